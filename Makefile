@@ -1,0 +1,39 @@
+# make demo   install into .venv and convert the clip in examples/
+# make test   the tests, in the same environment
+# make lint   style, format and types
+
+PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11; do \
+	$$python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
+	&& echo $$python && break; done)
+PYTEST_FLAGS ?= -n auto
+BIN := .venv/bin
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+
+.PHONY: demo test lint clean
+
+demo: .venv/core
+	$(BIN)/vid2ev convert examples/demo.mp4 -o demo_events --overwrite
+	@echo "Look at it: demo_events/preview.mp4"
+
+test: .venv/dev
+	$(BIN)/python -m pytest $(PYTEST_FLAGS)
+
+lint: .venv/dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf .venv demo_events
+
+.venv/core: pyproject.toml constraints.txt | $(BIN)/pip
+	$(INSTALL) -e .
+	@touch $@
+
+.venv/dev: pyproject.toml constraints.txt | $(BIN)/pip
+	$(INSTALL) -e '.[dev]'
+	@touch .venv/core $@
+
+$(BIN)/pip:
+	@test -n "$(PYTHON)" || { echo "vid2ev needs Python 3.11, 3.12 or 3.13; install one, or name it: make PYTHON=..."; exit 1; }
+	$(PYTHON) -m venv .venv

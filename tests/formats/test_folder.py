@@ -1,0 +1,173 @@
+"""The folder of a recording: there as a whole or not at all, what it must not touch it leaves, and it resumes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.folder import Folder, begun_job, check_free, partial_of
+from vid2ev.formats.manifest import write_manifest
+from vid2ev.stream.events import Events
+
+JOB = {"versions": {"vid2ev": "0"}, "sensor": {"threshold_on": 0.15}, "seed": 3}
+OTHER = JOB | {"sensor": {"threshold_on": 0.2}}
+
+
+def events_at(*t: int) -> Events:
+    n = len(t)
+    zeros = np.zeros(n, np.uint8)
+    return Events(np.array(t, np.int64), np.full(n, 7, np.uint16), np.full(n, 9, np.uint16), zeros, zeros)
+
+
+def made(folder: Folder) -> Path:
+    for name in ("events.h5", "manifest.json"):
+        (folder.whole / name).write_text(name)
+    write_manifest(folder.whole / "manifest.json", folder.job)
+    folder.publish()
+    return folder.directory
+
+
+def tree(path: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(path)): file.read_bytes() for file in sorted(path.rglob("*")) if file.is_file()}
+
+
+def begun(directory: Path) -> None:
+    """A conversion that was killed after its checkpoint: two events in it, a third beyond."""
+    folder = Folder(directory, JOB)
+    folder.__enter__()
+    folder.append(events_at(1, 2))
+    folder.checkpoint({"level": np.arange(4.0)})
+    folder.append(events_at(3))
+    for file in folder._files.values():
+        file.flush()
+    folder.__exit__(None, None, None)  # (what a kill does to the lock; with a checkpoint it leaves the files)
+
+
+def test_it_appears_as_a_whole(tmp_path: Path) -> None:
+    with Folder(tmp_path / "out", JOB) as folder:
+        assert not (tmp_path / "out").exists()
+        made(folder)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["events.h5", "manifest.json"]
+
+
+def test_an_empty_folder_is_free(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with Folder(tmp_path / "out", JOB) as folder:
+        made(folder)
+    assert (tmp_path / "out" / "events.h5").exists()
+
+
+def test_an_error_before_the_first_checkpoint_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", JOB) as folder:
+        folder.append(events_at(1))
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_events_come_back_in_blocks(tmp_path: Path) -> None:
+    with Folder(tmp_path / "out", JOB, labels=True) as folder:
+        for t in ((1, 2, 3), (), (4,), (5, 6, 7)):
+            folder.append(events_at(*t))
+        blocks = list(folder.events(3))
+    assert [block.t.tolist() for block in blocks] == [[1, 2, 3], [4, 5, 6], [7]]
+    assert all(block.label is not None and len(block.label) == len(block) for block in blocks)
+    with Folder(tmp_path / "out", JOB) as folder:
+        assert [len(block) for block in folder.events(3)] == [0]
+
+
+def test_resuming_cuts_off_what_came_after_the_checkpoint(tmp_path: Path) -> None:
+    begun(tmp_path / "out")
+    with Folder(tmp_path / "out", JOB, resume=True) as folder:
+        assert folder.count == 2
+        np.testing.assert_array_equal(folder.saved()["level"], np.arange(4.0))
+        folder.append(events_at(8))
+        (block,) = folder.events(10)
+        assert block.t.tolist() == [1, 2, 8]
+
+
+def test_a_begun_folder_is_neither_overwritten_nor_mixed(tmp_path: Path) -> None:
+    begun(tmp_path / "out")
+    before = tree(tmp_path)
+    with pytest.raises(UsageError, match="--resume"), Folder(tmp_path / "out", JOB):
+        pass
+    with (
+        pytest.raises(UsageError, match=r"threshold_on = 0\.15, not 0\.2"),
+        Folder(tmp_path / "out", OTHER, resume=True),
+    ):
+        pass
+    assert tree(tmp_path) == before
+    assert begun_job(tmp_path / "out") == JOB
+    with Folder(tmp_path / "out", OTHER, resume=True, overwrite=True) as folder:
+        assert folder.count == 0 and not folder.saved()
+
+
+def test_a_finished_recording_is_left_as_it_is(tmp_path: Path) -> None:
+    with Folder(tmp_path / "out", JOB) as folder:
+        made(folder)
+    before = tree(tmp_path)
+    with pytest.raises(UsageError, match="--overwrite"), Folder(tmp_path / "out", JOB):
+        pass
+    with Folder(tmp_path / "out", JOB, resume=True) as folder:
+        assert folder.finished == JOB
+    with pytest.raises(UsageError, match="threshold_on"), Folder(tmp_path / "out", OTHER, resume=True):
+        pass
+    assert tree(tmp_path) == before
+
+
+def test_overwriting_keeps_the_old_until_the_new_is_whole(tmp_path: Path) -> None:
+    with Folder(tmp_path / "out", JOB) as folder:
+        made(folder)
+    before = tree(tmp_path / "out")
+    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", OTHER, overwrite=True) as folder:
+        folder.append(events_at(1))
+        raise ZeroDivisionError
+    assert tree(tmp_path / "out") == before
+    with Folder(tmp_path / "out", OTHER, overwrite=True) as folder:
+        made(folder)
+    assert begun_job(tmp_path / "out") == OTHER
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_folders_of_others_are_not_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "one.png").touch()
+    (tmp_path / "file").touch()
+    (tmp_path / "here").mkdir()
+    partial_of(tmp_path / "taken").mkdir()
+    (partial_of(tmp_path / "taken") / "thesis.tex").touch()
+    monkeypatch.chdir(tmp_path / "here")
+    before = tree(tmp_path)
+    for directory, reason in {
+        tmp_path / "photos": "one.png",
+        tmp_path / "file": "is a file",
+        tmp_path / "taken": "other files",
+        Path("."): "within",
+        Path(".."): "within",
+        tmp_path / "here": "within",
+        Path("/"): "within",
+    }.items():
+        with pytest.raises(UsageError, match=reason):
+            check_free(directory, overwrite=True, resume=True)
+    assert tree(tmp_path) == before
+
+
+def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl", reason="no file locks on this system")
+    with Folder(tmp_path / "out", JOB) as first:
+        first.append(events_at(1))
+        for flags in ({}, {"overwrite": True}, {"resume": True}):
+            with pytest.raises(UsageError, match="another vid2ev"), Folder(tmp_path / "out", JOB, **flags):
+                pass
+        made(first)
+    assert (tmp_path / "out" / "events.h5").exists()
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(DataError, match="file/out cannot be written"), Folder(tmp_path / "file" / "out", JOB):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

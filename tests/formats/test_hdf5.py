@@ -1,0 +1,196 @@
+"""events.h5: what is written is what plain h5py reads, in DSEC's layout; what is damaged is refused in one sentence."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import hdf5plugin  # noqa: F401  (registers the filters)
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from vid2ev.errors import DataError
+from vid2ev.formats.hdf5 import BLOCK, describe_events, read_events, write_events
+from vid2ev.stream.events import Events
+
+SIZE = (320, 240)
+
+
+def events_at(t: np.ndarray, labelled: bool = False, seed: int = 0) -> Events:
+    random = np.random.default_rng(seed)
+    t = np.asarray(t, np.int64)
+    x, y = (random.integers(0, side, len(t)).astype(np.uint16) for side in SIZE)
+    p, label = (random.integers(0, n, len(t)).astype(np.uint8) for n in (2, 4))
+    return Events(t, x, y, p, label if labelled else None)
+
+
+def write(path: Path, events: Events, t_offset_us: int = 0, duration_us: int | None = None) -> None:
+    last = int(events.t[-1]) - t_offset_us if len(events) else 0
+    blocks = (events.select(np.arange(at, min(at + BLOCK, len(events)))) for at in range(0, max(len(events), 1), BLOCK))
+    duration_us = max(last, duration_us or 0)
+    write_events(path, blocks, count=len(events), size=SIZE, t_offset_us=t_offset_us, duration_us=duration_us)
+
+
+def assert_same(one: Events, other: Events) -> None:
+    for name in ("t", "x", "y", "p"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert getattr(one, name).dtype == getattr(other, name).dtype
+
+
+@pytest.mark.parametrize("labelled", [False, True])
+def test_plain_h5py_reads_what_was_written(tmp_path: Path, labelled: bool) -> None:
+    offset_us = 3 * 3600 * 10**6  # a recording that starts three hours in
+    t = np.sort(np.random.default_rng(1).integers(0, 5_000_000, BLOCK + 12_345)) + offset_us
+    events = events_at(t, labelled)
+    write(tmp_path / "events.h5", events, offset_us)
+    with h5py.File(tmp_path / "events.h5") as file:
+        assert {name: file[f"events/{name}"].dtype for name in "txyp"} == {"t": "u4", "x": "u2", "y": "u2", "p": "u1"}
+        assert file["ms_to_idx"].dtype == "u8" and file["t_offset"].dtype == "i8" and file["t_offset"].shape == ()
+        assert (file.attrs["width"], file.attrs["height"], file.attrs["version"]) == (*SIZE, 1)
+        assert file["t_offset"][()] == offset_us
+        np.testing.assert_array_equal(file["events/t"][:].astype(np.int64) + offset_us, events.t)
+        for name in ("x", "y", "p"):
+            np.testing.assert_array_equal(file[f"events/{name}"], getattr(events, name))
+        assert ("label" in file["events"]) == labelled
+        if labelled:
+            np.testing.assert_array_equal(file["events/label"], events.label)
+        milliseconds = np.arange(len(file["ms_to_idx"])) * 1000
+        np.testing.assert_array_equal(file["ms_to_idx"], np.searchsorted(events.t - offset_us, milliseconds))
+        assert file["ms_to_idx"][-1] == len(events)
+
+
+gaps = st.lists(st.integers(0, 3000) | st.sampled_from([0, 1, 999, 1000, 1001, 2_500_000]), max_size=60)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    gaps=gaps, offset=st.integers(0, 2**50), rest=st.integers(0, 5000), window=st.tuples(*[st.integers(-9, 10**7)] * 2)
+)
+def test_any_window_of_any_times_is_found(
+    tmp_path: Path, gaps: list[int], offset: int, rest: int, window: tuple[int, int]
+) -> None:
+    relative = np.cumsum(gaps, dtype=np.int64)
+    events = events_at(relative + offset)
+    duration = (int(relative[-1]) if gaps else 0) + rest
+    write(tmp_path / "events.h5", events, offset, duration)
+    with h5py.File(tmp_path / "events.h5") as file:
+        index = file["ms_to_idx"][:]
+    assert len(index) == duration // 1000 + 2  # every begun millisecond has its end, too
+    np.testing.assert_array_equal(index, np.searchsorted(relative, np.arange(len(index)) * 1000))
+    start, stop = (offset + at for at in window)
+    inside = events.select((events.t >= start) & (events.t < stop))
+    assert_same(Events.concatenate(read_events(tmp_path / "events.h5", start, stop, block=7)), inside)
+    assert_same(Events.concatenate(read_events(tmp_path / "events.h5", block=7)), events)
+
+
+@pytest.mark.parametrize(("last", "kind"), [(2**32 - 1, "u4"), (2**32, "u8"), (2**33, "u8")])
+def test_times_beyond_71_minutes_are_wide(tmp_path: Path, last: int, kind: str) -> None:
+    events = events_at(np.array([0, 5, last]))
+    write(tmp_path / "events.h5", events)
+    with h5py.File(tmp_path / "events.h5") as file:
+        assert file["events/t"].dtype == kind
+        assert file["ms_to_idx"][-2:].tolist() == [2, 3]
+    assert_same(Events.concatenate(read_events(tmp_path / "events.h5")), events)
+    assert_same(Events.concatenate(read_events(tmp_path / "events.h5", last, last + 1)), events.select(np.array([2])))
+
+
+def test_the_same_events_give_the_same_bytes(tmp_path: Path) -> None:
+    events = events_at(np.sort(np.random.default_rng(2).integers(0, 10**6, 200_000)), labelled=True)
+    write(tmp_path / "one.h5", events)
+    time.sleep(1.1)  # files with times of writing would differ in a second
+    write(tmp_path / "other.h5", events)
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "other.h5").read_bytes()
+
+
+@pytest.mark.parametrize("t", [[5, 4], [-1, 0]])
+def test_times_out_of_order_or_before_the_start_are_not_written(tmp_path: Path, t: list[int]) -> None:
+    with pytest.raises(ValueError, match="order"):
+        write(tmp_path / "events.h5", events_at(np.array(t)), duration_us=10)
+
+
+def test_the_description_counts(tmp_path: Path) -> None:
+    events = events_at(np.array([7, 7, 1999]), labelled=True)
+    write(tmp_path / "events.h5", events)
+    found = describe_events(tmp_path / "events.h5")
+    assert (found["events"], found["on"], found["off"]) == (3, int(events.p.sum()), 3 - int(events.p.sum()))
+    assert (found["first_us"], found["last_us"], found["size"], found["labels"]) == (7, 1999, list(SIZE), True)
+    assert describe_events(tmp_path)["events"] == 3  # the folder will do
+
+
+def test_files_of_others_without_size_and_index_are_read(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        for name, values in {"t": [10, 20, 2000], "x": [1, 2, 3], "y": [4, 5, 6], "p": [0, 1, 1]}.items():
+            file[f"events/{name}"] = np.array(values, np.int32)
+    (events,) = read_events(tmp_path / "other.h5", 20)
+    assert events.t.tolist() == [20, 2000] and events.y.tolist() == [5, 6]
+    assert describe_events(tmp_path / "other.h5")["size"] is None
+
+
+def refused(path: Path) -> str:
+    with pytest.raises(DataError) as raised:
+        list(read_events(path))
+    assert str(path) in str(raised.value) and "\n" not in str(raised.value)
+    return str(raised.value)
+
+
+def test_what_is_no_event_file_is_refused(tmp_path: Path) -> None:
+    assert "no such file" in refused(tmp_path / "missing.h5")
+    assert "no such file" in refused(tmp_path)
+    (tmp_path / "text.h5").write_text("t x y p\n")
+    assert "not an HDF5 file" in refused(tmp_path / "text.h5")
+    (tmp_path / "empty.h5").touch()
+    assert "not an HDF5 file" in refused(tmp_path / "empty.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["events/t"] = np.arange(3)
+    assert "DSEC" in refused(tmp_path / "other.h5")
+    with h5py.File(tmp_path / "uneven.h5", "w") as file:
+        for name, count in zip("txyp", (3, 3, 3, 2), strict=True):
+            file[f"events/{name}"] = np.arange(count)
+    assert "differ in length" in refused(tmp_path / "uneven.h5")
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.9, 0.999])
+def test_a_file_cut_short_is_refused(tmp_path: Path, share: float) -> None:
+    write(tmp_path / "events.h5", events_at(np.sort(np.random.default_rng(3).integers(0, 10**6, 200_000))))
+    whole = (tmp_path / "events.h5").read_bytes()
+    (tmp_path / "cut.h5").write_bytes(whole[: int(share * len(whole))])
+    refused(tmp_path / "cut.h5")
+
+
+def test_a_file_with_broken_chunks_is_refused(tmp_path: Path) -> None:
+    write(tmp_path / "events.h5", events_at(np.sort(np.random.default_rng(3).integers(0, 10**6, 200_000))))
+    with h5py.File(tmp_path / "events.h5") as file:
+        chunk = file["events/x"].id.get_chunk_info(1)
+    content = bytearray((tmp_path / "events.h5").read_bytes())
+    content[chunk.byte_offset : chunk.byte_offset + chunk.size] = bytes(chunk.size)
+    (tmp_path / "broken.h5").write_bytes(content)
+    refused(tmp_path / "broken.h5")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
+def test_a_full_disk_is_an_error_and_not_a_crash(tmp_path: Path) -> None:
+    program = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from vid2ev.formats.hdf5 import write_events
+from vid2ev.stream.events import Events
+random = np.random.default_rng(0)
+n = 1 << 18
+t = np.sort(random.integers(0, 10**7, n))
+x = random.integers(0, 300, n).astype(np.uint16)
+events = Events(t, x, x, (x & 1).astype(np.uint8))
+for limit in (0, 1, 100, 2048, 5000, 100_000, 1_000_000):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        write_events(Path(sys.argv[1]), [events], count=n, size=(300, 300), t_offset_us=0, duration_us=10**7)
+    except OSError as error:
+        print(error.errno)
+"""
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "full.h5")], capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout.split()) == (0, "", ["27"] * 7)  # EFBIG, as ENOSPC would be

@@ -1,0 +1,107 @@
+"""Fixed-rate mode: event frames at round(1e6 k / rate) us, at most one event per pixel and event frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against.clips import clean, feed, play, start
+
+from vid2ev.sensors.dvs import DvsSpec
+from vid2ev.stream import Events
+
+SHAPE = (12, 17)
+START_NS = 5_000_123_999
+
+
+def clip() -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    t_ns = START_NS + np.concatenate([[0], np.cumsum(rng.integers(300_000, 9_000_000, 50))])
+    return t_ns, 10 ** rng.uniform(-2.5, 0.5, (51, *SHAPE)).astype(np.float32)
+
+
+def frame_times(rate_hz: float, until_us: int) -> np.ndarray:
+    k = np.arange(int(until_us * rate_hz * 1e-6) + 3)
+    return START_NS // 1000 + np.rint(1e6 * k / rate_hz).astype(np.int64)
+
+
+roundings = pytest.mark.parametrize("rounding", ["nearest", "causal"])
+
+
+def in_event_frames(free: Events, grid: np.ndarray, rounding: str) -> tuple[dict, set]:
+    """(event frame, pixel) -> polarity of the first event there, and the keys that 1 us of rounding may change."""
+    pixels = SHAPE[0] * SHAPE[1]
+    after = np.searchsorted(grid, free.t)
+    low, high = free.t - grid[after - 1], grid[after] - free.t
+    if rounding == "nearest":
+        index, border = np.where(low <= high, after - 1, after), np.abs(low - high) / 2
+    else:
+        index, border = after, np.minimum(low, high)
+    key = index * pixels + free.y.astype(np.int64) * SHAPE[1] + free.x
+    first: dict[int, int] = {}
+    for k, p in zip(key.tolist(), free.p.tolist(), strict=True):
+        first.setdefault(k, p)
+    unsure = key[border <= 1]
+    return first, set(np.concatenate([unsure - pixels, unsure, unsure + pixels]).tolist())
+
+
+@pytest.mark.parametrize("rate_hz", [29.97, 30.0, 997.0, 3000.0, 100_000.0])
+@roundings
+def test_events_are_the_first_crossing_of_each_event_frame(rate_hz, rounding):
+    """The free-running events, moved to their event frame; the first of a pixel and frame stays."""
+    t_ns, light = clip()
+    keys = {"photoreceptor_tau_us": 300, "follower_tau_us": 100}
+    fixed = play(clean(frame_rate_hz=rate_hz, rounding=rounding, **keys), t_ns, light)
+    grid = frame_times(rate_hz, int(t_ns[-1] - START_NS) // 1000)
+    assert np.isin(fixed.t, grid).all()
+    place = fixed.y.astype(np.int64) * SHAPE[1] + fixed.x
+    assert (np.diff(fixed.t * light[0].size + place) > 0).all(), "out of order, or two of a pixel in one frame"
+
+    want, unsure = in_event_frames(play(clean(**keys), t_ns, light), grid, rounding)
+    key = np.searchsorted(grid, fixed.t) * light[0].size + place
+    got = dict(zip(key.tolist(), fixed.p.tolist(), strict=True))
+    assert {k: p for k, p in got.items() if k not in unsure} == {k: p for k, p in want.items() if k not in unsure}
+    assert len(got.keys() - unsure) > 1_000
+
+
+@roundings
+def test_an_event_frame_ahead_is_held_back(rounding):
+    """Whatever the cut into frames of light, the stream is ordered; `flush` gives the last events once."""
+    t_ns, light = clip()
+    dvs = start(clean(frame_rate_hz=40, rounding=rounding), light)
+    parts = []
+    for k in range(len(t_ns)):
+        sent = feed(dvs, t_ns[k : k + 1], light[k : k + 1])
+        assert not len(sent) or sent.t.max() * 1000 <= t_ns[k]
+        parts.append(sent)
+    rest = dvs.flush()
+    assert len(rest) > 0
+    assert len(dvs.flush()) == 0
+    sent = Events.concatenate([*parts, rest])
+    assert (np.diff(sent.t) >= 0).all()
+    assert dvs.counts["on"] + dvs.counts["off"] == len(sent)
+
+
+@roundings
+def test_causal_never_precedes_its_cause(rounding):
+    """One crossing at 12.4 ms of a 100 Hz camera: the nearest frame is at 10 ms, the next at 20 ms."""
+    t_ns = [0, 12_000_000, 13_000_000, 40_000_000]
+    light = np.exp(np.array([0.0, 0.0, 0.25, 0.25])).astype(np.float32)[:, None, None]
+    spec = clean(threshold_on=0.1, threshold_off=0.1, dark_level=1e-9, frame_rate_hz=100, rounding=rounding)
+    assert play(spec, t_ns, light).t.tolist() == [10_000 if rounding == "nearest" else 20_000]
+
+
+def test_free_running_holds_nothing_back():
+    t_ns, light = clip()
+    dvs = start(DvsSpec(), light)
+    feed(dvs, t_ns, light)
+    assert len(dvs.flush()) == 0
+
+
+def test_a_static_scene_with_noise_still_sends_one_event_per_frame_at_most():
+    """Hot pixels at 50 kHz in a 1 kHz camera: each sends in every event frame, once."""
+    t_ns = np.arange(0, 100_000_001, 10_000_000)
+    spec = clean(frame_rate_hz=1000, hot_probability=1.0, hot_rate_hz=50_000)
+    sent = play(spec, t_ns, np.full((len(t_ns), 3, 3), 0.2, np.float32))
+    times = sent.t[(sent.x == 1) & (sent.y == 1)]
+    assert (times % 1000 == 0).all() and (np.diff(times) == 1000).all()
+    assert len(times) in (100, 101)

@@ -1,0 +1,68 @@
+"""A label says why an event was sent; asking for it changes nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against.clips import clean, hold, play
+
+from vid2ev.sensors.dvs import DvsSpec
+from vid2ev.stream.events import Label
+
+SHAPE = (24, 24)
+REST = hold(0.3, np.arange(0, 1_000_000_001, 20_000_000), SHAPE)
+
+
+def moving() -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    return np.arange(30) * 5_000_000, 10 ** rng.uniform(-2, 0, (30, *SHAPE)).astype(np.float32)
+
+
+def noisy(**keys) -> DvsSpec:
+    """Leak, shot noise and hot pixels, each hardly there unless `keys` say so."""
+    rates = {"leak_rate_hz": 1e-6, "shot_rate_hz": 1e-6, "hot_probability": 1e-6, "hot_rate_hz": 1e-6}
+    return clean(**{**rates, **keys})
+
+
+@pytest.mark.parametrize(
+    ("keys", "label"),
+    [
+        ({"leak_rate_hz": 10}, Label.LEAK),
+        ({"shot_rate_hz": 10}, Label.SHOT),
+        ({"hot_probability": 0.2, "hot_rate_hz": 100}, Label.HOT),
+    ],
+)
+def test_at_rest_every_event_has_the_label_of_its_only_cause(keys, label):
+    sent = play(noisy(**keys), *REST, labels=True)
+    assert len(sent) > 1_000
+    assert (sent.label == label).all() and sent.label.dtype == np.uint8
+
+
+def test_events_of_moving_light_are_signal():
+    sent = play(noisy(), *moving(), labels=True)
+    assert len(sent) > 10_000
+    assert (sent.label == Label.SIGNAL).all()
+
+
+def test_hot_pixels_send_only_hot_events():
+    sent = play(noisy(hot_probability=1.0, hot_rate_hz=1000), *moving(), labels=True)
+    assert (sent.label == Label.HOT).all()
+
+
+def test_shot_events_in_moving_light_are_labelled_at_their_rate():
+    """The shot events of a moving scene are those of the law: rate by light, signal events aside."""
+    t_ns, light = moving()
+    sent = play(noisy(shot_rate_hz=2000), t_ns, light, labels=True)
+    mean_light = (light[1:] + light[:-1]).mean(dtype=np.float64) / 2
+    expected = 2000 * (1 - 0.75 * mean_light) * t_ns[-1] * 1e-9 * light[0].size
+    assert abs(np.count_nonzero(sent.label == Label.SHOT) - expected) < 5 * np.sqrt(expected)
+    assert np.count_nonzero(sent.label == Label.SIGNAL) > 1_000
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, 500.0])
+def test_labels_change_nothing_else(rate_hz):
+    spec = noisy(leak_rate_hz=5, shot_rate_hz=50, hot_probability=0.05, hot_rate_hz=500, frame_rate_hz=rate_hz)
+    plain, labelled = play(spec, *moving()), play(spec, *moving(), labels=True)
+    assert plain.label is None and len(labelled.label) == len(labelled) == len(plain) > 5_000
+    assert all(np.array_equal(getattr(plain, name), getattr(labelled, name)) for name in "txyp")
+    assert {Label.SIGNAL, Label.SHOT, Label.HOT} <= set(np.unique(labelled.label))

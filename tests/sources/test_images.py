@@ -1,0 +1,115 @@
+"""Folders of images: order, times, depth, refusals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources import open_source
+from vid2ev.sources.transfer import code_table
+
+
+def write(folder: Path, names: list[str], dtype=np.uint8, shape=(6, 8), stamps: str | None = None) -> list[np.ndarray]:
+    """Random images under these names, returned in the order of the names."""
+    rng = np.random.default_rng(0)
+    pictures = [rng.integers(0, np.iinfo(dtype).max + 1, shape).astype(dtype) for _ in names]
+    for name, picture in zip(names, pictures, strict=True):
+        assert cv2.imwrite(str(folder / name), picture)
+    if stamps is not None:
+        (folder / "timestamps.txt").write_text(stamps)
+    return pictures
+
+
+@pytest.mark.parametrize(("dtype", "bits"), [(np.uint8, 8), (np.uint16, 16)])
+def test_codes_of_either_depth_are_srgb(tmp_path: Path, dtype, bits: int) -> None:
+    pictures = write(tmp_path, [f"{k}.png" for k in range(3)], dtype)
+    source = open_source(tmp_path, fps=100)
+    frames = list(source.frames())
+    assert source.size == (8, 6) and source.frames_expected == 3 and source.warnings == []
+    assert [frame.t_ns for frame in frames] == [0, 10_000_000, 20_000_000]
+    for frame, picture in zip(frames, pictures, strict=True):
+        np.testing.assert_array_equal(frame.light, code_table("srgb", bits)[picture])
+        assert frame.light.dtype == np.float32 and frame.original
+    linear = next(open_source(tmp_path, fps=100, transfer="linear").frames())
+    np.testing.assert_array_equal(linear.light, code_table("linear", bits)[pictures[0]])
+
+
+def test_frame_10_comes_after_frame_9(tmp_path: Path) -> None:
+    names = ["frame9.png", "frame10.png", "frame100.png"]
+    pictures = write(tmp_path, names)
+    for frame, picture in zip(open_source(tmp_path, fps=1).frames(), pictures, strict=True):
+        np.testing.assert_array_equal(frame.light, code_table("srgb", 8)[picture])
+
+
+def test_colour_is_red_green_blue_and_transparency_is_ignored(tmp_path: Path) -> None:
+    blue_green_red_alpha = np.zeros((1, 3, 4), np.uint8)
+    blue_green_red_alpha[0, 0, 2] = blue_green_red_alpha[0, 1, 1] = blue_green_red_alpha[0, 2, 0] = 255
+    cv2.imwrite(str(tmp_path / "a.png"), blue_green_red_alpha)
+    (frame,) = open_source(tmp_path, fps=1).frames()
+    np.testing.assert_allclose(frame.light[0], [0.2126, 0.7152, 0.0722], atol=1e-6)
+
+
+def test_timestamps_are_honoured(tmp_path: Path) -> None:
+    write(tmp_path, ["0.png", "1.png", "2.png"], stamps="1.5\n1.500001\n2\n")
+    source = open_source(tmp_path)
+    assert [frame.t_ns for frame in source.frames()] == [1_500_000_000, 1_500_001_000, 2_000_000_000]
+    assert source.describe()["timestamps_unit"] == "s"
+    assert [frame.t_ns for frame in open_source(tmp_path, fps=4).frames()] == [0, 250_000_000, 500_000_000]
+
+
+def test_start_skips_without_changing_what_follows(tmp_path: Path) -> None:
+    write(tmp_path, [f"{k}.png" for k in range(5)], stamps="0\n40\n40\n80\n120\n")
+    source = open_source(tmp_path)
+    whole, rest = list(source.frames()), list(source.frames(2))
+    assert [frame.t_ns for frame in whole] == [0, 40_000_000, 80_000_000, 120_000_000]
+    assert [frame.t_ns for frame in rest] == [frame.t_ns for frame in whole[2:]]
+    np.testing.assert_array_equal(rest[0].light, whole[2].light)
+    assert source.warnings == ["dropped 1 of 5 frames whose time is not after the frame before"]
+    assert list(source.frames(9)) == []
+
+
+def test_float_tiff_is_light(tmp_path: Path) -> None:
+    light = np.linspace(0, 12, 48, dtype=np.float32).reshape(6, 8)
+    cv2.imwrite(str(tmp_path / "a.tiff"), light)
+    source = open_source(tmp_path, fps=1)
+    np.testing.assert_array_equal(next(source.frames()).light, light)
+    assert source.describe()["transfer"] == "linear"
+
+
+def test_other_files_in_the_folder_do_not_matter(tmp_path: Path) -> None:
+    write(tmp_path, ["0.png"])
+    (tmp_path / "notes.md").write_text("not an image")
+    assert open_source(tmp_path, fps=1).frames_expected == 1
+
+
+def test_refusals(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no images"):
+        open_source(tmp_path, fps=30)
+    write(tmp_path, ["0.png", "1.png"])
+    with pytest.raises(UsageError, match="--fps"):
+        open_source(tmp_path)
+    (tmp_path / "timestamps.txt").write_text("0\n33\n66\n")
+    with pytest.raises(DataError, match="3 times for 2 images"):
+        open_source(tmp_path)
+    with pytest.raises(UsageError, match="transfer"):
+        open_source(tmp_path, fps=1, transfer="nonsense")
+
+
+def test_an_image_of_another_size_is_named(tmp_path: Path) -> None:
+    write(tmp_path, ["0.png", "1.png"])
+    write(tmp_path, ["2.png"], shape=(6, 9))
+    with pytest.raises(DataError, match=r"2\.png: 9x6 pixels, expected 8x6"):
+        list(open_source(tmp_path, fps=1).frames())
+
+
+@pytest.mark.parametrize("content", [b"", b"not a png at all", None])
+def test_a_broken_image_is_named(tmp_path: Path, content: bytes | None) -> None:
+    write(tmp_path, ["0.png", "1.png"], shape=(64, 64))
+    whole = (tmp_path / "1.png").read_bytes()
+    (tmp_path / "1.png").write_bytes(whole[: len(whole) // 2] if content is None else content)
+    with pytest.raises(DataError, match=r"1\.png"):
+        list(open_source(tmp_path, fps=1).frames())

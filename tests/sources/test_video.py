@@ -1,0 +1,456 @@
+"""Videos: exact times, exact light, the right way up, and what is wrong with a file in one sentence."""
+
+from __future__ import annotations
+
+import wave
+import weakref
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources import open_source
+from vid2ev.sources.transfer import parse_transfer
+from vid2ev.sources.video import Video
+
+LIMITED, FULL = 1, 2
+
+
+def light_of(signal: np.ndarray, transfer: str = "bt709") -> np.ndarray:
+    return parse_transfer(transfer).to_light(signal)
+
+
+def flat(codes: list[int], shape: tuple[int, int] = (32, 48)) -> list[np.ndarray]:
+    return [np.full(shape, code, np.uint8) for code in codes]
+
+
+# ---------------------------------------------------------------------------------------------------------- times
+
+
+@pytest.mark.parametrize(
+    "rate", [Fraction(24000, 1001), Fraction(30000, 1001), Fraction(25), Fraction(240), Fraction(7)]
+)
+def test_times_are_the_nearest_nanosecond_of_exact_fractions(encode, rate: Fraction) -> None:
+    path = encode("a.mp4", flat([k * 4 for k in range(40)]), codec="libx264", time_base=1 / rate)
+    times = [frame.t_ns for frame in open_source(path).frames()]
+    assert len(times) == 40
+    for k, t_ns in enumerate(times):
+        assert abs(t_ns - k / rate * 10**9) <= Fraction(1, 2)
+
+
+def test_variable_rate_and_reordered_frames(encode) -> None:
+    """B-frames are stored out of order; each frame must come with its own time, whatever the spacing."""
+    stamps = [0, 1, 5, 6, 7, 400, 401, 9000, 90000, 90001, 90005, 90090]
+    levels = [20 * k + 10 for k in range(len(stamps))]
+    options = {"bf": "3", "crf": "1", "x264-params": "b-adapt=0:scenecut=0"}
+    path = encode("a.mp4", flat(levels), codec="libx264", stamps=stamps, time_base=Fraction(1, 90000), options=options)
+    with av.open(str(path)) as container:
+        kinds = {frame.pict_type for frame in container.decode(video=0)}
+    assert len(kinds) == 3, "no B-frames: the test tests nothing"
+    frames = list(open_source(path).frames())
+    assert [frame.t_ns for frame in frames] == [(2 * s * 10**9 + 90000) // 180000 for s in stamps]
+    brightness = [frame.light.mean() for frame in frames]
+    assert brightness == sorted(brightness) and len(set(brightness)) == len(levels)
+
+
+def test_a_clip_that_starts_late_keeps_its_times(encode) -> None:
+    hours = 3 * 3600 * 1000
+    path = encode("a.mkv", flat([1, 2, 3]), stamps=[hours, hours + 33, hours + 66], time_base=Fraction(1, 1000))
+    times = [frame.t_ns for frame in open_source(path).frames()]
+    assert times == [(hours + k) * 1_000_000 for k in (0, 33, 66)]
+
+
+def test_repeated_times_are_dropped_and_counted(encode) -> None:
+    # Matroska rounds to milliseconds: four frames in 0.4 ms become repeats.
+    stamps = [0, 1000, 1001, 1002, 1003, 2000]
+    path = encode("a.mkv", flat([10, 20, 30, 40, 50, 60]), stamps=stamps, time_base=Fraction(1, 10000))
+    source = open_source(path)
+    frames = list(source.frames())
+    assert [frame.t_ns for frame in frames] == [0, 100_000_000, 200_000_000]
+    assert source.warnings == ["dropped 3 of 6 frames whose time is not after the frame before"]
+    (last,) = source.frames(2)
+    assert last.t_ns == 200_000_000 and len(source.warnings) == 1
+
+
+def test_a_stream_without_times_is_placed_by_its_rate(encode) -> None:
+    path = encode("a.h264", flat([10, 20, 30]), codec="libx264", time_base=Fraction(1, 25))
+    source = open_source(path)
+    assert [frame.t_ns for frame in source.frames()] == [0, 40_000_000, 80_000_000]
+    assert "3 frames without a presentation time were placed at 25 fps" in source.warnings[0]
+    assert [frame.t_ns for frame in open_source(path, fps=1000).frames()] == [0, 1_000_000, 2_000_000]
+
+
+def test_fps_overrules_the_file(encode) -> None:
+    path = encode("a.mkv", flat([1, 2, 3]), stamps=[0, 5, 90])
+    assert [frame.t_ns for frame in open_source(path, fps=1000).frames()] == [0, 1_000_000, 2_000_000]
+
+
+def test_start_is_a_place_in_the_whole(encode) -> None:
+    options = {"bf": "2", "g": "8"}
+    path = encode("a.mp4", flat([7 * k for k in range(30)]), codec="libx264", options=options)
+    source = open_source(path)
+    whole = list(source.frames())
+    for start in (0, 1, 8, 29):
+        rest = list(source.frames(start))
+        assert [frame.t_ns for frame in rest] == [frame.t_ns for frame in whole[start:]]
+        assert all(np.array_equal(a.light, b.light) for a, b in zip(rest, whole[start:], strict=True))
+    assert list(source.frames(30)) == []
+
+
+# ---------------------------------------------------------------------------------------------------------- light
+
+
+def test_ten_bits_arrive_as_ten_bits(encode, make_picture) -> None:
+    ramp = np.arange(64, 941, dtype=np.uint16)[None, :].repeat(4, axis=0)
+    ramp = np.concatenate([ramp, ramp[:, -1:]], axis=1)
+    neutral = np.full((2, ramp.shape[1] // 2), 512, np.uint16)
+    path = encode("a.mkv", [make_picture([ramp, neutral, neutral], "yuv420p10le", color_range=LIMITED)])
+    source = open_source(path)
+    (frame,) = source.frames()
+    assert source.describe()["bits"] == 10
+    assert len(np.unique(frame.light)) == 877  # of 219 * 4 + 1 levels
+    np.testing.assert_allclose(frame.light[1], light_of((ramp[1] / 4.0 - 16) / 219), atol=6e-7)
+
+
+def test_eight_bits_of_luma_are_not_rounded_again(encode, make_picture) -> None:
+    """Through 8-bit RGB, 220 levels of limited range would fall on uneven steps of 256."""
+    ramp = np.arange(16, 236, dtype=np.uint8)[None, :].repeat(2, axis=0)
+    neutral = np.full((1, 110), 128, np.uint8)
+    (frame,) = open_source(encode("a.mkv", [make_picture([ramp, neutral, neutral], "yuv420p")])).frames()
+    np.testing.assert_allclose(frame.light[0], light_of((ramp[0] - 16.0) / 219), atol=6e-7)
+
+
+@pytest.mark.parametrize("depth", [8, 10, 12])
+def test_full_and_limited_range_agree(encode, make_picture, depth: int) -> None:
+    """The same signal coded both ways, to within half a code of each."""
+    rng = np.random.default_rng(0)
+    signal, chroma = rng.uniform(0.2, 0.8, (16, 16)), rng.uniform(-0.1, 0.1, (2, 16, 16))
+    unit, top = 2.0 ** (depth - 8), 2**depth - 1
+    name, dtype = ("yuv444p", np.uint8) if depth == 8 else (f"yuv444p{depth}le", np.uint16)
+    lights = []
+    for color_range in (FULL, LIMITED):
+        if color_range == FULL:
+            planes = [signal * top, *(c * top + 128 * unit for c in chroma)]
+        else:
+            planes = [(16 + 219 * signal) * unit, *((128 + 224 * c) * unit for c in chroma)]
+        coded = make_picture([np.rint(p).astype(dtype) for p in planes], name, color_range=color_range, colorspace=1)
+        path = encode(f"{color_range}.mkv", [coded], color_range=color_range, colorspace=1)
+        source = open_source(path)
+        assert source.describe()["range"] == ("full" if color_range == FULL else "limited")
+        lights.append(next(source.frames()).light)
+    np.testing.assert_allclose(lights[0], lights[1], atol=5.0 / (219 * unit))
+    assert abs(np.mean(lights[0] - lights[1])) < 0.3 / (219 * unit)
+
+
+@pytest.mark.parametrize(("pixel_format", "bits"), [
+    ("gray", 8), ("gray10le", 10), ("gray16le", 16), ("gbrp", 8), ("gbrp10le", 10), ("gbrp16le", 16),
+])  # fmt: skip
+def test_grey_and_rgb_are_full_range_and_exact(encode, make_picture, pixel_format: str, bits: int) -> None:
+    rng = np.random.default_rng(0)
+    dtype = np.uint8 if bits == 8 else np.uint16
+    count = 3 if pixel_format.startswith("g") and "b" in pixel_format else 1
+    planes = [rng.integers(0, 2**bits, (8, 10)).astype(dtype) for _ in range(count)]
+    codec = {"gbrp": "rawvideo"}.get(pixel_format, "ffv1")
+    source = open_source(encode("a.nut", [make_picture(planes, pixel_format)], codec=codec))
+    green, blue, red = (light_of(p / (2.0**bits - 1)) for p in (planes if count == 3 else planes * 3))
+    (frame,) = source.frames()
+    np.testing.assert_allclose(frame.light, 0.2126 * red + 0.7152 * green + 0.0722 * blue, atol=6e-7)
+
+
+def test_packed_and_semi_planar_formats_are_taken_apart_without_loss(make_picture) -> None:
+    from vid2ev.sources.planes import planar
+
+    rng = np.random.default_rng(0)
+    y, u, v = (rng.integers(0, 256, shape).astype(np.uint8) for shape in ((8, 16), (4, 8), (4, 8)))
+    woven = np.stack([u, v], axis=-1).reshape(4, 16)
+    for color_range in (0, LIMITED, FULL):
+        taken = planar(make_picture([y, woven], "nv12", color_range=color_range), "clip")
+        assert taken.format.name == "yuv420p" and taken.color_range == color_range
+        for plane, expected in zip(taken.planes, (y, u, v), strict=True):
+            got = np.frombuffer(plane, np.uint8).reshape(plane.height, -1)[:, : expected.shape[1]]
+            np.testing.assert_array_equal(got, expected)
+
+
+@pytest.mark.parametrize(("tags", "transfer"), [
+    ({}, "bt709"),
+    ({"color_trc": 1}, "bt709"),
+    ({"color_trc": 13}, "srgb"),
+    ({"color_trc": 4}, "gamma:2.2"),
+    ({"color_trc": 5}, "gamma:2.8"),
+    ({"color_trc": 8}, "linear"),
+])  # fmt: skip
+def test_the_tag_chooses_the_curve(encode, tags: dict[str, int], transfer: str) -> None:
+    path = encode("a.mkv", flat([128]), **tags)
+    source = open_source(path)
+    assert source.describe()["transfer"] == transfer
+    (frame,) = source.frames()
+    np.testing.assert_allclose(frame.light, light_of(np.array(128 / 255), transfer), atol=1e-6)
+    assert open_source(path, transfer="gamma:3").describe()["transfer"] == "gamma:3"
+
+
+@pytest.mark.parametrize(("tag", "name"), [(16, "PQ"), (18, "HLG")])
+def test_hdr_is_refused_by_name_unless_told_otherwise(encode, tag: int, name: str) -> None:
+    path = encode("a.mkv", flat([128]), color_trc=tag)
+    with pytest.raises(DataError, match=f"{name}.*--transfer"):
+        open_source(path)
+    assert len(list(open_source(path, transfer="bt709").frames())) == 1
+
+
+def test_matrix_and_primaries_are_those_of_the_tags(encode, make_picture) -> None:
+    y, u, v = (np.full((4, 4), code, np.uint8) for code in (110, 90, 190))
+    got = {}
+    for matrix in (1, 6, 9):
+        coded = make_picture([y, u, v], "yuv444p", colorspace=matrix, color_primaries=matrix)
+        path = encode(f"{matrix}.mkv", [coded], colorspace=matrix, color_primaries=matrix)
+        got[matrix] = float(next(open_source(path).frames()).light[0, 0])
+    luma, cb, cr = (110 - 16) / 219, (90 - 128) / 224, (190 - 128) / 224
+    for matrix, kr, kb, weights in (
+        (1, 0.2126, 0.0722, (0.2126, 0.7152, 0.0722)),
+        (6, 0.299, 0.114, (0.2124, 0.7011, 0.0866)),
+        (9, 0.2627, 0.0593, (0.2627, 0.6780, 0.0593)),
+    ):
+        red, blue = luma + 2 * (1 - kr) * cr, luma + 2 * (1 - kb) * cb
+        green = (luma - kr * red - kb * blue) / (1 - kr - kb)
+        assert got[matrix] == pytest.approx(float(light_of(np.array([red, green, blue])) @ weights), abs=1e-4)
+    assert len(set(got.values())) == 3
+
+
+# ---------------------------------------------------------------------------------------------------------- upright
+
+
+def with_display_matrix(path: Path, matrix: tuple[int, int, int, int]) -> Path:
+    """The mp4 with the matrix a, b, c, d in its track header (ISO/IEC 14496-12 section 8.3.2)."""
+    data = bytearray(path.read_bytes())
+    at = data.index(b"tkhd") + 4 + 40
+    for place, value in zip((0, 1, 3, 4), matrix, strict=True):
+        data[at + 4 * place : at + 4 * place + 4] = (value << 16).to_bytes(4, "big", signed=True)
+    turned = path.with_name(f"turned{matrix}.mp4")
+    turned.write_bytes(data)
+    return turned
+
+
+@pytest.mark.parametrize(("matrix", "turn"), [
+    ((1, 0, 0, 1), lambda p: p),
+    ((0, 1, -1, 0), lambda p: np.rot90(p, -1)),  # a telephone held upright: a quarter turn clockwise to show it
+    ((-1, 0, 0, -1), lambda p: np.rot90(p, 2)),
+    ((0, -1, 1, 0), lambda p: np.rot90(p, 1)),
+    ((-1, 0, 0, 1), np.fliplr),
+    ((1, 0, 0, -1), np.flipud),
+    ((0, 1, 1, 0), np.transpose),
+    ((0, -1, -1, 0), lambda p: np.rot90(p, 2).T),
+])  # fmt: skip
+def test_the_picture_is_upright(encode, matrix: tuple[int, int, int, int], turn: Callable[[Any], np.ndarray]) -> None:
+    scene = np.full((32, 64), 50, np.uint8)
+    scene[:16, :16], scene[:16, 48:], scene[16:, :32] = 230, 150, 90
+    stored = encode("a.mp4", [scene] * 2, codec="libx264", options={"crf": "0", "bf": "0"})
+    (upright, _) = open_source(stored).frames()
+    path = with_display_matrix(stored, matrix)
+    source = open_source(path)
+    (frame, _) = source.frames()
+    assert frame.light.shape == source.size[::-1] and frame.light.flags.c_contiguous
+    np.testing.assert_array_equal(frame.light, turn(upright.light))
+    with av.open(str(path)) as container:  # (FFmpeg's own reading of the angle, where there is no mirror)
+        angle = next(container.decode(video=0)).rotation
+    if matrix[0] * matrix[3] - matrix[1] * matrix[2] > 0:
+        np.testing.assert_array_equal(frame.light, np.rot90(upright.light, angle // 90))
+
+
+# ---------------------------------------------------------------------------------------------------------- damage
+
+
+def noisy(count: int) -> Iterator[np.ndarray]:
+    rng = np.random.default_rng(0)
+    for _ in range(count):
+        yield rng.integers(0, 256, (64, 96)).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("name", "codec", "container_options"), [
+    ("a.mp4", "libx264", {"movflags": "+faststart"}),
+    ("a.mkv", "ffv1", {}),
+    ("a.avi", "ffv1", {}),
+])  # fmt: skip
+def test_a_truncated_file_gives_what_it_has_and_says_so(encode, name: str, codec: str, container_options) -> None:
+    path = encode(
+        name,
+        noisy(40),
+        codec=codec,
+        container_options=container_options,
+        options={"bf": "0"} if codec == "libx264" else {},
+    )
+    whole = list(open_source(path).frames())
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) * 6 // 10])
+    source = open_source(path)
+    frames = list(source.frames())
+    assert 10 < len(frames) < 30
+    assert any("truncated" in warning for warning in source.warnings)
+    for a, b in zip(frames, whole, strict=False):
+        assert a.t_ns == b.t_ns and np.array_equal(a.light, b.light)
+    assert len(list(source.frames(5))) == len(frames) - 5
+
+
+def test_a_file_without_its_index_is_refused(encode) -> None:
+    path = encode("a.mp4", noisy(40), codec="libx264")
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(DataError, match=r"a\.mp4: not a video"):
+        open_source(path)
+
+
+def test_damage_in_the_middle_costs_only_what_is_damaged(encode) -> None:
+    path = encode("a.avi", noisy(20))
+    whole = list(open_source(path).frames())
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 3000] = bytes(3000)
+    path.write_bytes(data)
+    source = open_source(path)
+    frames = list(source.frames())
+    same = {frame.t_ns for frame in whole for other in frames if np.array_equal(frame.light, other.light)}
+    assert 16 <= len(same) <= len(frames) <= 20
+
+
+def test_a_disk_that_fails_ends_the_clip_with_a_remark(encode, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = encode("a.mp4", flat([8 * k for k in range(30)]), codec="libx264", options={"bf": "2"})
+    source = open_source(path)
+    demux = av.container.InputContainer.demux
+
+    class Failing:
+        def __init__(self, container):
+            self.container = container
+
+        def demux(self, stream):
+            for k, packet in enumerate(demux(self.container, stream)):
+                if k == 20:
+                    raise av.error.InvalidDataError(1, "disk on fire")
+                yield packet
+
+    pictures = Video._pictures
+    monkeypatch.setattr(Video, "_pictures", lambda self, c, s, remarks: pictures(self, Failing(c), s, remarks))
+    frames = list(source.frames())
+    assert 18 <= len(frames) <= 20  # (the decoder's rest included)
+    assert any("cannot be read to its end" in warning for warning in source.warnings)
+
+
+def test_a_change_of_size_is_refused(encode) -> None:
+    small = encode("a.h264", flat([10, 20], (32, 48)), codec="libx264").read_bytes()
+    path = encode("b.h264", flat([10, 20], (64, 48)), codec="libx264")
+    path.write_bytes(small + path.read_bytes())
+    with pytest.raises(DataError, match="size changes to 48x64"):
+        list(open_source(path).frames())
+
+
+def test_interlaced_video_is_remarked_on(encode) -> None:
+    path = encode("a.mp4", flat([10, 20]), codec="libx264", options={"x264-params": "tff=1"})
+    assert "interlaced" in open_source(path).warnings[0]
+
+
+def write_sound(path: Path) -> None:
+    with wave.open(str(path), "wb") as sound:
+        sound.setnchannels(1)
+        sound.setsampwidth(2)
+        sound.setframerate(8000)
+        sound.writeframes(bytes(8000))
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 100_000, b"just some text, no video\n" * 50, b"RIFF"])
+def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes) -> None:
+    for name in ("clip.mp4", "clip.txt", "clip"):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(DataError, match=name):
+            open_source(tmp_path / name)
+
+
+def test_sound_alone_is_refused(tmp_path: Path) -> None:
+    write_sound(tmp_path / "a.wav")
+    with pytest.raises(DataError, match="no video stream"):
+        open_source(tmp_path / "a.wav")
+
+
+def test_a_picture_under_another_name_is_refused(tmp_path: Path) -> None:
+    import cv2
+
+    (tmp_path / "clip.mp4").write_bytes(cv2.imencode(".png", np.zeros((8, 8), np.uint8))[1].tobytes())
+    with pytest.raises(UsageError, match="a single picture"):
+        open_source(tmp_path / "clip.mp4")
+
+
+def test_a_playlist_opens_nothing_else(encode, tmp_path: Path) -> None:
+    clip = encode("a.ts", flat([10, 20]), codec="libx264")
+    (tmp_path / "list.m3u8").write_text(f"#EXTM3U\n#EXTINF:1,\nhttp://127.0.0.1:9/x.ts\n{clip}\n#EXT-X-ENDLIST\n")
+    with pytest.raises(DataError):
+        open_source(tmp_path / "list.m3u8")
+
+
+def test_odd_names_are_names(encode, tmp_path: Path) -> None:
+    path = encode("a.mkv", flat([10]))
+    for name in ("http:clip.mkv", "a b%d.mkv", "pipe:0", "ünïcode.mkv"):
+        path.rename(tmp_path / name)
+        path = tmp_path / name
+        assert len(list(open_source(path).frames())) == 1
+
+
+@pytest.mark.parametrize("name", ["missing.mp4", "missing/", "photo.png"])
+def test_paths_that_cannot_be_meant(tmp_path: Path, name: str) -> None:
+    if name == "photo.png":
+        (tmp_path / name).write_bytes(b"")
+    with pytest.raises(UsageError, match=name.rstrip("/")):
+        open_source(tmp_path / name)
+
+
+def test_options_that_cannot_be_meant(encode) -> None:
+    path = encode("a.mkv", flat([10]))
+    with pytest.raises(UsageError, match="transfer"):
+        open_source(path, transfer="sgrb")
+    with pytest.raises(UsageError, match="fps"):
+        open_source(path, fps=0)
+
+
+# ---------------------------------------------------------------------------------------------------------- streaming
+
+
+def test_frames_do_not_pile_up(encode) -> None:
+    path = encode("a.mkv", noisy(60))
+    alive: list[weakref.ref] = []
+    for frame in open_source(path).frames():
+        alive.append(weakref.ref(frame.light))
+        del frame
+        assert sum(ref() is not None for ref in alive) <= 1
+
+
+def test_two_readers_do_not_disturb_each_other(encode) -> None:
+    source = open_source(encode("a.mkv", noisy(10)))
+    for a, b in zip(source.frames(), source.frames(), strict=True):
+        assert a.t_ns == b.t_ns and np.array_equal(a.light, b.light) and a.light is not b.light
+
+
+def test_it_is_ready_for_json(encode) -> None:
+    import json
+
+    about = json.loads(json.dumps(open_source(encode("a.mkv", flat([10]))).describe()))
+    assert about["kind"] == "video" and about["size"] == [48, 32] and about["codec"] == "ffv1"
+
+
+# ---------------------------------------------------------------------------------------------------------- real clips
+
+
+@pytest.mark.parametrize(("name", "size", "count"), [
+    ("intel_car-detection.mp4", (768, 432), 377),
+    ("intel_asl_book.mkv", (640, 480), 109),
+    ("nasa_13013.mp4", (320, 180), 325),
+])  # fmt: skip
+def test_real_clips_are_read_whole(shared_videos: Path, name: str, size: tuple[int, int], count: int) -> None:
+    source = open_source(shared_videos / name)
+    assert source.size == size
+    with av.open(str(shared_videos / name)) as container:
+        stamps = [frame.pts * frame.time_base for frame in container.decode(container.streams.video[0])]
+    seen = 0
+    for frame, stamp in zip(source.frames(), stamps, strict=True):
+        assert abs(frame.t_ns - stamp * 10**9) <= Fraction(1, 2)
+        assert frame.light.shape == size[::-1] and np.isfinite(frame.light).all()
+        seen += 1
+    assert seen == count and source.warnings == []

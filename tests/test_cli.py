@@ -1,0 +1,351 @@
+"""The command line: what it prints, and that every failure is one sentence, an exit code, and nothing left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from vid2ev import Frame, UsageError, conversion
+from vid2ev.commands import main
+from vid2ev.recipe import Recipe
+
+CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
+QUICK = ["--upsample", "none", "--threads", "1"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def vid2ev(*arguments: str) -> Result:
+    result = CliRunner().invoke(main, arguments)
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def left() -> set[str]:
+    return {path.name for path in Path().iterdir()}
+
+
+def refused(exit_code: int, sentence: str, *arguments: str) -> str:
+    """The error of a command, which must be one line and leave the folder as it was."""
+    before = left()
+    result = vid2ev(*arguments)
+    assert result.exit_code == exit_code, result.output
+    line = result.stderr.strip()
+    assert line.startswith("error: ") and "\n" not in line and result.stdout == ""
+    assert sentence in line
+    assert left() == before
+    return line
+
+
+def write_video(path: Path, frames: int = 30, size: tuple[int, int] = (64, 48)) -> Path:
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"g": "5"})
+        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        for k in range(frames):
+            picture = np.full((size[1], size[0], 3), 40, np.uint8)
+            picture[10:30, k : k + 20] = 200
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode(None))
+    return path
+
+
+# ----------------------------------------------------------------------------------------------------- what works
+
+
+def test_a_video_becomes_a_recording() -> None:
+    write_video(Path("clip.mp4"))
+    result = vid2ev("convert", "clip.mp4", *QUICK)
+    assert result.exit_code == 0 and result.stderr == ""
+    assert {path.name for path in Path("clip_events").iterdir()} == {"events.h5", "preview.mp4", "manifest.json"}
+    manifest = json.loads(Path("clip_events/manifest.json").read_text())
+    assert f"{manifest['counts']['events']:,}" in result.stdout
+    assert manifest["counts"]["frames"] == 30 and manifest["counts"]["events"] > 0
+    assert len(result.stdout.splitlines()) < 25
+
+
+def test_options_reach_the_recording() -> None:
+    sensor = Path("mine.toml")
+    sensor.write_text("[dvs]\nthreshold_on = 0.3\nmismatch = 0\ncrossing_noise = 0\n")
+    options = [
+        "--set",
+        "threshold_off=0.25",
+        "--seed",
+        "9",
+        "--labels",
+        "--no-preview",
+        "--fps",
+        "50",
+        "--threads",
+        "2",
+    ]
+    light = ["--upsample", "linear", "--subframes", "3", "--max-subframes", "8"]
+    result = vid2ev("convert", CLIP, "-o", "a/b/out", "--sensor", "mine.toml", "-q", *options, *light)
+    assert (result.exit_code, result.output) == (0, "")
+    manifest = json.loads(Path("a/b/out/manifest.json").read_text())
+    parameters = manifest["sensor"]["parameters"]
+    assert (parameters["threshold_on"], parameters["threshold_off"], manifest["seed"]) == (0.3, 0.25, 9)
+    assert manifest["upsampling"] == {"method": "linear", "subframes": 3, "max_subframes": 8}
+    assert manifest["labels"] is True and manifest["run"]["threads"] == 2
+    assert manifest["counts"]["frames"] == 11  # 0.2 s at 50 Hz instead of 100
+    assert not Path("a/b/out/preview.mp4").exists()
+
+
+def test_a_dry_run_says_all_and_does_nothing() -> None:
+    result = vid2ev(
+        "convert", CLIP, "--dry-run", "--sensor", "davis346", "--set", "threshold_on=0.31", "--seed", "random"
+    )
+    assert result.exit_code == 0 and left() == set()
+    for fact in ("moving-edge", "64x48", "davis346", "0.31", "refractory", "at random", "events.h5"):
+        assert fact in result.stdout
+    refused(2, "threshold_onn", "convert", CLIP, "--dry-run", "--set", "threshold_onn=1")
+
+
+def test_verbose_says_before_what_it_does() -> None:
+    result = vid2ev("convert", CLIP, "-o", "out", "-v", *QUICK)
+    assert result.stdout.index("effects") < result.stdout.index("took")
+
+
+def test_overwrite_and_resume_on_a_finished_recording() -> None:
+    vid2ev("convert", CLIP, "-o", "out", "-q", *QUICK)
+    refused(2, "--overwrite", "convert", CLIP, "-o", "out", *QUICK)
+    refused(2, "seed = 0, not 1", "convert", CLIP, "-o", "out", "--resume", "--seed", "1", *QUICK)
+    before = Path("out/manifest.json").stat().st_mtime_ns
+    assert vid2ev("convert", CLIP, "-o", "out", "--resume", *QUICK).exit_code == 0
+    assert Path("out/manifest.json").stat().st_mtime_ns == before
+    assert vid2ev("convert", CLIP, "-o", "out", "--overwrite", "--seed", "1", *QUICK).exit_code == 0
+    assert json.loads(Path("out/manifest.json").read_text())["seed"] == 1
+
+
+def test_info_on_everything() -> None:
+    write_video(Path("clip.mp4"))
+    vid2ev("convert", "clip.mp4", "-q", *QUICK)
+    manifest = json.loads(Path("clip_events/manifest.json").read_text())
+    count = manifest["counts"]["events"]
+    for path in ("clip_events", "clip_events/events.h5"):
+        assert f"{count:,}" in vid2ev("info", path).stdout
+    assert json.loads(vid2ev("info", "clip_events", "--json").stdout) == manifest
+    events = json.loads(vid2ev("info", "clip_events/events.h5", "--json").stdout)
+    assert (events["events"], events["size"]) == (count, [64, 48])
+    for path, size in (("clip.mp4", "64x48"), ("clip_events/preview.mp4", "x480"), (CLIP, "64x48")):
+        assert size in vid2ev("info", path).stdout
+    assert json.loads(vid2ev("info", "clip.mp4", "--json").stdout)["size"] == [64, 48]
+
+
+def test_a_truncated_video_is_converted_with_a_warning() -> None:
+    whole = write_video(Path("clip.mkv"), 60).read_bytes()
+    Path("cut.mkv").write_bytes(whole[: len(whole) * 2 // 3])
+    result = vid2ev("convert", "cut.mkv", *QUICK)
+    assert result.exit_code == 0, result.output
+    assert "warning" in result.stdout
+    manifest = json.loads(Path("cut_events/manifest.json").read_text())
+    assert manifest["warnings"] and 1 < manifest["counts"]["frames"] < 60
+
+
+def test_help_and_version() -> None:
+    assert {"convert", "info", "sensors"} <= set(vid2ev("--help").stdout.split())
+    for command in ("convert", "info"):
+        assert vid2ev(command, "--help").exit_code == 0
+    assert vid2ev("--version").stdout.startswith("vid2ev ")
+    done = subprocess.run([sys.executable, "-m", "vid2ev", "info", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0 and "Usage: " in done.stdout
+
+
+# ----------------------------------------------------------------------------------------------------- what does not
+
+
+def test_a_command_that_is_not() -> None:
+    result = vid2ev("convrt", CLIP)
+    assert result.exit_code == 2 and "did you mean convert?" in result.stderr
+    assert "the commands are" in vid2ev("qqq").stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["--subframes", "0"],
+        ["--subframes", "many"],
+        ["--upsample", "magic"],
+        ["--threads", "0"],
+        ["--max-subframes", "0"],
+        ["--fps", "0"],
+        ["--fps", "fast"],
+        ["--seed=-1"],
+        ["--seed", "dice"],
+        ["--sensr", "ideal"],
+    ],
+    ids=" ".join,
+)
+def test_options_that_cannot_be_meant(arguments: list[str]) -> None:
+    result = vid2ev("convert", *([CLIP] if arguments else []), *arguments)
+    assert result.exit_code == 2 and "Error: " in result.stderr and left() == set()
+
+
+@pytest.mark.parametrize(
+    ("sentence", "arguments"),
+    [
+        ("davis346", ["--sensor", "davis364"]),
+        ("no.toml", ["--sensor", "no.toml"]),
+        ("threshold_on", ["--set", "threshold_onn=1"]),
+        ("threshold_on", ["--set", "threshold_on=-1"]),
+        ("threshold_on", ["--set", "threshold_on=nan"]),
+        ("key=value", ["--set", "threshold_on"]),
+        ("frame_rate_hz", ["--set", "frame_rate_hz=fast"]),
+        ("18446744073709551616", ["--seed", str(2**64)]),
+        ("holds files", ["-o", "photos"]),
+        ("is a file", ["-o", "file"]),
+        ("within", ["-o", "."]),
+    ],
+)
+def test_values_that_cannot_be(sentence: str, arguments: list[str]) -> None:
+    Path("photos").mkdir()
+    Path("photos/one.png").touch()
+    Path("file").touch()
+    refused(2, sentence, "convert", CLIP, *arguments, *QUICK)
+    refused(2, sentence, "convert", CLIP, *arguments, *QUICK, "--dry-run")
+
+
+def test_sources_that_are_none() -> None:
+    Path("empty.mp4").touch()
+    Path("text.mp4").write_text("not a video\n" * 1000)
+    Path("noise.avi").write_bytes(np.random.default_rng(0).bytes(50_000))
+    Path("bare").mkdir()
+    Path("notes").mkdir()
+    Path("notes/readme.txt").touch()
+    np.save("cube.npy", np.zeros((3, 0, 4), np.float32))
+    refused(2, "missing.mp4", "convert", "missing.mp4")
+    refused(2, "no such", "convert", "synthetic.mp4/clip")
+    for name in ("empty.mp4", "text.mp4", "noise.avi", "bare", "notes", "cube.npy"):
+        refused(1, name, "convert", name)
+        refused(1, name, "info", name)
+    refused(2, "expected one of", "convert", "synthetic:nothing")
+    refused(2, "transfer", "convert", str(write_video(Path("clip.mp4"), 3)), "--transfer", "gama:2")
+    refused(1, "no such file", "info", "missing.h5")
+    Path("text.h5").write_text("t x y p")
+    refused(1, "not an HDF5 file", "info", "text.h5")
+    Path("odd").mkdir()
+    Path("odd/manifest.json").write_text("[1, 2]")
+    refused(1, "manifest", "info", "odd")
+
+
+def test_a_place_that_cannot_be_written() -> None:
+    Path("file").touch()
+    refused(1, "cannot be written", "convert", CLIP, "-o", "file/out", *QUICK)
+
+
+def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    vid2ev("convert", CLIP, "-o", "whole", "-q", *QUICK)
+    light = Recipe._light
+
+    def interrupted(self: Recipe, start: int) -> Iterator[tuple[Frame, int]]:
+        for k, item in enumerate(light(self, start)):
+            if k == 8:
+                raise KeyboardInterrupt
+            yield item
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Recipe, "_light", interrupted)
+        result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
+        assert (result.exit_code, result.stderr.count("\n")) == (130, 1)
+        assert "nothing is left" in result.stderr and left() == {"whole"}
+        patch.setitem(conversion.convert.__kwdefaults__, "piece", 1)
+        result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
+        assert result.exit_code == 130 and "--resume" in result.stderr
+    refused(2, "--resume", "convert", CLIP, "-o", "out", *QUICK)
+    result = vid2ev("convert", CLIP, "-o", "out", "--resume", *QUICK)
+    assert result.exit_code == 0 and left() == {"whole", "out"}
+    assert Path("out/events.h5").read_bytes() == Path("whole/events.h5").read_bytes()
+
+
+def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Recipe, "of", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        vid2ev("convert", CLIP)
+
+
+def test_every_error_raised_on_purpose_has_its_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    @click.command()
+    def failing() -> None:
+        raise UsageError("value 3: expected 4; give 4")
+
+    monkeypatch.setattr(type(main), "get_command", lambda *_: failing)
+    monkeypatch.setattr(type(main), "list_commands", lambda *_: ["failing"])
+    result = vid2ev("failing")
+    assert (result.exit_code, result.stderr) == (2, "error: value 3: expected 4; give 4\n")
+
+
+# ----------------------------------------------------------------------------------------------------- the real thing
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals, limits and terminals")
+
+
+def started(*arguments: str, before: str = "", **options: Any) -> subprocess.Popen[str]:
+    program = f"import sys; from vid2ev.commands import main\n{before}\nmain(sys.argv[1:])"
+    return subprocess.Popen([sys.executable, "-c", program, *arguments], text=True, **options)
+
+
+@posix
+@pytest.mark.parametrize("limit", [1000, 30_000, 120_000])
+def test_a_full_disk_is_one_sentence_and_the_old_recording_stays(limit: int) -> None:
+    clip = CLIP.replace("0.2", "2")
+    options = [clip, "-o", "out", "-q", *QUICK]
+    vid2ev("convert", *options, "--seed", "1")
+    before = {path.name: path.read_bytes() for path in Path("out").iterdir()}
+    full = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, resource.RLIM_INFINITY))"
+    child = started("convert", *options, "--overwrite", before=full, stderr=subprocess.PIPE)
+    _, error = child.communicate()
+    assert child.returncode == 1, error
+    assert error.startswith("error: out cannot be written") and error.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in Path("out").iterdir()} == before and left() == {"out"}
+
+
+@posix
+def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
+    endless = CLIP.replace("0.2", "1000")
+    child = started("convert", endless, "-o", "out", *QUICK, stderr=subprocess.PIPE)
+    while not Path("out.partial/t").exists() and child.poll() is None:
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    _, error = child.communicate()
+    assert (child.returncode, error.count("\n"), error[:11]) == (130, 1, "interrupted")
+    assert left() == set()
+
+
+@posix
+def test_a_terminal_shows_progress_and_a_file_does_not() -> None:
+    import pty
+    import termios
+
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (24, 110))
+    child = started("convert", CLIP, "-o", "out", *QUICK, stdout=subprocess.PIPE, stderr=theirs)
+    os.close(theirs)
+    shown = b""
+    while child.poll() is None or shown == b"":
+        try:
+            shown += os.read(ours, 1 << 16)
+        except OSError:  # (the other end is closed)
+            break
+    child.communicate()
+    os.close(ours)
+    assert child.returncode == 0
+    for fact in (b"frames", b"left", b"events/s", b"x real time"):
+        assert fact in shown

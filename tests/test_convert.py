@@ -1,0 +1,193 @@
+"""`convert`: the same recipe makes the same bytes, the files agree with each other, and a failure leaves nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+import h5py
+import hdf5plugin  # noqa: F401  (registers the filters)
+import numpy as np
+import pytest
+
+from vid2ev import DataError, Events, Frame, UsageError, convert, events_of, load_sensor, read_events
+from vid2ev.recipe import Recipe, _ahead
+
+CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
+NOISY = ["shot_rate_hz=20", "leak_rate_hz=1", "hot_probability=0.01", "hot_rate_hz=200"]
+OPTIONS: dict[str, Any] = {"overrides": NOISY, "upsample": "linear", "subframes": 3, "seed": 5, "labels": True}
+VIDEOS = Path(__file__).parents[1] / ".." / "shared" / "data" / "videos"
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("convert") / "reference"
+    convert(CLIP, directory, threads=1, **OPTIONS)
+    return directory
+
+
+def manifest_of(directory: Path) -> dict[str, Any]:
+    return json.loads((directory / "manifest.json").read_text())
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"threads": 2}, {"threads": 5}, {"piece": 1}, {"piece": 1 << 21}, {"preview": False}, {"report": lambda *_: None}],
+    ids=str,
+)
+def test_what_does_not_count_changes_no_bit(reference: Path, tmp_path: Path, changed: dict[str, Any]) -> None:
+    convert(CLIP, tmp_path / "out", **({"threads": 1} | OPTIONS | changed))
+    assert (tmp_path / "out" / "events.h5").read_bytes() == (reference / "events.h5").read_bytes()
+    one, other = manifest_of(reference), manifest_of(tmp_path / "out")
+    for manifest in (one, other):
+        del manifest["run"], manifest["preview"]
+    assert one == other
+    if changed.get("preview", True) and "piece" not in changed:
+        assert (tmp_path / "out" / "preview.mp4").read_bytes() == (reference / "preview.mp4").read_bytes()
+    assert (tmp_path / "out" / "preview.mp4").exists() == changed.get("preview", True)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"seed": 6}, {"subframes": 2}, {"upsample": "none", "subframes": "auto"}, {"overrides": NOISY[1:]}],
+    ids=str,
+)
+def test_what_counts_makes_other_events(reference: Path, tmp_path: Path, changed: dict[str, Any]) -> None:
+    convert(CLIP, tmp_path / "out", **(OPTIONS | changed))
+    assert (tmp_path / "out" / "events.h5").read_bytes() != (reference / "events.h5").read_bytes()
+
+
+def test_events_of_gives_what_convert_writes(reference: Path) -> None:
+    options = OPTIONS | {"threads": 2}
+    one = Events.concatenate(events_of(CLIP, **options))
+    other = Events.concatenate(read_events(reference))
+    assert len(one) > 1000
+    for name in ("t", "x", "y", "p", "label"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_specification_serves_as_a_sensor(reference: Path, tmp_path: Path) -> None:
+    options = OPTIONS | {"overrides": (), "sensor": load_sensor("paper", NOISY)}
+    convert(CLIP, tmp_path / "out", **options)
+    assert (tmp_path / "out" / "events.h5").read_bytes() == (reference / "events.h5").read_bytes()
+    with pytest.raises(UsageError, match="preset or file"):
+        convert(CLIP, tmp_path / "other", **(options | {"overrides": NOISY}))
+
+
+def test_the_manifest_says_what_is_in_the_files(reference: Path) -> None:
+    manifest = manifest_of(reference)
+    events = Events.concatenate(read_events(reference))
+    counts = manifest["counts"]
+    assert counts["events"] == len(events) == counts["on"] + counts["off"]
+    assert counts["on"] == int(events.p.sum())
+    assert (counts["frames"], counts["subframes"]) == (31, 60)
+    assert (manifest["start_us"], manifest["duration_us"]) == (0, 300_000)
+    assert manifest["sensor"]["size"] == [64, 48] and manifest["seed"] == 5
+    assert load_sensor("paper", NOISY).model_dump(mode="json") == manifest["sensor"]["parameters"]
+    assert manifest["sensor"]["effects"] == load_sensor("paper", NOISY).effects()
+    assert {"vid2ev", "python", "numpy", "numba", "av"} <= set(manifest["versions"])
+    assert manifest["run"]["seconds"] > 0 and manifest["run"]["threads"] == 1
+    with h5py.File(reference / "events.h5") as file:
+        assert (file.attrs["width"], file.attrs["height"]) == (64, 48)
+        assert len(file["ms_to_idx"]) == 302
+        np.testing.assert_array_equal(file["ms_to_idx"], np.searchsorted(events.t, np.arange(302) * 1000))
+    with av.open(str(reference / "preview.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == 10
+
+
+def test_a_recording_counts_from_its_first_frame(tmp_path: Path) -> None:
+    light = np.repeat(np.geomspace(0.1, 0.8, 12, dtype=np.float32), 16).reshape(12, 4, 4)
+    np.save(tmp_path / "late.npy", light)
+    start_us = 3 * 3600 * 10**6 + 7
+    np.save(tmp_path / "late_timestamps.npy", (start_us + 10_000 * np.arange(12)) * 1000)
+    manifest = convert(tmp_path / "late.npy", tmp_path / "out", "ideal", upsample="none")
+    assert (manifest["start_us"], manifest["duration_us"]) == (start_us, 110_000)
+    with h5py.File(tmp_path / "out" / "events.h5") as file:
+        assert file["t_offset"][()] == start_us and file["events/t"].dtype == "u4"
+        assert file["events/t"][0] > 0 and file["events/t"][-1] <= 110_000
+    (events,) = read_events(tmp_path / "out")
+    assert start_us < events.t[0] and events.t[-1] <= start_us + 110_000
+
+
+def test_event_frames_later_than_the_last_frame_are_kept(tmp_path: Path) -> None:
+    overrides = ["frame_rate_hz=7"]  # event frames at 143 ms, 286 ms, 429 ms
+    manifest = convert(CLIP, tmp_path / "out", "ideal", overrides, upsample="none")
+    events = Events.concatenate(read_events(tmp_path / "out"))
+    assert set(events.t) <= {0, 142_857, 285_714, 428_571} and len(events) == manifest["counts"]["events"] > 0
+    convert(CLIP, tmp_path / "pieces", "ideal", overrides, upsample="none", piece=1)
+    assert (tmp_path / "out" / "events.h5").read_bytes() == (tmp_path / "pieces" / "events.h5").read_bytes()
+
+
+@pytest.mark.parametrize("labels", [False, True])
+def test_one_frame_makes_a_recording_without_events(tmp_path: Path, labels: bool) -> None:
+    np.save(tmp_path / "still.npy", np.full((1, 3, 5), 0.5, np.float32))
+    manifest = convert(tmp_path / "still.npy", tmp_path / "out", fps=30, labels=labels)
+    assert manifest["counts"]["events"] == 0 and manifest["duration_us"] == 0
+    assert any("one frame" in warning for warning in manifest["warnings"])
+    assert len(Events.concatenate(read_events(tmp_path / "out"))) == 0
+    with h5py.File(tmp_path / "out" / "events.h5") as file:
+        assert file["ms_to_idx"][:].tolist() == [0, 0] and ("label" in file["events"]) == labels
+
+
+def test_a_random_seed_is_drawn_and_kept(tmp_path: Path) -> None:
+    one = convert(CLIP, tmp_path / "one", seed=None, upsample="none")
+    other = convert(CLIP, tmp_path / "other", seed=None, upsample="none")
+    assert one["seed"] != other["seed"]
+    again = convert(CLIP, tmp_path / "again", seed=one["seed"], upsample="none")
+    assert (tmp_path / "again" / "events.h5").read_bytes() == (tmp_path / "one" / "events.h5").read_bytes()
+    assert convert(CLIP, tmp_path / "one", seed=None, upsample="none", resume=True) == one
+    assert {key: again[key] for key in again if key != "run"} == {key: one[key] for key in one if key != "run"}
+
+
+def test_a_source_that_fails_half_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    light = Recipe._light
+
+    def failing(self: Recipe, start: int) -> Iterator[tuple[Frame, int]]:
+        for k, item in enumerate(light(self, start)):
+            if k == 8:
+                raise DataError("picture 8 is broken; mend it")
+            yield item
+
+    monkeypatch.setattr(Recipe, "_light", failing)
+    with pytest.raises(DataError, match="picture 8"):
+        convert(CLIP, tmp_path / "out", upsample="none")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_items_made_ahead_come_in_order_and_errors_in_their_place() -> None:
+    closed = []
+
+    def counting() -> Iterator[int]:
+        try:
+            yield from range(10)
+            raise ZeroDivisionError
+        finally:
+            closed.append(True)
+
+    got = []
+    with pytest.raises(ZeroDivisionError):
+        for item in _ahead(counting(), 3):
+            got.append(item)
+    assert got == list(range(10)) and closed == [True]
+    early = _ahead(counting(), 3)
+    assert next(early) == 0
+    early.close()
+    assert closed == [True, True]
+
+
+def test_real_video_makes_the_same_bytes_in_pieces(tmp_path: Path) -> None:
+    video = VIDEOS / "intel_asl_again.mkv"
+    if not video.exists():
+        pytest.skip("../shared/data is not here")
+    manifest = convert(video, tmp_path / "one", upsample="none", threads=1)
+    convert(video, tmp_path / "other", upsample="none", threads=2, piece=1 << 22)
+    assert (tmp_path / "one" / "events.h5").read_bytes() == (tmp_path / "other" / "events.h5").read_bytes()
+    assert manifest["counts"]["events"] > 100_000
+    films = []
+    for directory in ("one", "other"):
+        with av.open(str(tmp_path / directory / "preview.mp4")) as film:
+            films.append([packet.pts for packet in film.demux(video=0)])
+    assert films[0] == films[1]

@@ -1,0 +1,185 @@
+"""The house stands: imports go down only, modules stand alone, commands are documented, the docs are true."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import graphlib
+import importlib
+import io
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "vid2ev"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+# The floor of each room; an import may only go to a lower floor, or stay in its own room.
+FLOORS = {
+    "errors": 0,
+    "kernel_cache": 0,
+    "stream": 1,
+    "sources": 2,
+    "upsample": 2,
+    "physics": 2,
+    "formats": 2,
+    "kernels": 3,
+    "sensors": 4,
+    "recipe": 5,
+    "conversion": 6,
+    "": 7,  # vid2ev/__init__.py: the public names
+    "commands": 8,
+    "__main__": 9,
+}
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+COMMANDS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["vid2ev.commands"]
+
+
+def room(module: str) -> str:
+    return [*module.split("."), ""][1]
+
+
+def imports_of(nodes: list[ast.stmt]) -> set[str]:
+    """The vid2ev modules that the statements import; `from package import name` is resolved to a module."""
+    found: set[str] = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            for alias in node.names:
+                submodule = f"{node.module}.{alias.name}"
+                found.add(submodule if submodule in MODULES else node.module or "")
+    return {name for name in found if name.split(".")[0] == "vid2ev"}
+
+
+def tree(module: str) -> ast.Module:
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_go_down_only(module: str) -> None:
+    # Imports inside functions count too: they are later, not higher.
+    nodes = [node for node in ast.walk(tree(module)) if isinstance(node, ast.stmt)]
+    for target in imports_of(nodes):
+        assert room(module) in FLOORS, f"give the room of {module} a floor"
+        assert room(target) == room(module) or FLOORS[room(target)] < FLOORS[room(module)], f"{module} -> {target}"
+
+
+def test_imports_make_no_cycle() -> None:
+    graph = {module: imports_of(tree(module).body) - {module} for module in MODULES}
+    graphlib.TopologicalSorter(graph).prepare()
+
+
+def test_every_module_imports_alone() -> None:
+    program = """
+import importlib, sys
+for name in sys.argv[1:]:
+    for loaded in [loaded for loaded in sys.modules if loaded.split(".")[0] == "vid2ev"]:
+        del sys.modules[loaded]
+    importlib.import_module(name)
+"""
+    names = [name for name in MODULES if not name.endswith("__main__")]
+    done = subprocess.run([sys.executable, "-c", program, *names], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["-c", "import vid2ev"], ["-m", "vid2ev", "--help"]])
+def test_a_quick_start_loads_nothing_heavy(arguments: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", *arguments], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    loaded = {line.rpartition("|")[2].strip().split(".")[0] for line in done.stderr.splitlines()}
+    assert "vid2ev" in loaded
+    assert not loaded & {"numpy", "numba", "av", "cv2", "h5py", "pydantic"}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_modules_are_short(module: str) -> None:
+    assert len(MODULES[module].read_text(encoding="utf-8").splitlines()) <= 400
+
+
+def test_every_public_name_is_there() -> None:
+    import vid2ev
+
+    assert all(getattr(vid2ev, name) is not None for name in vid2ev.__all__)
+    assert set(vid2ev.__all__) <= set(dir(vid2ev))
+
+
+def effects() -> dict[str, type]:
+    """The parameter models in physics/, one per effect."""
+    from pydantic import BaseModel
+
+    models: dict[str, type] = {}
+    for name in MODULES:
+        if name.startswith("vid2ev.physics."):
+            module = importlib.import_module(name)
+            for value in vars(module).values():
+                if isinstance(value, type) and issubclass(value, BaseModel) and value.__module__ == name:
+                    models[name] = value
+    return models
+
+
+def test_every_effect_says_what_it_is_in_units_and_where_it_comes_from() -> None:
+    units = {"us": "[us]", "hz": "[Hz]"}
+    assert effects()
+    for name, model in effects().items():
+        page = importlib.import_module(name).__doc__ or ""
+        assert re.search(r"^Sources?:", page, re.MULTILINE), f"{name} cites no source"
+        assert re.search(r"^    \S", page, re.MULTILINE), f"{name} displays no law"
+        for key, field in model.model_fields.items():  # type: ignore[attr-defined]
+            assert field.description, f"{name}: {key} has no description"
+            suffix = key.rpartition("_")[2]
+            if suffix in units and key != "frame_rate_hz":
+                assert units[suffix] in field.description, f"{name}: {key} does not say {units[suffix]}"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_and_stands_in_the_readme(name: str) -> None:
+    module, _, attribute = COMMANDS[name].partition(":")
+    command = getattr(importlib.import_module(module), attribute)
+    shown = CliRunner().invoke(command, ["--help"], prog_name=f"vid2ev {name}")
+    assert shown.exit_code == 0, shown.output
+    assert command.help and command.name == name
+    assert all(option.help for option in command.params if isinstance(option, click.Option))
+    assert f"vid2ev {name}" in README
+
+
+def test_the_readme_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each Python block runs, all in one namespace, and prints what the text block after it shows."""
+    monkeypatch.chdir(ROOT)
+    blocks = re.findall(r"```python\n(.*?)```(?:\s*```text\n(.*?)```)?", README, re.DOTALL)
+    assert blocks
+    namespace: dict[str, object] = {}
+    for code, expected in blocks:
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(code, "README.md", "exec"), namespace)
+        assert printed.getvalue().strip() == expected.strip()
+
+
+def test_the_readme_names_every_preset() -> None:
+    from vid2ev.sensors.presets import preset_names
+
+    assert all(f"`{name}`" in README for name in preset_names())
+
+
+def test_links_in_the_documents_lead_somewhere() -> None:
+    for page in (ROOT / "README.md", PACKAGE / "README.md"):
+        for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
+            if not target.startswith("http"):
+                assert (page.parent / target).exists(), f"{page.name}: {target}"

@@ -1,0 +1,61 @@
+"""vid2ev: ordinary video in, what an event camera would have recorded out.
+
+The public names load what they need on first use, so that `import vid2ev` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vid2ev.conversion import convert as convert
+    from vid2ev.errors import DataError as DataError
+    from vid2ev.errors import UsageError as UsageError
+    from vid2ev.errors import Vid2evError as Vid2evError
+    from vid2ev.formats.hdf5 import read_events as read_events
+    from vid2ev.recipe import events_of as events_of
+    from vid2ev.sensors.dvs import Dvs as Dvs
+    from vid2ev.sensors.presets import load_sensor as load_sensor
+    from vid2ev.sensors.presets import preset_names as preset_names
+    from vid2ev.sensors.spec import DvsSpec as DvsSpec
+    from vid2ev.sources import open_source as open_source
+    from vid2ev.stream.events import Events as Events
+    from vid2ev.stream.events import Label as Label
+    from vid2ev.stream.frames import Frame as Frame
+
+    __version__: str
+
+_HOME = {
+    "DataError": "vid2ev.errors",
+    "Dvs": "vid2ev.sensors.dvs",
+    "DvsSpec": "vid2ev.sensors.spec",
+    "Events": "vid2ev.stream.events",
+    "Frame": "vid2ev.stream.frames",
+    "Label": "vid2ev.stream.events",
+    "UsageError": "vid2ev.errors",
+    "Vid2evError": "vid2ev.errors",
+    "convert": "vid2ev.conversion",
+    "events_of": "vid2ev.recipe",
+    "load_sensor": "vid2ev.sensors.presets",
+    "open_source": "vid2ev.sources",
+    "preset_names": "vid2ev.sensors.presets",
+    "read_events": "vid2ev.formats.hdf5",
+}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("vid2ev")
+    if name not in _HOME:
+        raise AttributeError(f"module 'vid2ev' has no attribute '{name}'")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

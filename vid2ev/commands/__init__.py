@@ -1,0 +1,54 @@
+"""The command line: each command parses, makes one call and prints.
+
+Commands are entry points of the group `vid2ev.commands`, so that other packages can add theirs; their modules import
+what is heavy when they are called.
+"""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from importlib.metadata import entry_points
+from typing import Any
+
+import click
+
+from vid2ev.errors import Vid2evError
+
+INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
+
+
+class Commands(click.Group):
+    """The commands of all installed packages, by name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(entry_points(group="vid2ev.commands").names)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        found = entry_points(group="vid2ev.commands", name=cmd_name)
+        return next(iter(found)).load() if found else None
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        names = self.list_commands(ctx)
+        if args and args[0] not in names and not args[0].startswith("-"):
+            close = difflib.get_close_matches(args[0], names, n=1, cutoff=0.5)
+            hint = f"did you mean {close[0]}?" if close else f"the commands are {', '.join(names)}"
+            raise click.UsageError(f"no command '{args[0]}'; {hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Errors meant for people become one line; what else goes wrong keeps its traceback."""
+        try:
+            return super().invoke(ctx)
+        except Vid2evError as error:
+            click.echo(f"error: {error}", err=True)
+            sys.exit(error.exit_code)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            sys.exit(INTERRUPTED)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="vid2ev", message="%(package)s %(version)s")
+def main() -> None:
+    """Ordinary video in, what an event camera would have recorded out."""

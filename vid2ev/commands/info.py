@@ -1,0 +1,43 @@
+"""`vid2ev info`: what a recording, an event file or a video holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+
+@click.command(short_help="Say what a recording, an event file or a video holds.")
+@click.argument("file")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
+def info(file: str, as_json: bool) -> None:
+    """Say what FILE holds: a folder that `vid2ev convert` wrote, an event file (events.h5), or a source of frames.
+
+    Exit code 1 says that it cannot be read, 2 that there is no such file.
+    """
+    from vid2ev.commands import summary
+
+    path = Path(file)
+    if (path / "manifest.json").is_file():
+        from vid2ev.formats.manifest import read_manifest
+
+        found = read_manifest(path)
+        facts = [
+            *summary.result_facts(found),
+            *summary.recipe_facts(found),
+            *summary.file_facts(path),
+            *summary.speed_facts(found),
+        ]
+    elif path.suffix in (".h5", ".hdf5"):
+        from vid2ev.formats.hdf5 import describe_events
+
+        found = describe_events(path)
+        facts = summary.event_facts(found)
+    else:
+        from vid2ev.sources import open_source
+
+        source = open_source(file)
+        found = {"path": file} | source.describe()
+        facts = [("source", summary.source_text(found)), *(("warning", text) for text in source.warnings)]
+    click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))

@@ -1,0 +1,105 @@
+"""Recordings and recipes on one screen: a name and a line for each fact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+NAME = 10  # width of the names
+
+
+def lines(facts: Iterable[tuple[str, str]]) -> str:
+    """Facts under each other, their names in a column."""
+    return "\n".join(f"{name:<{NAME}}{text}" for name, text in facts)
+
+
+def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Source, light, sensor and seed, from a recipe's description or a manifest."""
+    sensor, upsampling = recipe["sensor"], recipe["upsampling"]
+    parameters = sensor["parameters"]
+    light = {
+        "none": "the frames, in a straight line from one to the next",
+        "linear": f"in a straight line from frame to frame, {_parts(upsampling, 'in one part')}",
+        "flow": f"along the motion between the frames, {_parts(upsampling, 'in parts as needed, at most {}')}",
+    }
+    width, height = sensor["size"]
+    return [
+        ("source", source_text(recipe["source"])),
+        ("light", light[upsampling["method"]]),
+        (
+            "sensor",
+            f"{sensor['name']}, {width}x{height}, thresholds ON {parameters['threshold_on']:g} and OFF"
+            f" {parameters['threshold_off']:g}, seed {recipe['seed']}",
+        ),
+        ("effects", ", ".join(sensor["effects"]) or "none"),
+    ]
+
+
+def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Events, duration and warnings, from a manifest."""
+    counts = manifest["counts"]
+    seconds, (width, height) = manifest["duration_us"] / 1e6, manifest["sensor"]["size"]
+    rate = f", {_short(counts['events'] / seconds)}/s, {counts['events'] / seconds / width / height:.3g}/s per pixel"
+    share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
+    return [
+        ("events", f"{counts['events']:,}{rate if seconds else ''}{share}"),
+        ("duration", f"{seconds:.3f} s: {counts['frames']:,} frames, {counts['subframes']:,} made between them"),
+        *(("warning", text) for text in manifest["warnings"]),
+    ]
+
+
+def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Time taken, from a manifest."""
+    seconds, video_s = manifest["run"]["seconds"], manifest["duration_us"] / 1e6
+    ratio = f", {video_s / seconds:.2g} x real time" if seconds and video_s else ""
+    threads = manifest["run"]["threads"]
+    return [("took", f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}")]
+
+
+def file_facts(directory: Path) -> list[tuple[str, str]]:
+    """The files of a recording."""
+    files = sorted(path for path in directory.iterdir() if path.is_file())
+    return [("files", f"{directory}: " + ", ".join(f"{path.name} {_bytes(path)}" for path in files))]
+
+
+def source_text(source: Mapping[str, Any]) -> str:
+    """A source's description as one line; unknown facts are left out."""
+    facts = [
+        "x".join(map(str, source["size"])) if source.get("size") else "",
+        f"{source['frames_expected']} frames" if source.get("frames_expected") else "",
+        *(str(source[key]) for key in ("codec", "pixel_format", "transfer") if source.get(key)),
+    ]
+    return f"{source['path']} ({', '.join(fact for fact in [source.get('kind', ''), *facts] if fact)})"
+
+
+def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """An event file's description."""
+    count = facts["events"]
+    first, last = facts["first_us"], facts["last_us"]
+    spread = (last - first) / 1e6 if count else 0.0
+    share = f", {100 * facts['on'] / count:.1f} % ON" if count else ""
+    found = [
+        ("events", f"{count:,}{share}{', ' + _short(count / spread) + '/s' if spread else ''}"),
+        ("size", "x".join(map(str, facts["size"])) if facts["size"] else "not stated"),
+    ]
+    if count:
+        found.append(("time", f"{first} ... {last} us ({spread:.6f} s), counted from {facts['start_us']} us"))
+    stored = f"{facts['bytes'] / count:.2f} bytes per event, " if count else ""
+    return [*found, ("stored", f"{stored}t as {facts['time_type']}{', with labels' * facts['labels']}")]
+
+
+def _parts(upsampling: Mapping[str, Any], auto: str) -> str:
+    parts = upsampling["subframes"]
+    return auto.format(upsampling["max_subframes"]) if parts == "auto" else f"in {parts} parts"
+
+
+def _short(number: float) -> str:
+    for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+        if number >= size:
+            return f"{number / size:.3g} {unit}"
+    return f"{number:.3g} "
+
+
+def _bytes(path: Path) -> str:
+    return f"{_short(path.stat().st_size)}B"

@@ -1,0 +1,244 @@
+"""`convert`: the whole path, from a video to the folder of its recording."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError
+from vid2ev.formats.folder import Folder, begun_job
+from vid2ev.formats.hdf5 import BLOCK, write_events
+from vid2ev.formats.manifest import machine, write_manifest
+from vid2ev.formats.preview import Preview
+from vid2ev.recipe import Recipe
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
+STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
+
+
+@dataclass
+class Progress:
+    """How far a conversion is."""
+
+    frames: int = 0  # of the source
+    subframes: int = 0  # made between them
+    limited: int = 0  # source intervals that hit max_subframes
+    events: int = 0
+    start_ns: int = 0  # the first frame
+    end_ns: int = 0  # the last frame
+    last_us: int = 0  # the last event
+    seconds: float = 0.0  # of work, in all runs
+    finished: bool = False
+    warnings: list[str] = field(default_factory=list)
+
+    def add(self, frame: Frame, events: Events) -> None:
+        """Count a frame and the events up to it."""
+        self.frames += frame.original
+        self.subframes += not frame.original
+        self.end_ns = frame.t_ns
+        self.count(events)
+
+    def count(self, events: Events) -> None:
+        """Count events."""
+        self.events += len(events)
+        self.last_us = int(events.t[-1]) if len(events) else self.last_us
+
+    @property
+    def offset_us(self) -> int:
+        """The instant from which an event file counts: the first frame."""
+        return self.start_ns // 1000
+
+    @property
+    def duration_us(self) -> int:
+        """From the first frame to the last, or to the last event where the sensor's readout makes it later."""
+        return max(self.end_ns // 1000, self.last_us) - self.offset_us
+
+
+Report = Callable[[Recipe, Progress], object]
+
+
+def convert(
+    video: str | Path,
+    directory: str | Path | None = None,
+    sensor: str | Path | DvsSpec = "paper",
+    overrides: Sequence[str] = (),
+    *,
+    seed: int | None = 0,
+    threads: int | None = None,
+    preview: bool = True,
+    overwrite: bool = False,
+    resume: bool = False,
+    report: Report | None = None,
+    piece: int = PIECE,
+    **rest: Any,
+) -> dict[str, Any]:
+    """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
+
+    seed       of the sensor; None draws one
+    threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
+    overwrite  replace a recording that is there, when the new one is whole
+    resume     go on where an interrupted conversion was; a finished one is left as it is
+    report     called at every source frame
+    piece      pixel-steps between two checkpoints
+    Everything else is as for `Recipe.of`.
+
+    Returns the manifest.  The same recipe makes the same bytes in events.h5, with or without interruptions.
+    Raises UsageError for what cannot be meant, DataError for a source that cannot be read or a folder that cannot
+    be written.
+    """
+    directory = default_directory(video) if directory is None else Path(directory)
+    if seed is None:
+        seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
+    recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
+    job = recipe.describe() | {"preview": preview}
+    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume) as folder:
+        if folder.finished:
+            return folder.finished
+        threads = threads or usable_cores()
+        dvs = recipe.dvs(threads)
+        film = Preview(recipe.source.size, folder.partial, wanted=preview)
+        done = _record(recipe, dvs, film, folder, piece, report)
+        manifest = job | _outcome(done, dvs) | {"run": _run(video, threads, done)}
+        with folder.writing():
+            _write(folder, film, recipe, done, manifest)
+    return manifest
+
+
+def default_directory(video: str | Path) -> Path:
+    """Where the recording of a video goes if nothing else is said."""
+    path = Path(os.path.abspath(str(video).removeprefix("synthetic:").partition(",")[0]))
+    return Path(f"{path.name if path.is_dir() else path.stem}_events")
+
+
+def usable_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int, report: Report | None) -> Progress:
+    """Events and preview into the folder, from its last checkpoint to the end of the source."""
+    done = _take_up(folder, dvs, film)
+    if done.finished:
+        return done
+    began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
+    with closing(recipe.light(max(done.frames - 1, 0))) as light:
+        first = next(light, None)
+        if first is None:
+            raise DataError(f"{recipe.video} has no frames; give a source that has some")
+        film.begin(first[0])
+        if not done.frames:
+            dvs.step(first[0].light, first[0].t_ns)
+            done.frames, done.start_ns, done.end_ns = 1, first[0].t_ns, first[0].t_ns
+        for frame, limited in light:
+            events = dvs.step(frame.light, frame.t_ns)
+            with folder.writing():
+                folder.append(events)
+                film.add(frame, events)
+            done.add(frame, events)
+            done.limited, done.seconds = limited_before + limited, time.monotonic() - began
+            work += max(STEP, frame.light.size)
+            if frame.original and report:
+                report(recipe, done)
+            if frame.original and work >= piece:
+                _checkpoint(folder, dvs, film, done)
+                work = 0
+    held_back = dvs.flush()
+    with folder.writing():
+        folder.append(held_back)
+        film.finish(held_back)
+    done.count(held_back)
+    done.finished, done.warnings = True, list(recipe.source.warnings)
+    _checkpoint(folder, dvs, film, done)
+    return done
+
+
+def _take_up(folder: Folder, dvs: Dvs, film: Preview) -> Progress:
+    """Bring everything to the point of the last checkpoint."""
+    saved = folder.saved()
+    if not saved:
+        return Progress()
+    dvs.restore({name.removeprefix("dvs."): array for name, array in saved.items() if name.startswith("dvs.")})
+    film.restore({name.removeprefix("film."): array for name, array in saved.items() if name.startswith("film.")})
+    return Progress(**json.loads(str(saved["progress"])))
+
+
+def _checkpoint(folder: Folder, dvs: Dvs, film: Preview, done: Progress) -> None:
+    with folder.writing():
+        film.close()
+        state = {f"dvs.{name}": array for name, array in dvs.state().items()}
+        state |= {f"film.{name}": array for name, array in film.state().items()}
+        folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(done)))})
+
+
+def _write(folder: Folder, film: Preview, recipe: Recipe, done: Progress, manifest: dict[str, Any]) -> None:
+    """The files of the recording, in their place at once."""
+    whole = folder.whole
+    write_events(
+        whole / "events.h5",
+        folder.events(BLOCK),
+        count=done.events,
+        size=recipe.source.size,
+        t_offset_us=done.offset_us,
+        duration_us=done.duration_us,
+    )
+    film.join(whole / "preview.mp4")
+    write_manifest(whole / "manifest.json", manifest)
+    folder.publish()
+
+
+def _outcome(done: Progress, dvs: Dvs) -> dict[str, Any]:
+    """What came out, for the manifest."""
+    counts = {"frames": done.frames, "subframes": done.subframes, "limited_intervals": done.limited}
+    return {
+        "start_us": done.offset_us,
+        "duration_us": done.duration_us,
+        "counts": counts | {"events": done.events} | dvs.counts,
+        "warnings": done.warnings + _remarks(done, dvs),
+    }
+
+
+def _remarks(done: Progress, dvs: Dvs) -> list[str]:
+    """What a person should know about the result."""
+    counts = dvs.counts
+    remarks = []
+    if done.frames == 1:
+        remarks.append("one frame only: nothing changes, so there are no events")
+    if done.limited:
+        remarks.append(
+            f"{done.limited} of {done.frames - 1} intervals asked for more sub-frames than --max-subframes allows"
+        )
+    if counts["capped"]:
+        remarks.append(
+            f"{counts['capped']} times a pixel had more than max_crossings = {dvs.spec.max_crossings} crossings"
+            " from frame to frame; the rest is missing"
+        )
+    if counts["not_finite"]:
+        remarks.append(
+            f"{counts['not_finite']} values of light were negative, not finite or beyond 1e30; they count as 0 or 1e30"
+        )
+    return remarks
+
+
+def _run(video: str | Path, threads: int, done: Progress) -> dict[str, Any]:
+    """When, where and how fast, for the manifest."""
+    return {
+        "ended": datetime.now(UTC).isoformat(timespec="seconds"),
+        "video": str(video),
+        "seconds": round(done.seconds, 3),
+        "threads": threads,
+        "machine": machine(),
+    }

@@ -1,0 +1,231 @@
+"""The folder of a recording: there as a whole or not at all, and resumable until it is.
+
+    DIR.partial/          while the recording is being made
+        lock              held by the process that makes it
+        job.json          what is made; only the same is ever continued
+        t x y p [label]   the events so far, raw columns that only grow
+        preview-00000.mp4 finished pieces of the preview
+        checkpoint.npz    the last point at which everything fitted together
+        whole/            the files of the finished recording
+    DIR/                  whole/, renamed
+
+A checkpoint is written beside the old one and renamed, after everything it speaks of has reached the disk.  Whenever
+the process is killed, the checkpoint is therefore whole; what lies beyond it is cut off on resuming.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.disk import lock, sync, whole_file
+from vid2ev.formats.manifest import difference, read_manifest
+from vid2ev.stream.events import Events
+
+COLUMNS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}
+FILES = {"events.h5", "preview.mp4", "manifest.json"}  # what a recording holds, and nothing else
+
+
+class Folder:
+    """The folder `directory` while it is made, as a context: `append`, `checkpoint`, then `publish`.
+
+    job        what decides the recording, for JSON; what is there of another job is in the way
+    overwrite  replace a recording that is in the way; it stays until the new one is whole
+    resume     take what is there if it is of the same job: a finished recording, or the last checkpoint
+    Left without `publish`, the folder keeps its last checkpoint; without one it leaves nothing.
+    Raises UsageError where `directory` is taken, DataError where it cannot be written.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        job: Mapping[str, Any],
+        *,
+        overwrite: bool = False,
+        resume: bool = False,
+        labels: bool = False,
+    ):
+        self.directory = directory
+        self.partial = partial_of(directory)
+        self.job = json.loads(json.dumps(job))
+        self.overwrite, self.resume = overwrite, resume
+        self.columns = {name: dtype for name, dtype in COLUMNS.items() if labels or name != "label"}
+        self.count = 0
+        self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
+        self._files: dict[str, io.BufferedRandom] = {}
+        self._lock: int | None = None
+
+    def __enter__(self) -> Self:
+        check_free(self.directory, self.overwrite, self.resume)
+        try:
+            with self.writing():
+                self.partial.mkdir(parents=True, exist_ok=True)
+                self._lock = lock(self.partial)
+                self._begin()
+        except BaseException as error:
+            self.__exit__(type(error), error, error.__traceback__)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for file in self._files.values():
+            with suppress(OSError):
+                file.close()
+        if self._lock is not None:
+            if self.finished or not self.resumable:
+                shutil.rmtree(self.partial, ignore_errors=True)
+            os.close(self._lock)
+
+    @property
+    def resumable(self) -> bool:
+        """Whether there is a checkpoint to resume from."""
+        return (self.partial / "checkpoint.npz").exists()
+
+    def append(self, events: Events) -> None:
+        """Add events; they count from the next checkpoint on."""
+        for name, file in self._files.items() if len(events) else ():
+            file.write(np.ascontiguousarray(getattr(events, name), self.columns[name]).data)
+        self.count += len(events)
+
+    def checkpoint(self, state: Mapping[str, np.ndarray]) -> None:
+        """Make all that was appended, and `state` with it, the point to resume from."""
+        for file in self._files.values():
+            file.flush()
+            os.fsync(file.fileno())
+        with whole_file(self.partial / "checkpoint.npz") as saved:
+            np.savez(saved, allow_pickle=False, **state, events=np.int64(self.count))
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """The state of the last checkpoint; empty without one."""
+        if not self.resumable:
+            return {}
+        with np.load(self.partial / "checkpoint.npz") as arrays:
+            return dict(arrays)
+
+    def events(self, block: int) -> Iterator[Events]:
+        """All events appended, `block` of them at a time but for the last."""
+        for file in self._files.values():
+            file.flush()
+        for at in range(0, max(self.count, 1), block):
+            n = min(block, self.count - at)
+            yield Events(
+                **{
+                    name: np.fromfile(self.partial / name, dtype, n, offset=at * np.dtype(dtype).itemsize)
+                    for name, dtype in self.columns.items()
+                }
+            )
+
+    @property
+    def whole(self) -> Path:
+        """The folder for the files of the finished recording, which `publish` renames."""
+        path = self.partial / "whole"
+        path.mkdir(exist_ok=True)
+        return path
+
+    def publish(self) -> None:
+        """Put the finished recording in its place, at once."""
+        for path in self.whole.iterdir():
+            sync(path)
+        sync(self.whole)
+        if self.directory.exists():
+            shutil.rmtree(self.partial / "replaced", ignore_errors=True)
+            self.directory.rename(self.partial / "replaced")
+        self.whole.rename(self.directory)
+        (self.partial / "checkpoint.npz").unlink(missing_ok=True)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """What goes wrong with the disk within becomes one sentence."""
+        try:
+            yield
+        except (DataError, UsageError):
+            raise
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise DataError(
+                f"{self.directory} cannot be written: {reason}; make room or access there, or choose another folder"
+                " with -o"
+            ) from error
+
+    def _begin(self) -> None:
+        """Take up the checkpoint, find the recording finished, or start."""
+        made = self.directory / "manifest.json"
+        if self.resume and self.resumable and self._is_same(self.partial / "job.json"):
+            with np.load(self.partial / "checkpoint.npz") as saved:
+                self.count = int(saved["events"])
+        elif self.resume and not self.resumable and made.exists() and self._is_same(made):
+            self.finished = read_manifest(made)
+            return
+        else:
+            self._clear()
+            with whole_file(self.partial / "job.json") as file:
+                file.write(json.dumps(self.job, indent=2).encode())
+        for name, dtype in self.columns.items():
+            (self.partial / name).touch()
+            self._files[name] = column = open(self.partial / name, "r+b")  # noqa: SIM115 (closed by __exit__)
+            column.truncate(self.count * np.dtype(dtype).itemsize)
+            column.seek(0, os.SEEK_END)
+
+    def _is_same(self, path: Path) -> bool:
+        """Whether a job or manifest is of this job; if it is not, that is an error unless it may be overwritten."""
+        earlier = read_manifest(path)
+        changed = difference({key: earlier.get(key) for key in self.job}, self.job)
+        if changed and not self.overwrite:
+            raise UsageError(
+                f"{self.directory} was begun with {changed}; --resume needs the options it was begun with,"
+                " --overwrite starts again"
+            )
+        return not changed
+
+    def _clear(self) -> None:
+        for path in self.partial.iterdir():
+            if path.name != "lock":
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def partial_of(directory: Path) -> Path:
+    """Where a recording is kept while it is made."""
+    return directory.parent / f"{directory.name}.partial"
+
+
+def begun_job(directory: Path) -> dict[str, Any]:
+    """The job of a recording that was begun or finished; empty if there is none."""
+    for path in (partial_of(directory) / "job.json", directory / "manifest.json"):
+        if path.exists():
+            return read_manifest(path)
+    return {}
+
+
+def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
+    """Raise UsageError unless a recording may be written to `directory`; touches nothing."""
+    if directory.name in ("", "..") or directory.is_mount() or directory.resolve() == Path.cwd():
+        raise UsageError(
+            f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
+        )
+    if directory.exists() and not directory.is_dir():
+        raise UsageError(f"{directory} is a file; choose a folder with -o")
+    held = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
+    if held - FILES:
+        raise UsageError(
+            f"{directory} holds files that are no recording ({min(held - FILES)}); choose another folder with -o"
+        )
+    if held and not (overwrite or resume):
+        raise UsageError(f"{directory} exists; --overwrite replaces it, -o chooses another folder")
+    partial = partial_of(directory)
+    begun = {path.name for path in partial.iterdir()} if partial.is_dir() else set()
+    if begun and not begun & {"job.json", "lock"}:
+        raise UsageError(f"{partial} is needed to work in, and holds other files; choose another folder with -o")
+    if "checkpoint.npz" in begun and not (overwrite or resume):
+        raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")

@@ -1,0 +1,90 @@
+"""manifest.json: everything that made a recording.
+
+Its keys, but for `run`, are the same for every run with the same result; `run` says when, where and how fast.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from vid2ev.errors import DataError
+
+LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
+HEAD = 1 << 20  # bytes at the start of a file by which it is known
+
+
+def versions() -> dict[str, str]:
+    """The versions of what takes part in making events."""
+    return {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
+
+
+def machine() -> dict[str, Any]:
+    """Where the run took place."""
+    return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}
+
+
+def identity(path: Path) -> dict[str, Any]:
+    """What tells a source from another: size, time of change, and a digest of names, sizes and the first content."""
+    files = sorted(child for child in path.iterdir() if child.is_file()) if path.is_dir() else [path]
+    stats = [file.stat() for file in files]
+    digest = hashlib.sha256(repr([(file.name, stat.st_size) for file, stat in zip(files, stats, strict=True)]).encode())
+    if files:
+        with open(files[0], "rb") as file:
+            digest.update(file.read(HEAD))
+    return {
+        "bytes": sum(stat.st_size for stat in stats),
+        "changed_ns": max((stat.st_mtime_ns for stat in stats), default=0),
+        "sha256": digest.hexdigest(),
+    }
+
+
+def write_manifest(path: Path, manifest: Mapping[str, Any]) -> None:
+    """Write a manifest; raises OSError."""
+    path.write_text(json.dumps(manifest, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """Read the manifest of a recording folder, or a file; raises DataError."""
+    path = path / "manifest.json" if path.is_dir() else path
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file; give a folder that `vid2ev convert` wrote") from error
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path} cannot be read as JSON ({error}); make the recording again") from error
+    if not isinstance(manifest, dict) or "vid2ev" not in manifest.get("versions", {}):
+        raise DataError(f"{path} is not the manifest of a vid2ev recording; give a folder that `vid2ev convert` wrote")
+    return manifest
+
+
+def difference(one: Any, other: Any, name: str = "") -> str:
+    """The first value that differs between two pieces of JSON, as "name = one, not other"; empty if none does."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in [*one, *(key for key in other if key not in one)]:
+            found = difference(one.get(key), other.get(key), f"{name}.{key}" if name else key)
+            if found:
+                return found
+        return ""
+    return "" if one == other else f"{name} = {json.dumps(one)}, not {json.dumps(other)}"
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())

@@ -1,0 +1,78 @@
+"""The two panels of the preview: a frame in gray, and counts of events in colour, as planes of yuv420p.
+
+ON is amber, OFF is blue, on dark ground; more events are brighter.  Codes have 8 bits and limited range, by Rec. ITU-R
+BT.709-6.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numba import njit
+
+MOST = 15  # events of one polarity that a pixel can tell apart
+ON, OFF, GROUND = np.array([[255, 190, 90], [90, 160, 255], [16, 18, 24]]) / 255
+STRENGTH_PER_EVENT = 0.55  # share of the remaining way from the ground to the full colour
+NEUTRAL = 128  # the code of no colour
+
+
+def reduced(light: np.ndarray, across: int, down: int) -> np.ndarray:
+    """Codes Y [uint8, down x across] of linear light, which is averaged where pixels share one."""
+    if light.shape != (down, across):
+        light = cv2.resize(light, (across, down), interpolation=cv2.INTER_AREA)
+    light = np.nan_to_num(light, nan=0.0)
+    return GRAYS[(np.clip(light, 0, 1) * 65535).astype(np.uint16)]
+
+
+@njit(cache=True, nogil=True)
+def count(x, y, p, column, row, counts):  # type: ignore[no-untyped-def]
+    """Add events to counts [polarity, down, across], those of pixel (x, y) at (column[x], row[y])."""
+    for i in range(len(x)):
+        polarity, down, across = p[i], row[y[i]], column[x[i]]
+        if counts[polarity, down, across] < MOST:
+            counts[polarity, down, across] += 1
+
+
+@njit(cache=True, nogil=True)
+def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-untyped-def]
+    """Fill luma [height, 2 width] and chroma [2, height / 2, width]: gray in the left half, counts in the right.
+
+    Chroma of a block of 2 x 2 is the mean of those of its pixels that have events, so that single ones keep theirs.
+    """
+    down, across = gray.shape
+    height, width = luma.shape[0], luma.shape[1] // 2
+    for block_i in range(height // 2):
+        for block_j in range(width // 2):
+            u = v = n = 0
+            for k in range(4):
+                i, j = 2 * block_i + k // 2, 2 * block_j + k % 2
+                row, column = min(i // enlarged, down - 1), min(j // enlarged, across - 1)
+                off, on = counts[0, row, column], counts[1, row, column]
+                luma[i, j] = gray[row, column]
+                luma[i, width + j] = colours[off, on, 0]
+                if off + on > 0:
+                    u, v, n = u + colours[off, on, 1], v + colours[off, on, 2], n + 1
+            chroma[0, block_i, block_j] = chroma[1, block_i, block_j] = NEUTRAL
+            right = width // 2 + block_j
+            chroma[0, block_i, right] = u // n if n else colours[0, 0, 1]
+            chroma[1, block_i, right] = v // n if n else colours[0, 0, 2]
+
+
+def _colour_table() -> np.ndarray:
+    """Codes Y, U, V [OFF events, ON events, 3], by the equations of Rec. ITU-R BT.709-6 items 3.2 to 3.4, 8 bits."""
+    off, on = np.mgrid[0 : MOST + 1, 0 : MOST + 1][..., None]
+    colour = (off * OFF + on * ON) / np.maximum(off + on, 1)
+    strength = 1 - (1 - STRENGTH_PER_EVENT) ** (off + on)
+    rgb = GROUND + strength * (colour - GROUND)
+    y = rgb @ [0.2126, 0.7152, 0.0722]
+    u, v = (rgb[..., 2] - y) / 1.8556, (rgb[..., 0] - y) / 1.5748
+    return np.rint(np.stack([16 + 219 * y, NEUTRAL + 224 * u, NEUTRAL + 224 * v], axis=-1)).astype(np.uint8)
+
+
+def _gray_table() -> np.ndarray:
+    """Codes Y of light in steps of 1 / 65535, by Rec. ITU-R BT.709-6 items 1.2 and 3.4, 8 bits."""
+    light = np.arange(1 << 16) / 65535
+    return np.rint(16 + 219 * np.where(light < 0.018, 4.5 * light, 1.099 * light**0.45 - 0.099)).astype(np.uint8)
+
+
+COLOURS, GRAYS = _colour_table(), _gray_table()

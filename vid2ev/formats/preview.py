@@ -1,0 +1,177 @@
+"""preview.mp4: the video on the left, its events on the right, in real time, for a browser.
+
+Frame k shows the instant t_k = t_0 + (k + 1/4) / RATE on the clock of the source: the newest source frame that is not
+after it, and the events since t_(k-1); none is lost, and one that is sent late is shown late.  The quarter lets source
+times that are rounded, or that drift as 29.97 Hz does, be shown in step.  Where nothing changes, a frame is left out
+and the one before it stays.
+
+A panel has at most 640 pixels a side: larger frames are reduced, events of the pixels that share one are added up;
+smaller ones are enlarged a whole number of times.
+
+The film is made in pieces, each beginning with a key frame, so that an interrupted run can go on: `begin`, then `add`
+and now and then `close`, and in the end `finish`, `close` and `join`.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.formats.disk import sync
+from vid2ev.formats.panels import COLOURS, count, paint, reduced
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+RATE = 30  # frames per second
+SIDE = 640
+ENCODER = {"preset": "superfast", "crf": "24"}
+BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
+MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins while the file is still loading
+
+
+class Preview:
+    """The preview of a recording of `size` (width, height), made in the folder `pieces`; not at all unless `wanted`.
+
+    Its state between two pieces is small: how far it is, and the events not shown yet.
+    """
+
+    def __init__(self, size: tuple[int, int], pieces: Path, *, wanted: bool = True):
+        width, height = size
+        shrunk = min(1.0, SIDE / max(size))
+        self.across, self.down = max(1, round(width * shrunk)), max(1, round(height * shrunk))
+        self.enlarged = max(1, SIDE // max(size))
+        sides = self.across * self.enlarged, self.down * self.enlarged
+        self.panel = [side + side % 2 for side in sides]  # 4:2:0 needs even sides
+        self.wanted, self.pieces = wanted, pieces
+        self._column = (np.arange(width) * self.across // width).astype(np.uint16)
+        self._row = (np.arange(height) * self.down // height).astype(np.uint16)
+        self._counts = np.zeros((2, self.down, self.across), np.uint8)  # events not shown yet: OFF, ON
+        self._next = 0  # number of the next frame
+        self._starts: list[int] = []  # number of the first frame of each piece
+        self._waiting = self._showing = False  # events not shown yet; events in the last frame
+        self._moved = True  # the newest source frame is not shown yet
+        self._t0_ns: int | None = None
+        self._gray: np.ndarray | None = None  # the left panel, once it is drawn
+        self._container: Any = None
+
+    def begin(self, frame: Frame) -> None:
+        """The first frame of the recording; after `restore`, the last source frame before it."""
+        self._newest = frame
+        self._t0_ns = frame.t_ns if self._t0_ns is None else self._t0_ns
+
+    def add(self, frame: Frame, events: Events) -> None:
+        """Take in the events up to a frame, and the frame itself if it is the source's."""
+        if not self.wanted:
+            return
+        while (instant_ns := self._instant_ns()) < frame.t_ns:
+            earlier = int(np.searchsorted(events.t, instant_ns // 1000, side="right"))
+            self._count(events.select(slice(earlier)))  # type: ignore[arg-type]
+            events = events.select(slice(earlier, None))  # type: ignore[arg-type]
+            self._show()
+        self._count(events)
+        if frame.original:
+            self._newest, self._gray, self._moved = frame, None, True
+
+    def finish(self, events: Events) -> None:
+        """Show the last events, and what is left."""
+        if self.wanted:
+            self._count(events)
+            self._show()
+
+    def close(self) -> None:
+        """End a piece and bring it to the disk; the next frame begins another."""
+        if self._container is not None:
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+            self._container = None
+            sync(self._piece(len(self._starts) - 1))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """The state between two pieces, as plain arrays."""
+        clock = np.array([self._t0_ns, self._next, self._waiting, self._showing, self._moved], np.int64)
+        return {"clock": clock, "starts": np.array(self._starts, np.int64), "counts": self._counts.copy()}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state."""
+        self._t0_ns, self._next, *flags = (int(value) for value in state["clock"])
+        self._waiting, self._showing, self._moved = (bool(flag) for flag in flags)
+        self._starts = [int(start) for start in state["starts"]]
+        self._counts[...] = state["counts"]
+
+    def join(self, path: Path) -> None:
+        """Put the pieces one after the other into one file, without encoding them again."""
+        import av
+
+        if not self._starts:
+            return
+        with av.open(str(path), "w", options=MUXER) as whole:
+            with av.open(str(self._piece(0))) as first:
+                stream = whole.add_stream_from_template(first.streams.video[0])
+            for number, start in enumerate(self._starts):
+                with av.open(str(self._piece(number))) as piece:
+                    for packet in piece.demux(video=0):
+                        if packet.dts is not None and packet.pts is not None and packet.time_base:
+                            shift = int(start / (RATE * packet.time_base))
+                            packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
+                            packet.stream = stream
+                            whole.mux(packet)
+
+    def _piece(self, number: int) -> Path:
+        return self.pieces / f"preview-{number:05d}.mp4"
+
+    def _instant_ns(self) -> int:
+        assert self._t0_ns is not None
+        return self._t0_ns + (4 * self._next + 1) * 10**9 // (4 * RATE)
+
+    def _count(self, events: Events) -> None:
+        if len(events):
+            count(events.x, events.y, events.p, self._column, self._row, self._counts)
+            self._waiting = True
+
+    def _show(self) -> None:
+        """Encode the next frame, if it differs from the one before."""
+        if self._waiting or self._showing or self._moved:
+            self._encode(self._picture())
+            self._counts[...] = 0
+        self._showing, self._waiting, self._moved = self._waiting, False, False
+        self._next += 1
+
+    def _picture(self) -> np.ndarray:
+        """Both panels as planes Y, U, V, one after the other as yuv420p has them."""
+        if self._gray is None:
+            self._gray = reduced(self._newest.light, self.across, self.down)
+        width, height = self.panel
+        picture = np.empty((height * 3 // 2, 2 * width), np.uint8)
+        luma, chroma = picture[:height], picture[height:].reshape(2, height // 2, width)
+        paint(self._gray, self._counts, COLOURS, self.enlarged, luma, chroma)
+        return picture
+
+    def _encode(self, picture: np.ndarray) -> None:
+        import av
+
+        if self._container is None:
+            self._open()
+        frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
+        frame.pts, frame.time_base = self._next - self._starts[-1], Fraction(1, RATE)
+        frame.colorspace = frame.color_primaries = frame.color_trc = BT709
+        frame.color_range = LIMITED
+        self._container.mux(self._stream.encode(frame))
+
+    def _open(self) -> None:
+        """Begin a piece with the next frame."""
+        import av
+
+        self._container = av.open(str(self._piece(len(self._starts))), "w")
+        self._starts.append(self._next)
+        self._stream = self._container.add_stream("libx264", rate=RATE, options=ENCODER)
+        self._stream.width, self._stream.height, self._stream.pix_fmt = 2 * self.panel[0], self.panel[1], "yuv420p"
+        context = self._stream.codec_context
+        context.time_base = Fraction(1, RATE)
+        context.max_b_frames = 0  # pieces can then be put one after the other as they are
+        context.thread_count = 1  # more would make other bits
+        context.gop_size = 4 * RATE
+        context.colorspace = context.color_primaries = context.color_trc = BT709
+        context.color_range = LIMITED

@@ -1,0 +1,318 @@
+"""The walk on a CPU: blocks of pixels; scan, gather what is flagged, solve.
+
+Which slow path a walk needs is known from the types of its flags, so `overload` picks it, and numba compiles no other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numba.core.extending import overload
+
+from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, load_levels, move_memories
+from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
+from vid2ev.kernels.general import FIRST, KNOTS, walk_pixel
+from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
+from vid2ev.kernels.response import LANES, load_responses, prepare_responses, respond
+from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan, scan_level
+from vid2ev.kernels.straight import load_lines, prepare_lines, straight
+from vid2ev.kernels.turns import TURNS
+from vid2ev.physics.comparator import initial_phase
+from vid2ev.physics.log_curve import log_level, log_level_32
+
+
+def is_on(flags, name):
+    """Whether a flag is on, from the numba type of the flags."""
+    return len(flags.types[flags.fields.index(name)]) > 0
+
+
+FEW = 256  # lanes that wait for company, so that rounds with few lanes are rare
+_ADD_BYTES = np.uint64(0x0101010101010101)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def hits_of(flagged, hits):
+    """Indices of the flagged pixels of a block into `hits` (BLOCK + 1 long); returns their number.
+
+    Where many are flagged no branch depends on a single pixel, where few are, words of eight without any are skipped.
+    """
+    words = flagged.view(np.uint64)
+    total = np.uint64(0)
+    for k in range(words.size):
+        total += (words[k] * _ADD_BYTES) >> np.uint64(56)  # (flags are 0 or 1: their sum is in the top byte)
+    count = 0
+    if total == 0:
+        return count
+    if total > BLOCK // 16:
+        for i in range(flagged.size):
+            hits[count] = i
+            count += np.int64(flagged[i])
+        return count
+    for k in range(words.size):
+        if words[k] != 0:
+            for i in range(8 * k, 8 * k + 8):
+                hits[count] = i
+                count += np.int64(flagged[i])
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, iv, out, tally):
+    """Advance blocks first_block ... last_block - 1 by one interval; returns (keys, their number).
+
+    Flagged pixels are gathered over as many blocks as fill the lanes, so that the vector code has something to do.
+    """
+    stride = stride_of(flags)
+    scratch, lanes, turns = np.zeros(SCRATCH, np.float32), np.empty(LANES, np.float64), np.empty(TURNS, np.float64)
+    flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
+    loaded, live = np.empty(BLOCK, np.int64), np.empty(BLOCK + 1, np.int64)
+    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    forced_keys, chance, forced = np.empty(128, np.int64), np.empty(128, np.float64), 0
+    knots = np.empty(KNOTS, np.float64)
+    n, used = np.int64(0), np.int64(0)
+    for index in range(first_block, last_block):
+        p0 = index * BLOCK
+        size = min(BLOCK, pixels - p0)
+        block = planes.fast[index * stride : (index + 1) * stride]
+        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+        scan(block, scratch, flagged, p0, size, flags, num, iv)
+        if len(flags.forced):
+            forced_keys, chance, forced = candidates(forced_keys, chance, p0, size, planes.hot, num, iv)
+            forced = keep_likely(block, scratch, forced_keys, chance, forced, flags, num, iv)
+            for j in range(forced):
+                flagged[place_of_candidate(forced_keys[j], iv)[0]] = 1
+        flagged[size:] = 0
+        count = hits_of(flagged, hits)
+        count, out, n = take_general(
+            block,
+            scratch,
+            hits,
+            count,
+            p0,
+            one_lane,
+            one_pixel,
+            forced_keys,
+            chance,
+            forced,
+            knots,
+            planes,
+            flags,
+            num,
+            iv,
+            out,
+            n,
+            tally,
+        )
+        if used + count > BLOCK:
+            enough = min(FEW, BLOCK - count)
+            used, out, n = solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
+        load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv)
+        remember_input(block, scratch, size)
+        used += count
+    used, out, n = solve_lanes(lanes, loaded, live, used, 0, planes, flags, num, iv, out, n, tally)
+    return out, n
+
+
+def load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
+    """Load the flagged pixels of a block into lanes used, ..."""
+
+
+def solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
+    """Events of the lanes loaded so far, until at most `enough` are left: (how many are left, out, n)."""
+
+
+def take_general(
+    block,
+    scratch,
+    hits,
+    count,
+    p0,
+    lanes,
+    pixels,
+    forced_keys,
+    chance,
+    forced,
+    knots,
+    planes,
+    flags,
+    num,
+    iv,
+    out,
+    n,
+    tally,
+):
+    """Walk the flagged pixels that need the general path and keep the others in `hits`: (how many are left, out, n)."""
+
+
+@overload(load, jit_options=OPTIONS)
+def _load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
+    if is_on(flags, "straight"):
+
+        def lines(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
+            free, pixels = lanes[used:], loaded[used:]
+            load_lines(block, scratch, free, pixels, hits, count, p0, flags)
+            prepare_lines(free, pixels, count, planes, flags, num, iv)
+
+        return lines
+
+    def responses(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
+        free, pixels = lanes[used:], loaded[used:]
+        load_responses(block, scratch, free, pixels, hits, count, p0, flags, iv)
+        b = iv.b if len(flags.poles) == 2 else 0.0
+        prepare_responses(free, turns, pixels, live, count, b, planes, flags, num, iv)
+
+    return responses
+
+
+@overload(solve_lanes, jit_options=OPTIONS)
+def _solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
+    solver = straight if is_on(flags, "straight") else respond
+
+    def solve(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
+        return solver(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
+
+    return solve
+
+
+@overload(take_general, jit_options=OPTIONS)
+def _take_general(
+    block,
+    scratch,
+    hits,
+    count,
+    p0,
+    lanes,
+    pixels,
+    forced_keys,
+    chance,
+    forced,
+    knots,
+    planes,
+    flags,
+    num,
+    iv,
+    out,
+    n,
+    tally,
+):
+    # A drift after a low-pass that acts on the light has no closed form.
+    curved = not is_on(flags, "straight") and not is_on(flags, "log_input")
+    added = is_on(flags, "leak") or is_on(flags, "noise")
+    always = is_on(flags, "track") or (curved and added)
+    if not (always or is_on(flags, "forced") or is_on(flags, "noise")):
+
+        def nothing(
+            block,
+            scratch,
+            hits,
+            count,
+            p0,
+            lanes,
+            pixels,
+            forced_keys,
+            chance,
+            forced,
+            knots,
+            planes,
+            flags,
+            num,
+            iv,
+            out,
+            n,
+            tally,
+        ):
+            return count, out, n
+
+        return nothing
+
+    def some(
+        block,
+        scratch,
+        hits,
+        count,
+        p0,
+        lanes,
+        pixels,
+        forced_keys,
+        chance,
+        forced,
+        knots,
+        planes,
+        flags,
+        num,
+        iv,
+        out,
+        n,
+        tally,
+    ):
+        left, j = np.int64(0), 0
+        every = always or (len(flags.noise) > 0 and not iv.noise_resolved)
+        for k in range(count):
+            while j < forced and place_of_candidate(forced_keys[j], iv)[0] < hits[k]:
+                j += 1
+            if every or (j < forced and place_of_candidate(forced_keys[j], iv)[0] == hits[k]):
+                out, n = walk_pixel(
+                    block, scratch, hits[k], p0, lanes, pixels, forced_keys, chance, forced, knots, j, planes, flags, num, iv,
+                    out, n, tally,
+                )  # fmt: skip
+            else:
+                hits[left] = hits[k]
+                left += 1
+        return left, out, n
+
+    return some
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle_tile(first_block, last_block, pixels, light, lut, bad, random_phase, planes, flags, num, tally):
+    """The state after a long time in this light: no lags, levels about the signal."""
+    poles = len(flags.poles)
+    stride = (LAG1 + poles + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
+    scratch = np.zeros(SCRATCH, np.float32)
+    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    for index in range(first_block, last_block):
+        p0 = index * BLOCK
+        size = min(BLOCK, pixels - p0)
+        block = planes.fast[index * stride : (index + 1) * stride]
+        block[:] = 0.0
+        block[HIGH * PITCH : HIGH * PITCH + BLOCK] = np.inf
+        block[LOW * PITCH : LOW * PITCH + BLOCK] = -np.inf
+        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+        for i in range(size):
+            pixel = p0 + i
+            u = scratch[NEW + i]
+            if len(flags.light_bandwidth):
+                block[(LAG1 + poles + 3 * len(flags.noise)) * PITCH + i] = u
+            level = log_level(np.float64(u), num.curve, num.dark)
+            if len(flags.log_input):
+                u = log_level_32(u, num.curve, np.float32(num.dark))
+                level = np.float64(u)
+            block[INPUT * PITCH + i] = u
+            if len(flags.noise):
+                block[(LAG1 + poles + 2) * PITCH + i] = level
+            one_pixel[0] = pixel
+            one_lane[AT] = level
+            move_memories(one_lane, one_pixel, 1, FIRST, 1, planes, flags, num)
+            if random_phase:
+                phase = initial_phase(num.seed, num.camera, pixel)
+                planes.memory[pixel] = level - (1.0 - phase) * (one_lane[LEVEL_ON] - level)
+                load_levels(one_lane, one_pixel, 1, planes, flags, num)
+                block[HIGH * PITCH + i] = scan_level(one_lane[LEVEL_ON], True, flags, num)
+                block[LOW * PITCH + i] = scan_level(one_lane[LEVEL_OFF], False, flags, num)
+            if bad[pixel]:
+                block[HIGH * PITCH + i], block[LOW * PITCH + i] = np.inf, -np.inf
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def shift_levels(pixels, by, planes, flags, num):
+    """Lower all memories by `by` nats: what the leak has risen since its reference is taken into them."""
+    stride = stride_of(flags)
+    lanes, pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    for p in range(pixels):
+        pixel[0] = p
+        at = place_of(p, stride)
+        planes.memory[p] -= by
+        if abs(planes.fast[at + HIGH * PITCH]) < np.inf:  # a bad or a blind pixel keeps its sign
+            load_levels(lanes, pixel, 1, planes, flags, num)
+            planes.fast[at + HIGH * PITCH] = scan_level(lanes[LEVEL_ON], True, flags, num)
+            planes.fast[at + LOW * PITCH] = scan_level(lanes[LEVEL_OFF], False, flags, num)

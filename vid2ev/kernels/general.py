@@ -1,0 +1,292 @@
+"""Slow path for everything at once: one pixel, one interval, scalar code.
+
+Used where the closed forms of the two fast slow paths do not hold: a drift or noise added after a low-pass before the log,
+forced events, photoreceptor noise that the interval does not resolve, and the refractory kind `track`.  The comparator's
+input is
+
+    F(s) = curve(y(s)) + leak + noise,     y the response in the filter's domain, leak and noise linear in s
+
+and is followed from knot to knot: turning points, forced events, the end of a refractory period.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vid2ev.kernels.crossing import (
+    AT,
+    HOT,
+    LABEL,
+    LEVEL_OFF,
+    LEVEL_ON,
+    SHOT,
+    SIGNAL,
+    UP,
+    WHEN,
+    cross_all,
+    key_of,
+    load_levels,
+    move_memories,
+    room,
+)
+from vid2ev.kernels.forced import place_of_candidate
+from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LAG1, LAG2, LOW, PITCH
+from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, OLD1, OLD2
+from vid2ev.physics.log_curve import log_level, log_slope
+from vid2ev.physics.photoreceptor import (
+    response,
+    response_slope,
+    response_terms,
+    separate_rates,
+    turning_points,
+)
+from vid2ev.physics.photoreceptor_noise import rice_expected, rice_gap
+from vid2ev.physics.random import RICE, philox, unit
+
+FIRST = np.zeros(1, np.int64)  # the one live lane
+KNOTS = 8  # room for the ends of the pieces: three of the response, each cut once at most
+
+
+class Path(NamedTuple):
+    """The comparator's input of one pixel in one interval."""
+
+    y0: float
+    end: float  # y(1) from the state that the next interval starts with
+    rise: float
+    c1: float
+    c2: float
+    a: float
+    b: float
+    light: bool  # y is light, and the log is still to come
+    base: float  # leak and noise at the start [nat]
+    drift: float  # and their rise over the interval
+    curve: int
+    dark: float
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def path_of(block, scratch, i, flags, num, iv):
+    """The path of pixel i of the block."""
+    poles, two = len(flags.poles), len(flags.poles) == 2
+    u0, du = np.float64(block[INPUT * PITCH + i]), np.float64(scratch[NEW + i]) - np.float64(block[INPUT * PITCH + i])
+    base, drift = iv.leak0, iv.leak1 - iv.leak0
+    if len(flags.noise):
+        base += scratch[NOISE0 + i]
+        drift += np.float64(scratch[NOISE1 + i]) - np.float64(scratch[NOISE0 + i])
+    e1 = np.float64(scratch[OLD1 + i]) if poles > 0 else 0.0
+    e2 = np.float64(scratch[OLD2 + i]) if two else 0.0
+    lag = e2 if two else e1
+    after = np.float64(scratch[NEW + i])
+    if poles > 0:
+        after -= block[(LAG2 if two else LAG1) * PITCH + i]
+    if len(flags.straight):
+        start = u0 - lag
+        if len(flags.log_input) == 0:
+            start = log_level(max(start, 0.0), num.curve, num.dark)
+            after = log_level(max(after, 0.0), num.curve, num.dark)
+        rise = after - start
+        return Path(start, after, rise, 0.0, 0.0, 0.0, 0.0, False, base, drift, num.curve, num.dark)
+    b = iv.b if two else 0.0
+    a = separate_rates(np.float64(scratch[CLOCK + i]), b) if len(flags.light_bandwidth) else iv.a
+    c1, c2 = response_terms(du, e1, e2, a, b, two) if poles > 0 else (0.0, 0.0)
+    light = len(flags.log_input) == 0
+    return Path(u0 - lag, after, du, c1, c2, a, b, light, base, drift, num.curve, num.dark)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def value(path, s):
+    """F(s) [nat]."""
+    y = path.end if s >= 1.0 else response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
+    if path.light:
+        y = log_level(max(y, 0.0), path.curve, path.dark)
+    return y + path.base + path.drift * s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def slope(path, s):
+    """dF/ds [nat per interval]."""
+    d = response_slope(s, path.rise, path.c1, path.c2, path.a, path.b)
+    if path.light:
+        y = response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
+        d *= log_slope(max(y, 0.0), path.curve, path.dark)
+    return d + path.drift
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def knots_of(path, knots):
+    """Ends of the monotone pieces of F into `knots`, ascending, the last one 1.0.
+
+    First the turning points of the response, then, as a drift moves them, a sign change of dF/ds within each piece.
+    """
+    rise = path.rise if path.light else path.rise + path.drift
+    c1, c2, a, b = path.c1, path.c2, path.a, path.b
+    first, second = 1.0, 1.0
+    if c1 != 0.0 or c2 != 0.0:
+        slope_0, slope_1 = response_slope(0.0, rise, c1, c2, a, b), response_slope(1.0, rise, c1, c2, a, b)
+        first, second = turning_points(slope_0, slope_1, rise, c1, c2, a, b)
+    n, start = 0, 0.0
+    for end in (first, second, 1.0):
+        if path.light and path.drift != 0.0:
+            lo, hi, rising = start, end, slope(path, start) > 0.0
+            if (slope(path, end) > 0.0) != rising:
+                for _ in range(50):
+                    middle = 0.5 * (lo + hi)
+                    if (slope(path, middle) > 0.0) == rising:
+                        lo = middle
+                    else:
+                        hi = middle
+                knots[n] = 0.5 * (lo + hi)
+                n += 1
+        knots[n] = end
+        n += 1
+        start = end
+        if end >= 1.0:
+            break
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def reach(path, level, lo, hi, up):
+    """Where F reaches a level between lo and hi, a monotone piece whose end is at or beyond it."""
+    if (value(path, lo) >= level) == up:
+        return lo
+    s = 0.5 * (lo + hi)
+    for k in range(80):
+        f = value(path, s) - level
+        if (f < 0.0) == up:
+            lo = s
+        else:
+            hi = s
+        newton = s - f / slope(path, s)
+        here = newton if (newton > lo) & (newton < hi) & (k % 3 != 2) else 0.5 * (lo + hi)
+        if abs(here - s) < 1e-13 or hi - lo < 1e-13:
+            return here
+        s = here
+    return s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def next_rice(path, knots, s, k, on, off, pixel, num, iv):
+    """Candidate k of the unresolved noise after s: (its s, the expected number it stands for)."""
+    top, bottom = value(path, 0.0), value(path, 0.0)
+    for knot in knots:
+        here = value(path, knot)
+        top, bottom = max(top, here), min(bottom, here)
+        if knot >= 1.0:
+            break
+    expected = rice_expected(on - top, bottom - off, num, iv)
+    return s + rice_gap(pixel, k, num, iv) / max(expected, 1e-300), expected
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
+    """Does candidate k happen at s? 1 as ON, -1 as OFF, 0 not at all."""
+    here = value(path, s)
+    words = philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 16) + k)
+    chance = unit(words[1]) * expected
+    upward = rice_expected(on - here, np.inf, num, iv)
+    if chance < upward:
+        return 1
+    return -1 if chance < upward + rice_expected(np.inf, here - off, num, iv) else 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, out, n, tally):
+    """`cross_all` for one pixel: (c_on, c_off, n)."""
+    pixels[0] = pixel
+    lanes[AT], lanes[WHEN], lanes[UP], lanes[LABEL] = at, s, 1.0 if up else 0.0, label
+    n = cross_all(lanes, pixels, 1, FIRST, 1, planes, flags, num, iv, out, n, tally)
+    return lanes[LEVEL_ON], lanes[LEVEL_OFF], n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def walk_pixel(
+    block, scratch, i, p0, lanes, pixels, forced_keys, chance, forced, knots, j, planes, flags, num, iv, out, n, tally
+):
+    """Events of pixel i of the block, whose forced candidates start at entry j: (out, n)."""
+    pixel = p0 + i
+    path = path_of(block, scratch, i, flags, num, iv)
+    knots_of(path, knots)
+    good = block[HIGH * PITCH + i] < np.inf or block[LOW * PITCH + i] > -np.inf  # a bad pixel has no levels
+    pixels[0] = pixel
+    load_levels(lanes, pixels, 1, planes, flags, num)
+    on, off = lanes[LEVEL_ON] if good else np.inf, lanes[LEVEL_OFF] if good else -np.inf
+    rice = len(flags.noise) > 0 and not iv.noise_resolved
+    piece, s, solved, candidate = 0, 0.0, 0, 0
+    blind_until = -1.0  # end of a refractory period of the kind `track`
+    if len(flags.track):
+        blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
+    rice_s, expected = next_rice(path, knots, s, 0, on, off, pixel, num, iv) if rice else (2.0, 0.0)
+    while True:
+        forced_s = 2.0
+        if j < forced:
+            whose, when = place_of_candidate(forced_keys[j], iv)
+            forced_s = when if whose == i else 2.0
+        blind = blind_until > s
+        blind_s = blind_until if blind else 2.0
+        stop = min(min(knots[piece], forced_s), min(rice_s, blind_s))
+        end = value(path, stop)
+        out = room(out, n, 1)
+        if not blind and (end >= on or end <= off):
+            up = end >= on
+            at = on if up else off
+            here = reach(path, at, s, stop, up)
+            solved += 1
+            if solved > num.max_crossings:
+                tally[CAPPED] += 1
+                here, at = stop, end
+            s = here
+            on, off, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
+            if len(flags.track):
+                blind_until = s + num.refractory_ns / iv.dt_ns
+            if rice:
+                candidate += 1
+                rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
+            continue
+        s = stop
+        if stop == blind_s:
+            pixels[0], lanes[AT] = pixel, end
+            move_memories(lanes, pixels, 1, FIRST, 1, planes, flags, num)
+            on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
+            blind_until = -1.0
+        elif stop == forced_s:
+            on, off, n = force(
+                lanes, pixels, pixel, path, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
+            )
+            if len(flags.track):
+                blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
+            j += 1
+        elif stop == rice_s:
+            polarity = accept_rice(path, s, candidate, expected, on, off, pixel, num, iv)
+            candidate += 1
+            if polarity != 0 and not blind:
+                at = on if polarity > 0 else off
+                on, off, n = cross_one(
+                    lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
+                )
+            rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
+        elif knots[piece] >= 1.0:
+            break
+        else:
+            piece += 1
+    if blind_until > 1.0:  # the levels are not known before the blind time ends: look at every interval until then
+        block[HIGH * PITCH + i], block[LOW * PITCH + i] = -np.inf, np.inf
+    return out, n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
+    """A forced candidate at s, where the signal is `end`: (c_on, c_off, n)."""
+    t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)
+    blind = len(flags.refractory) > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns
+    if chance == 0.0:  # a hot pixel
+        if not blind:
+            planes.t_last[pixel % planes.t_last.size] = t_ns
+            out[n] = key_of(s, pixel, np.int64(1), HOT, iv)
+            n += 1
+        return on, off, n
+    if on == np.inf or (blind and len(flags.track)):
+        return on, off, n
+    return cross_one(lanes, pixels, pixel, chance > 0.0, end, s, SHOT, planes, flags, num, iv, out, n, tally)

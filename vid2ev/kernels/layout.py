@@ -1,0 +1,128 @@
+"""What the walk works on: planes of pixel state, numbers of the sensor, numbers of the interval, and flags.
+
+Pixels lie in blocks of 1024 in row-major order.  What the scan touches is interleaved by block (`fast`: block, plane,
+pixel), so that the compiler sees that planes do not overlap and the memory is read in one stream; what only the slow
+path touches is plain planes.
+
+A **flag** is a tuple: empty when the effect is off, of length one when it is on.  Its type differs, so numba compiles a
+walk for each combination in use, and an effect that is off leaves no instruction behind.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+BLOCK_BITS = 10
+BLOCK = 1 << BLOCK_BITS
+PITCH = BLOCK + 16  # distance of planes: at a power of two apart they would fight for the same lines of the cache
+PIXEL_LIMIT = 1 << 25  # bits of the event key
+ON = (0,)
+OFF = ()
+
+# Planes of `fast`, in units of PITCH; after the lags in use come
+# three of the photoreceptor noise (its pair, the comparator's input without it) and, for a light-dependent pole, the light of the last frame.
+INPUT, HIGH, LOW, LAG1, LAG2 = range(5)
+
+# Counters kept by the walk.
+SWALLOWED, CAPPED, NOT_FINITE = range(3)
+TALLIES = 3
+
+
+class Flags(NamedTuple):
+    """What the walk is compiled for; each entry is ON or OFF (`poles`: one entry per pole)."""
+
+    poles: tuple  # (), (0,) or (0, 0)
+    log_input: tuple  # the filter acts on the log
+    log_compare: tuple  # the scan compares nats instead of light
+    straight: tuple  # the comparator's input is a straight line in nats within the interval
+    frame_time: tuple  # all events at the end of the interval
+    light_bandwidth: tuple
+    shading: tuple
+    leak: tuple
+    mismatch: tuple
+    crossing_noise: tuple
+    refractory: tuple
+    track: tuple  # the refractory period ends by memorising the signal
+    noise: tuple  # photoreceptor noise
+    forced: tuple  # shot noise or hot pixels
+    labels: tuple
+
+
+class Numbers(NamedTuple):
+    """Numbers of the sensor."""
+
+    seed: np.uint64
+    camera: int
+    curve: int
+    dark: float
+    threshold_on: float
+    threshold_off: float
+    crossing_noise: float  # [nat]
+    refractory_ns: int
+    max_crossings: int
+    leak_nat_per_ns: float
+    noise_rms: float  # [nat]
+    shot_rate_hz: float
+    shot_light_factor: float
+    hot_rate_hz: float
+    bandwidth_dark: float
+    tau1_ns: float
+    tau2_ns: float
+
+
+class Interval(NamedTuple):
+    """Numbers of one interval (t0, t0 + dt]."""
+
+    t0_ns: int
+    dt_ns: float
+    first_us: int  # the integer microsecond at or before t0
+    offset_ns: float  # t0 after that microsecond
+    last_us: int  # the last microsecond that an event may have, counted from first_us
+    x1: np.float32
+    w1: np.float32
+    x2: np.float32
+    g: np.float32
+    w2: np.float32
+    a: float  # dt / tau1, the faster clock of a light-dependent pole being formed per pixel
+    b: float  # dt / tau2
+    leak0: float  # leak since its reference at the start [nat]
+    leak1: float  # and at the end
+    gain: np.float32  # exp(leak1), and dark times it: leak in the light domain
+    shift: np.float32
+    noise_keep1: np.float32  # photoreceptor noise: see physics/photoreceptor_noise.py
+    noise_mix: np.float32
+    noise_keep2: np.float32
+    noise_s11: np.float32
+    noise_s21: np.float32
+    noise_s22: np.float32
+    noise_resolved: bool
+    step: int
+
+
+class Planes(NamedTuple):
+    """State of the pixels; a plane that nothing uses has one entry."""
+
+    fast: np.ndarray  # float32, blocks x planes x BLOCK
+    memory: np.ndarray  # float64 [n]: the level that each pixel memorised [nat]
+    theta: np.ndarray  # float32 [2 n]: its ON and OFF threshold [nat]
+    drawn: np.ndarray  # float32 [2 n]: the same with the noise of the crossing to come
+    t_last: np.ndarray  # int64 [n]: its last event [ns]
+    count: np.ndarray  # uint32 [n]: crossings so far
+    t_reset: np.ndarray  # int64 [n]: when its level last moved [ns]
+    hot: np.ndarray  # int32: indices of the hot pixels, ascending
+    shade: np.ndarray  # float32 [n]: optical gain
+
+
+@njit(cache=True, nogil=True)
+def stride_of(flags):
+    """Length of a block in `fast` for these flags."""
+    return (LAG1 + len(flags.poles) + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
+
+
+@njit(cache=True, nogil=True)
+def place_of(pixel, stride):
+    """Where a pixel stands in the first plane of `fast`."""
+    return (pixel >> BLOCK_BITS) * stride + (pixel & (BLOCK - 1))

@@ -1,0 +1,39 @@
+"""Hot and cold pixels: some fire all the time, some never.
+
+    hot    ON events, a Poisson process of hot_rate_hz [Hz], whatever the light      P(hot) = hot_probability
+    cold   no events                                                              P(cold) = cold_probability (1 - P(hot))
+
+A hot pixel sends ON events as a Poisson process of `hot_rate_hz`, whatever the light; a cold pixel sends none.  Which
+pixels are bad is drawn once per camera and seed.
+
+Source: the paper, "bad pixel probability", drawn anew at each conversion; the rate is ours (the paper: "always emitted").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from pydantic import BaseModel, Field
+
+from vid2ev.physics.random import HOT_MAP, philox, unit
+
+
+class BadPixels(BaseModel, frozen=True, extra="forbid"):
+    """Parameters of the bad pixels."""
+
+    hot_probability: float = Field(0.0, ge=0, le=1, description="share of pixels that fire all the time")
+    hot_rate_hz: float = Field(1000.0, ge=0, le=1e5, description="event rate of a hot pixel [Hz]")
+    cold_probability: float = Field(0.0, ge=0, le=1, description="share of the other pixels that never fire")
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bad_pixel_map(n, seed, camera, hot_probability, cold_probability):
+    """uint8 [n]: 0 a good pixel, 1 a hot one, 2 a cold one."""
+    kind = np.zeros(n, np.uint8)
+    for pixel in range(n):
+        words = philox(seed, HOT_MAP + 256 * camera, pixel, 0)
+        if unit(words[0]) < hot_probability:
+            kind[pixel] = 1
+        elif unit(words[1]) < cold_probability:
+            kind[pixel] = 2
+    return kind

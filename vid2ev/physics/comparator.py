@@ -1,0 +1,46 @@
+"""Comparator: two absolute levels per pixel, an event where the signal reaches one.
+
+    ON  when y >= c_on:   the memory becomes c_on,   and c_on, c_off move to memory + theta_on, memory - theta_off
+    OFF when y <= c_off:  the memory becomes c_off,  likewise
+
+Levels are float64 nats, so they do not drift.  The memory starts at the first signal, or, with `random_phase`, such that
+c_on lies anywhere within one threshold above it: real pixels are not in step, and without noise a scene that returns to
+its first value would sit exactly on a level.
+
+Sources: the paper, section II.A (thresholds apart, the level updated at every potential crossing); timing `linear` is
+ESIM (Rebecq, Gehrig, Scaramuzza, CoRL 2018).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from numba import njit
+from pydantic import BaseModel, Field
+
+from vid2ev.physics.random import PHASE, philox, unit
+
+
+class Comparator(BaseModel, frozen=True, extra="forbid"):
+    """Parameters of the comparator."""
+
+    threshold_on: float = Field(0.15, gt=0, le=100, description="mean ON threshold [nat]")
+    threshold_off: float = Field(0.15, gt=0, le=100, description="mean OFF threshold [nat]")
+    random_phase: bool = Field(True, description="pixels start anywhere between their levels instead of in step")
+    timing: Literal["response", "linear", "frame"] = Field(
+        "response",
+        description="crossing times from the filter's response, from a line between frames (ESIM), or the frame's time",
+    )
+    max_crossings: int = Field(
+        4096,
+        ge=1,
+        le=1_000_000,
+        description="crossings solved per pixel and interval; what is beyond is taken in one step, and counted",
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def initial_phase(seed, camera, pixel):
+    """Fraction of the ON threshold that lies between the first signal and the first ON level, in (0, 1)."""
+    word, _, _, _ = philox(seed, PHASE + 256 * camera, pixel, 0)
+    return unit(word)

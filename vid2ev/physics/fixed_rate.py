@@ -1,0 +1,97 @@
+"""Fixed-rate mode: events are read out in event frames, at most one per pixel and frame.
+
+    frame k is at round(1e6 k / frame_rate_hz) us after the first light frame
+    nearest   an event goes to the event frame nearest to its time, the earlier of two that are equally near
+    causal    to the next one, as a scanner that reads what has happened
+
+The first crossing wins; later ones of the same pixel and frame are dropped.  As the nearest frame may lie ahead of the
+light that is known, events of a frame not yet complete are held back; `flush` gives the last of them.
+
+Source: the paper, algorithm step 3, "rounded to the closest event frame timestamp".
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from vid2ev.stream.events import Events
+
+
+class FixedRate(BaseModel, frozen=True, extra="forbid"):
+    """Parameters of the fixed-rate mode."""
+
+    frame_rate_hz: float = Field(0.0, ge=0, le=1e6, description="event frames per second; 0: free-running")
+    rounding: Literal["nearest", "causal"] = Field("nearest", description="to the nearest event frame, or to the next")
+
+
+class EventFrames:
+    """Events into event frames; the state is `origin_us`, the last frame of each pixel, and the events held back."""
+
+    def __init__(self, spec: FixedRate, width: int, height: int):
+        self.spec, self.width = spec, width
+        self.origin_us: int | None = None
+        self.last = np.full(width * height, -1, np.int64)
+        self.held = Events.empty()
+
+    def instant_us(self, k: np.ndarray) -> np.ndarray:
+        """Times [us] of event frames k."""
+        assert self.origin_us is not None
+        return self.origin_us + np.rint(np.asarray(k, np.float64) * (1e6 / self.spec.frame_rate_hz)).astype(np.int64)
+
+    def frame_of(self, t_us: np.ndarray) -> np.ndarray:
+        """The event frame that an event of time t goes to."""
+        assert self.origin_us is not None
+        k = np.floor((t_us - self.origin_us) * (self.spec.frame_rate_hz * 1e-6)).astype(np.int64) - 1
+        # Frames are at rounded microseconds: walk up to the right one instead of trusting the division.
+        for _ in range(3):
+            here, after = self.instant_us(k), self.instant_us(k + 1)
+            ahead = t_us > here if self.spec.rounding == "causal" else t_us - here > after - t_us
+            k = k + ahead
+        return np.maximum(k, 0)
+
+    def push(self, events: Events, until_us: int) -> Events:
+        """Add events of times up to `until_us`; returns those of the event frames that are complete."""
+        frame = self.frame_of(events.t)
+        pixel = events.y.astype(np.int64) * self.width + events.x
+        order = np.lexsort((np.arange(len(pixel)), frame, pixel))
+        sorted_pixel, sorted_frame = pixel[order], frame[order]
+        first = np.ones(len(order), bool)
+        first[1:] = (sorted_pixel[1:] != sorted_pixel[:-1]) | (sorted_frame[1:] != sorted_frame[:-1])
+        first &= sorted_frame > self.last[sorted_pixel]
+        np.maximum.at(self.last, sorted_pixel, sorted_frame)
+        kept = np.sort(order[first])
+        events, frame = events.select(kept), frame[kept]
+        events = Events(self.instant_us(frame), events.x, events.y, events.p, events.label)
+        events = Events.concatenate([self.held, events])
+        # What comes later than `until_us` can still go to its own event frame, but to none before.
+        ready = self.frame_of(events.t) < self.frame_of(np.array([until_us]))[0]
+        self.held = events.select(~ready)
+        return self._ordered(events.select(ready))
+
+    def flush(self) -> Events:
+        """The events held back."""
+        held, self.held = self.held, Events.empty()
+        return self._ordered(held)
+
+    @staticmethod
+    def _ordered(events: Events) -> Events:
+        return events.select(np.lexsort((events.x, events.y, events.t)))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """The state as plain arrays."""
+        held = self.held
+        label = np.empty(0, np.uint8) if held.label is None else held.label
+        origin = np.array([self.origin_us], np.int64)
+        parts = {"t": held.t, "x": held.x, "y": held.y, "p": held.p, "label": label}
+        return {"frame_origin": origin, "frame_last": self.last.copy()} | {f"held_{k}": v for k, v in parts.items()}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state that `state` gave."""
+        self.origin_us = int(state["frame_origin"][0])
+        self.last[...] = state["frame_last"]
+        label = state["held_label"]
+        held = (state[f"held_{k}"] for k in "txyp")
+        self.held = Events(*held, label if len(label) else None)

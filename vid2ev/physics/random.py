@@ -1,0 +1,71 @@
+"""Noise as a function of (seed, camera, effect, pixel, tick): the same draw whoever asks, in whatever order.
+
+The generator is Philox4x32-10 (Salmon, Moraes, Dror, Shaw: *Parallel random numbers: as easy as 1, 2, 3*, SC 2011,
+with the rounds and constants of their Random123 library): key = seed, counter = (pixel, tick low, tick high,
+effect + 256 * camera).  Nothing is carried from one draw to the next, so chunks, tiles, threads and resumed runs agree.
+
+`tick` is what the effect counts: crossings of the pixel, cells of a fixed clock, steps, or 0 for a frozen map.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vid2ev.physics.elementary import fma, log64
+
+PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE = range(8)
+
+_M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_W0, _W1 = np.uint32(0x9E3779B9), np.uint32(0xBB67AE85)
+_32 = np.uint64(32)
+_TO_UNIT = 2.0**-32
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _round(c0, c1, c2, c3, k0, k1):
+    first, second = np.uint64(c0) * _M0, np.uint64(c2) * _M1
+    return (
+        np.uint32(second >> _32) ^ c1 ^ k0,
+        np.uint32(second),
+        np.uint32(first >> _32) ^ c3 ^ k1,
+        np.uint32(first),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def philox(seed, stream, pixel, tick):
+    """Four uint32 words for a seed (uint64), a stream (effect + 256 * camera), a pixel and a tick (int64)."""
+    c0, c3 = np.uint32(pixel), np.uint32(stream)
+    c1, c2 = np.uint32(tick), np.uint32(np.uint64(tick) >> _32)
+    k0, k1 = np.uint32(seed), np.uint32(np.uint64(seed) >> _32)
+    for _ in range(10):
+        c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
+        k0, k1 = np.uint32(k0 + _W0), np.uint32(k1 + _W1)
+    return c0, c1, c2, c3
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def unit(word):
+    """A uint32 word as a float64 in (0, 1), symmetric about 1/2."""
+    return (np.float64(word) + 0.5) * _TO_UNIT
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def normal_pair(first, second):
+    """Two independent standard normal numbers from two words (Box and Muller 1958); |z| < 6.8."""
+    radius = np.sqrt(-2.0 * log64(unit(first)))
+    quarter = unit(second) * 4.0
+    nearest = np.floor(quarter + 0.5)
+    a = (quarter - nearest) * 1.5707963267948966
+    z = a * a
+    sine = fma(z, fma(z, fma(z, fma(z, 2.7557319e-06, -1.984126984e-04), 8.333333333e-03), -0.16666666666666666), 1.0)
+    sine = a * sine
+    cosine = fma(z, fma(z, fma(z, 2.48015873e-05, -1.3888888889e-03), 4.1666666666666664e-02), -0.5)
+    cosine = fma(z, cosine, 1.0)
+    turns = np.int64(nearest) & 3
+    x = cosine if turns & 1 == 0 else sine
+    y = sine if turns & 1 == 0 else cosine
+    x = -x if (turns == 1) | (turns == 2) else x
+    y = -y if turns >= 2 else y
+    return radius * x, radius * y

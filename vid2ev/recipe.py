@@ -1,0 +1,159 @@
+"""What decides the events of a recording: a source of light, made denser in time, and a sensor that looks at it."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from vid2ev.errors import UsageError
+from vid2ev.formats.manifest import identity, versions
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.presets import load_sensor
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sources import Source, open_source
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+from vid2ev.upsample import Upsampler, make_upsampler
+
+AHEAD = 4  # frames made in advance, while the sensor works
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides the events of a recording; the same recipe, the same events.
+
+    video          what the source was opened by
+    sensor         what the specification was found by
+    upsample       how light is made between frames: none, linear or flow
+    subframes      intervals that a source interval becomes: "auto" (by motion and contrast), or a number
+    max_subframes  the most that "auto" may take
+    seed           of the sensor, 0 ... 2**64 - 1
+    labels         give each event its cause
+    """
+
+    video: str
+    source: Source
+    spec: DvsSpec
+    sensor: str
+    upsample: str = "flow"
+    subframes: int | Literal["auto"] = "auto"
+    max_subframes: int = 64
+    seed: int = 0
+    labels: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        video: str | Path,
+        sensor: str | Path | DvsSpec = "paper",
+        overrides: Sequence[str] = (),
+        *,
+        transfer: str = "auto",
+        fps: float | None = None,
+        **rest: Any,
+    ) -> Recipe:
+        """The recipe for a video and a sensor, with everything checked that can be before the first frame.
+
+        video      a video file, a folder of images, an array file, or `synthetic:NAME`
+        sensor     a preset, a TOML file, or a specification
+        overrides  `key=value` texts that change a preset or file
+        transfer, fps as for `open_source`; the rest are the fields above.  Raises UsageError, DataError.
+        """
+        if isinstance(sensor, DvsSpec) and overrides:
+            raise UsageError(
+                f"overrides {list(overrides)}: expected a preset or file to change; change the specification"
+            )
+        spec = sensor if isinstance(sensor, DvsSpec) else load_sensor(sensor, overrides)
+        name = "own" if isinstance(sensor, DvsSpec) else str(sensor)
+        seed = rest.get("seed", 0)
+        if not 0 <= seed < 1 << 64:
+            raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
+        recipe = cls(str(video), open_source(video, transfer=transfer, fps=fps), spec, name, **rest)
+        recipe.upsampler()  # (refuses what cannot be)
+        return recipe
+
+    def upsampler(self) -> Upsampler:
+        """A new upsampler."""
+        threshold = min(self.spec.threshold_on, self.spec.threshold_off)
+        return make_upsampler(self.upsample, self.subframes, self.max_subframes, threshold)
+
+    def dvs(self, threads: int = 1) -> Dvs:
+        """The sensor, before its first frame."""
+        return Dvs(self.spec, self.source.size, self.seed, threads=threads, labels=self.labels)
+
+    def light(self, start: int = 0) -> Generator[tuple[Frame, int]]:
+        """Source frame `start`, and all frames after it, those in between too; with each the number of source intervals
+        so far that hit `max_subframes`.  A thread of its own makes them, a little in advance."""
+        return _ahead(self._light(start), AHEAD)
+
+    def _light(self, start: int) -> Generator[tuple[Frame, int]]:
+        upsampler = self.upsampler()
+        before: Frame | None = None
+        for frame in self.source.frames(start):
+            for newer in [frame] if before is None else upsampler.between(before, frame):
+                yield newer, upsampler.limited
+            before = frame
+
+    def describe(self) -> dict[str, Any]:
+        """The recipe as JSON: what the manifest says of it, and by which a run is known again."""
+        path = Path(self.video)
+        known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
+        width, height = self.source.size
+        return json.loads(
+            json.dumps(
+                {
+                    "versions": versions(),
+                    "source": self.source.describe() | known_by,
+                    "upsampling": {
+                        "method": self.upsample,
+                        "subframes": self.subframes,
+                        "max_subframes": self.max_subframes,
+                    },
+                    "sensor": {
+                        "name": self.sensor,
+                        "size": [width, height],
+                        "parameters": self.spec.model_dump(mode="json"),
+                        "effects": self.spec.effects(),
+                    },
+                    "seed": self.seed,
+                    "labels": self.labels,
+                }
+            )
+        )
+
+
+def events_of(
+    video: str | Path,
+    sensor: str | Path | DvsSpec = "paper",
+    overrides: Sequence[str] = (),
+    *,
+    threads: int = 1,
+    **rest: Any,
+) -> Iterator[Events]:
+    """The events of a video, those that `convert` writes: one Events for each frame and sub-frame, the empty ones too.
+
+    The arguments are those of `Recipe.of`, and the `threads` of the sensor.  What is impossible is refused at once.
+    """
+    recipe = Recipe.of(video, sensor, overrides, **rest)
+    return recipe.dvs(threads).run(frame for frame, _ in recipe.light())
+
+
+def _ahead(items: Generator[T], depth: int) -> Generator[T]:
+    """The items, made by a second thread up to `depth` in advance; an error comes out in the place of its item."""
+    with ThreadPoolExecutor(1) as pool, closing(items):
+        end = object()
+        pending = deque(pool.submit(next, items, end) for _ in range(depth))
+        try:
+            while (item := pending.popleft().result()) is not end:
+                pending.append(pool.submit(next, items, end))
+                yield item  # type: ignore[misc]
+        finally:
+            pool.shutdown(cancel_futures=True)

@@ -1,0 +1,140 @@
+"""From a specification to what the walk works on: flags, numbers, planes of state, and the numbers of an interval."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vid2ev.kernels.layout import BLOCK, OFF, ON, Flags, Interval, Numbers, Planes, stride_of
+from vid2ev.physics.bad_pixels import bad_pixel_map
+from vid2ev.physics.log_curve import CURVES
+from vid2ev.physics.mismatch import fill_thresholds
+from vid2ev.physics.photoreceptor import separate, step_weights
+from vid2ev.physics.photoreceptor_noise import RESOLVED, noise_step
+from vid2ev.physics.shading import shading_map
+from vid2ev.sensors.spec import DvsSpec
+
+F = np.float32
+
+
+def flags_of(spec: DvsSpec, labels: bool) -> Flags:
+    """What the walk has to be compiled for."""
+
+    def flag(used: object) -> tuple:
+        return ON if used else OFF
+
+    poles = len(spec.pole_taus_us)
+    log_input = spec.filter == "after" and poles > 0
+    leak, noise = spec.leak_rate_hz > 0, spec.photoreceptor_noise > 0
+    return Flags(
+        poles=(0,) * poles,
+        log_input=flag(log_input),
+        log_compare=flag(log_input or noise or (leak and spec.log_curve != "offset")),
+        straight=flag(spec.timing != "response" or (spec.filter == "after" and poles == 0)),
+        frame_time=flag(spec.timing == "frame"),
+        light_bandwidth=flag(spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0),
+        shading=flag(spec.shading),
+        leak=flag(leak),
+        mismatch=flag(spec.mismatch > 0),
+        crossing_noise=flag(spec.crossing_noise > 0),
+        refractory=flag(spec.refractory_us > 0),
+        track=flag(spec.refractory_us > 0 and spec.refractory == "track"),
+        noise=flag(noise),
+        forced=flag(spec.shot_rate_hz > 0 or (spec.hot_probability > 0 and spec.hot_rate_hz > 0)),
+        labels=flag(labels),
+    )
+
+
+def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
+    """Numbers of the sensor in the units of the walk."""
+    taus = spec.pole_taus_us
+    tau1 = taus[0] * 1e3 if taus else 0.0
+    return Numbers(
+        seed=np.uint64(seed),
+        camera=camera,
+        curve=CURVES[spec.log_curve],
+        dark=spec.dark_level,
+        threshold_on=spec.threshold_on,
+        threshold_off=spec.threshold_off,
+        crossing_noise=spec.crossing_noise,
+        refractory_ns=spec.refractory_ns(),
+        max_crossings=spec.max_crossings,
+        leak_nat_per_ns=spec.leak_rate_hz * spec.threshold_on * 1e-9,
+        noise_rms=spec.photoreceptor_noise,
+        shot_rate_hz=spec.shot_rate_hz,
+        shot_light_factor=spec.shot_light_factor,
+        hot_rate_hz=spec.hot_rate_hz if spec.hot_probability > 0 else 0.0,
+        bandwidth_dark=spec.bandwidth_dark,
+        tau1_ns=tau1,
+        tau2_ns=separate(tau1, taus[1] * 1e3) if len(taus) == 2 else 0.0,
+    )
+
+
+def planes_of(spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int) -> tuple[Planes, np.ndarray]:
+    """State of the pixels, yet without light, and the map of bad pixels (uint8: 1 hot, 2 cold)."""
+    pixels = width * height
+    blocks = -(-pixels // BLOCK)
+    theta = np.empty(2 * pixels if flags.mismatch else 0, np.float32)
+    if flags.mismatch:
+        fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+    if spec.hot_probability > 0 or spec.cold_probability > 0:
+        bad = bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
+    else:
+        bad = np.zeros(pixels, np.uint8)
+    remembers_events = flags.refractory or num.hot_rate_hz > 0
+    planes = Planes(
+        fast=np.empty(blocks * stride_of(flags), np.float32),
+        memory=np.empty(pixels, np.float64),
+        theta=theta,
+        drawn=np.empty(2 * pixels if flags.crossing_noise else 0, np.float32),
+        t_last=np.zeros(pixels if remembers_events else 1, np.int64),
+        count=np.zeros(pixels if flags.crossing_noise else 1, np.uint32),
+        t_reset=np.zeros(pixels if flags.labels and flags.leak else 1, np.int64),
+        hot=np.flatnonzero(bad == 1).astype(np.int32),
+        shade=shading_map(spec.shading, width, height).ravel() if flags.shading else np.empty(0, np.float32),
+    )
+    return planes, bad
+
+
+def interval_of(
+    flags: Flags, num: Numbers, t0_ns: int, t1_ns: int, leak_since_ns: int, step: int, fresh_noise: bool
+) -> Interval:
+    """Numbers of the interval (t0, t1]; all weights in float64 before they are rounded once."""
+    dt = float(t1_ns - t0_ns)
+    first_us = t0_ns // 1000
+    weights = step_weights(dt, num.tau1_ns, num.tau2_ns)
+    leak0 = num.leak_nat_per_ns * (t0_ns - leak_since_ns)
+    leak1 = num.leak_nat_per_ns * (t1_ns - leak_since_ns)
+    gain = math.exp(min(leak1, 80.0))
+    resolved = bool(flags.noise) and dt * RESOLVED <= num.tau2_ns
+    noise = (0.0,) * 6
+    if resolved:
+        noise = noise_step(dt, num.tau1_ns, num.tau2_ns, num.noise_rms, fresh_noise)
+    keep1, mix, keep2, s11, s21, s22 = noise
+    return Interval(
+        t0_ns=t0_ns,
+        dt_ns=dt,
+        first_us=first_us,
+        offset_ns=float(t0_ns - first_us * 1000),
+        last_us=max(t1_ns // 1000 - first_us, 1),
+        x1=F(weights.x1),
+        w1=F(weights.w1),
+        x2=F(weights.x2),
+        g=F(weights.g),
+        w2=F(weights.w2),
+        a=dt / num.tau1_ns if num.tau1_ns > 0 else 0.0,
+        b=dt / num.tau2_ns if num.tau2_ns > 0 else 0.0,
+        leak0=leak0,
+        leak1=leak1,
+        gain=F(gain),
+        shift=F(num.dark * gain),
+        noise_keep1=F(keep1),
+        noise_mix=F(mix),
+        noise_keep2=F(keep2),
+        noise_s11=F(s11),
+        noise_s21=F(s21),
+        noise_s22=F(s22),
+        noise_resolved=resolved,
+        step=step,
+    )

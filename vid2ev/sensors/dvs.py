@@ -1,0 +1,259 @@
+"""Dvs: light in, events out, one frame at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, PIXEL_LIMIT, SWALLOWED, TALLIES
+from vid2ev.kernels.order import sorted_by_time, unpack
+from vid2ev.physics.fixed_rate import EventFrames
+from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sources.transfer import code_table
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+__all__ = ["Dvs", "DvsSpec"]
+
+LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
+LEAK_REBASE_NAT = 0.5
+STATE_PLANES = ("fast", "memory", "drawn", "t_last", "count", "t_reset")
+
+
+class Dvs:
+    """An event camera of `size` (width, height): feed it frames of light with `step`, get the events between them.
+
+    spec      parameters of the sensor
+    seed      0 ... 2**64 - 1: frozen maps and noise; the same seed is the same camera
+    camera    0 ... 2**24 - 1: the camera's number in a rig, so that cameras of one seed differ
+    threads   tiles worked on at a time; changes nothing but the time it takes
+    labels    give each event its cause (`vid2ev.stream.events.Label`)
+    transfer  what uint8 or uint16 frames are coded with ("srgb", "bt709", "linear", "gamma:2.2"); without it
+              they are refused, because linear light was not promised
+
+    Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
+    """
+
+    def __init__(
+        self,
+        spec: DvsSpec,
+        size: tuple[int, int],
+        seed: int = 0,
+        *,
+        camera: int = 0,
+        threads: int = 1,
+        labels: bool = False,
+        transfer: str | None = None,
+    ):
+        width, height = size
+        if width < 1 or height < 1 or width * height > PIXEL_LIMIT or max(width, height) > 65535:
+            raise UsageError(
+                f"size {width}x{height}: expected 1x1 to {PIXEL_LIMIT} pixels in all; scale the frames down"
+            )
+        if not 0 <= seed < 1 << 64 or not 0 <= camera < 1 << 24:
+            raise UsageError(f"seed {seed}, camera {camera}: expected 0 to 2**64 - 1 and 0 to 2**24 - 1")
+        if threads < 1:
+            raise UsageError(f"threads {threads}: expected at least 1; leave it out for one")
+        self.spec, self.size, self.seed, self.camera, self.labels = (
+            spec,
+            (width, height),
+            seed,
+            camera,
+            labels,
+        )
+        self.transfer = transfer
+        self.effects = spec.effects()
+        self._flags = flags_of(spec, labels)
+        self._numbers = numbers_of(spec, seed, camera)
+        self._planes, self._bad = planes_of(spec, self._flags, self._numbers, width, height)
+        self._frames = EventFrames(spec, width, height) if spec.frame_rate_hz > 0 else None
+        self._tallies = np.zeros((threads, TALLIES), np.int64)
+        self._polarities = np.zeros(2, np.int64)
+        self._t_ns: int | None = None
+        self._leak_since_ns = 0
+        self._step = 0
+        self._fresh_noise = True
+        blocks = -(-width * height // BLOCK)
+        cuts = [blocks * k // min(threads, blocks) for k in range(min(threads, blocks) + 1)]
+        self._tiles = list(pairwise(cuts))
+        self._buffers = [np.empty(4096, np.uint64) for _ in self._tiles]
+        self._pool = ThreadPoolExecutor(len(self._tiles)) if len(self._tiles) > 1 else None
+        self._tables: dict[Any, np.ndarray] = {}
+
+    # ------------------------------------------------------------------------------------------------- light in
+
+    def step(self, light: np.ndarray, t_ns: int) -> Events:
+        """Advance to a frame of light at t_ns [int, ns]; returns the events in (previous frame, this frame].
+
+        `light` is [height, width]: floating point is linear light (1.0 diffuse white; NaN and negative count as 0, what is
+        above 1e30 as 1e30), uint8 or uint16 are codes of `transfer`.  The first frame settles the sensor and has no events.
+        Raises UsageError for another shape or type, or a time that is not after the last one.
+        """
+        flat, table = self._light(light)
+        t_ns = int(t_ns)
+        if self._t_ns is None:
+            self._settle(flat, table, t_ns)
+            return Events.empty(self.labels)
+        if not self._t_ns < t_ns < self._t_ns + LONGEST_INTERVAL_NS:
+            raise UsageError(
+                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours; sort the frames and drop"
+                " repeated times"
+            )
+        self._rebase_leak(t_ns)
+        interval = interval_of(
+            self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
+        )
+        events = self._events(self._walk(flat, table, interval), interval)
+        self._t_ns = t_ns
+        self._step += 1
+        self._fresh_noise = not interval.noise_resolved
+        if self._frames is not None:
+            events = self._frames.push(events, t_ns // 1000)
+        return self._counted(events)
+
+    def run(self, frames: Iterable[Frame]) -> Iterator[Events]:
+        """`step` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""
+        for frame in frames:
+            yield self.step(frame.light, frame.t_ns)
+        yield self.flush()
+
+    def flush(self) -> Events:
+        """Events that fixed-rate mode holds back because their event frame lies ahead; otherwise none."""
+        return self._counted(self._frames.flush()) if self._frames is not None else Events.empty(self.labels)
+
+    # ------------------------------------------------------------------------------------------------- state
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
+        if self._t_ns is None:
+            return {}
+        state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
+        numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise)]
+        state["clock"] = np.array(numbers, np.int64)
+        state["tallies"] = self._tallies.sum(axis=0)
+        state["polarities"] = self._polarities.copy()
+        if self._frames is not None:
+            state |= self._frames.state()
+        return state
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
+        if not state:
+            self._t_ns = None
+            return
+        for name in STATE_PLANES:
+            plane = getattr(self._planes, name)
+            if state[name].shape != plane.shape:
+                raise UsageError(
+                    f"state of {state[name].size} entries in '{name}', expected {plane.size}: another sensor's state"
+                )
+            plane[...] = state[name]
+        self._t_ns, self._leak_since_ns, self._step, fresh = (int(value) for value in state["clock"])
+        self._fresh_noise = bool(fresh)
+        self._tallies[...] = 0
+        self._tallies[0] = state["tallies"]
+        self._polarities[...] = state["polarities"]
+        if self._frames is not None:
+            self._frames.restore(state)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Events sent (`on`, `off`), crossings `swallowed` by the refractory period, pixel-intervals `capped` at
+        `max_crossings`, and pixels `not_finite` (or negative, or above 1e30) that were mended."""
+        tallies = self._tallies.sum(axis=0)
+        off, on = (int(count) for count in self._polarities)
+        swallowed, capped, not_finite = (int(tallies[k]) for k in (SWALLOWED, CAPPED, NOT_FINITE))
+        return {"on": on, "off": off, "swallowed": swallowed, "capped": capped, "not_finite": not_finite}
+
+    # ------------------------------------------------------------------------------------------------- inside
+
+    def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        light = np.asarray(light)
+        width, height = self.size
+        if light.shape != (height, width):
+            raise UsageError(
+                f"light of shape {light.shape}: expected ({height}, {width}), rows and columns of this sensor"
+            )
+        if light.dtype.kind == "f":
+            flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
+            return flat.reshape(-1), np.empty(0, np.float32)
+        if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
+            raise UsageError(
+                f"light of type {light.dtype}: expected floating point (linear light), or uint8 or uint16 with"
+                " transfer='srgb', 'bt709', 'gamma:2.2' or 'linear'"
+            )
+        if light.dtype not in self._tables:
+            self._tables[light.dtype] = self._table(8 * light.dtype.itemsize)
+        return np.ascontiguousarray(light).reshape(-1), self._tables[light.dtype]
+
+    def _table(self, bits: int) -> np.ndarray:
+        assert self.transfer is not None
+        if self.transfer == "linear":
+            return np.array([1.0 / ((1 << bits) - 1)], np.float32)  # one entry: a product is faster than a look-up
+        return code_table(self.transfer, bits)
+
+    def _each_tile(self, work: Any) -> list:
+        if self._pool is None:
+            return [work(0, *self._tiles[0])]
+        return list(self._pool.map(lambda k: work(k, *self._tiles[k]), range(len(self._tiles))))
+
+    def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
+        def settle(k: int, first: int, last: int) -> None:
+            settle_tile(
+                first, last, self._bad.size, flat, table, self._bad, self.spec.random_phase, self._planes, self._flags,
+                self._numbers, self._tallies[k],
+            )  # fmt: skip
+
+        self._each_tile(settle)
+        self._t_ns = self._leak_since_ns = t_ns
+        self._planes.t_reset[...] = t_ns
+        self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
+        if self._frames is not None:
+            self._frames.origin_us = t_ns // 1000
+
+    def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> np.ndarray:
+        def walk(k: int, first: int, last: int) -> np.ndarray:
+            self._buffers[k], n = walk_tile(
+                first, last, self._bad.size, flat, table, self._planes, self._flags, self._numbers, interval,
+                self._buffers[k], self._tallies[k],
+            )  # fmt: skip
+            return self._buffers[k][:n]
+
+        keys = self._each_tile(walk)
+        return keys[0] if len(keys) == 1 else np.concatenate(keys)
+
+    def _events(self, keys: np.ndarray, interval: Any) -> Events:
+        if len(keys) == 0:
+            return Events.empty(self.labels)
+        n = len(keys)
+        t, x, y, p = (
+            np.empty(n, np.int64),
+            np.empty(n, np.uint16),
+            np.empty(n, np.uint16),
+            np.empty(n, np.uint8),
+        )
+        label = np.empty(n if self.labels else 0, np.uint8)
+        ordered = sorted_by_time(keys, n, interval.last_us)
+        unpack(ordered, self.size[0], interval.first_us, t, x, y, p, label)
+        return Events(t, x, y, p, label if self.labels else None)
+
+    def _counted(self, events: Events) -> Events:
+        on = int(np.count_nonzero(events.p))
+        self._polarities += (len(events) - on, on)
+        return events
+
+    def _rebase_leak(self, t_ns: int) -> None:
+        """Keep the leak small against the levels, whose float32 copies the scan compares."""
+        assert self._t_ns is not None
+        rate = self._numbers.leak_nat_per_ns
+        if rate * (t_ns - self._leak_since_ns) > LEAK_REBASE_NAT and self._t_ns > self._leak_since_ns:
+            risen = rate * (self._t_ns - self._leak_since_ns)
+            shift_levels(self._bad.size, risen, self._planes, self._flags, self._numbers)
+            self._leak_since_ns = self._t_ns

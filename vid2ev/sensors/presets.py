@@ -1,0 +1,171 @@
+"""Sensors by name: preset files, a person's own TOML file, and `key=value` on top of either.
+
+A sensor file has a table `[dvs]`, whose keys are the fields of `DvsSpec`; those left out have their defaults.
+A table `[about]` may hold `title`, `size`, `sources` and `differences`.  In a preset the comment above a key
+names the source of its value; `read_sensor` keeps it, so that `vid2ev sensors NAME` can cite it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import reprlib
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sensors.spec import DvsSpec
+
+PRESET_FILES = Path(__file__).with_name("preset_files")
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFile:
+    """A sensor file as read: its name, what it says about itself, its values and the comment above each."""
+
+    name: str
+    about: Mapping[str, Any]
+    values: Mapping[str, Any]
+    sources: Mapping[str, str]
+
+
+def preset_names() -> list[str]:
+    """The names of the presets that come with vid2ev, in alphabetical order."""
+    return sorted(path.stem for path in PRESET_FILES.glob("*.toml"))
+
+
+def load_sensor(name_or_path: str | Path, overrides: Sequence[str] = ()) -> DvsSpec:
+    """The specification of a sensor: a preset or a TOML file, changed by `key=value` texts.
+
+    An override names a key of `DvsSpec`, bare or with `dvs.` before it; its value is a TOML number, boolean,
+    string or list, and a bare word is a string.  Later overrides win.
+
+    Raises UsageError for an unknown preset or key and for a value that cannot be, DataError for a file that
+    cannot be read as TOML.
+    """
+    sensor = read_sensor(name_or_path)
+    values = dict(sensor.values)
+    for override in overrides:
+        key, value = _parse_override(override)
+        values[key] = value
+    return _spec(values, sensor.name)
+
+
+def read_sensor(name_or_path: str | Path) -> SensorFile:
+    """A sensor file with its comments; the values are not checked yet.  Raises as `load_sensor` does."""
+    name, path = _find(str(name_or_path))
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise DataError(f"Sensor file {path} cannot be read ({reason}); give a readable TOML file.") from error
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"Sensor file {path} is not valid TOML: {error}; correct that line.") from error
+    unknown = [key for key in tables if key not in ("dvs", "about")]
+    if unknown:
+        raise UsageError(
+            f"Sensor file {path} has '{unknown[0]}' outside its tables [dvs] and [about]; "
+            "put the sensor's keys under [dvs]."
+        )
+    values, about = tables.get("dvs"), tables.get("about", {})
+    if not isinstance(values, dict) or not isinstance(about, dict):
+        raise UsageError(f"Sensor file {path} has no table [dvs]; put the sensor's keys under a line [dvs].")
+    return SensorFile(name, about, values, _comments(text))
+
+
+def _find(name_or_path: str) -> tuple[str, Path]:
+    names = preset_names()
+    if name_or_path in names:
+        return name_or_path, PRESET_FILES / f"{name_or_path}.toml"
+    path = Path(name_or_path)
+    if path.is_file():
+        return str(path), path
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise UsageError(f"Sensor file {path} does not exist; give an existing TOML file or one of {_list(names)}.")
+    hint = _nearest(name_or_path, names)
+    raise UsageError(f"Sensor '{name_or_path}' is not a preset{hint}; presets are {_list(names)}, or give a TOML file.")
+
+
+def _comments(text: str) -> dict[str, str]:
+    """The comment lines directly above each key of the table [dvs], joined to one line."""
+    found: dict[str, str] = {}
+    block: list[str] = []
+    table = ""
+    for line in map(str.strip, text.splitlines()):
+        if line.startswith("#"):
+            block.append(line.lstrip("# "))
+            continue
+        if line.startswith("["):
+            table = line
+        assignment = re.match(r"([\w-]+)\s*=", line)
+        if assignment and block and table == "[dvs]":
+            found[assignment[1]] = " ".join(block)
+        block = []
+    return found
+
+
+def _parse_override(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    key = key.strip().removeprefix("dvs.")
+    if not equals or not key or not value.strip():
+        raise UsageError(f"Setting '{text}' is not of the form key=value; write for example threshold_on=0.2.")
+    return key, _parse_value(value.strip())
+
+
+def _parse_value(text: str) -> Any:
+    """A TOML value; else a number as Python reads it (`.2`); else the text itself."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        parsed = {}
+    if list(parsed) == ["value"]:
+        return parsed["value"]
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _spec(values: Mapping[str, Any], name: str) -> DvsSpec:
+    try:
+        return DvsSpec(**values)
+    except ValidationError as error:
+        raise UsageError(_sentence(error, name)) from error
+
+
+def _sentence(error: ValidationError, name: str) -> str:
+    """The first of pydantic's complaints as one sentence: key, value, what is possible, default."""
+    complaint = error.errors()[0]
+    where = f"in sensor {name}"
+    if not complaint["loc"]:
+        return f"The values {where} do not go together: {_plain(complaint['msg'])}."
+    key = str(complaint["loc"][0])
+    if complaint["type"] == "extra_forbidden":
+        hint = _nearest(key, DvsSpec.model_fields)
+        return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
+    default = DvsSpec.model_fields[key].default
+    value = reprlib.repr(complaint["input"])
+    return f"{key} = {value} {where} is impossible: {_plain(complaint['msg'])} (default {default!r})."
+
+
+def _plain(message: str) -> str:
+    """Pydantic's message as a clause within a sentence."""
+    message = message.removeprefix("Value error, ").rstrip(".")
+    message = re.sub(r", (unable|got) .*", "", message)
+    return re.sub(r"^Input should be", "it must be", message).replace("a valid tuple", "a list")
+
+
+def _nearest(word: str, words: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(words), n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names)

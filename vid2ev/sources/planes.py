@@ -1,0 +1,62 @@
+"""Planes of codes from a decoded picture, and the way up it is to be shown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError
+
+
+def planar(picture: Any, path: object) -> Any:
+    """The picture in planes of whole codes: as it is, or rearranged without loss (semi-planar, packed, big-endian)."""
+    kind = picture.format
+    bits = max(component.bits for component in kind.components)
+    if bits > 16 or "f16" in kind.name or kind.name.startswith(("bayer", "xyz")):
+        raise DataError(f"{path}: pixel format {kind.name} is not supported; convert it to 8 to 16 bits of RGB or YUV")
+    depth = "" if bits <= 8 else f"{bits}le"
+    if kind.is_rgb or kind.has_palette:
+        wanted = f"gbrp{depth}"
+    elif len(kind.components) < 3:
+        wanted = f"gray{depth}"
+    else:
+        chroma = {(1, 1): "420", (1, 0): "422", (0, 0): "444", (0, 1): "440", (2, 0): "411", (2, 2): "410"}
+        wanted = f"yuv{chroma[halvings_of(kind.chroma_width), halvings_of(kind.chroma_height)]}p{depth}"
+    if kind.name.replace("yuvj", "yuv").replace("yuva", "yuv").replace("gbrap", "gbrp") == wanted:
+        return picture
+    return picture.reformat(format=wanted)
+
+
+def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
+    """What `upright` is to do, from the display matrix of a picture: transpose, mirror left to right, flip upside down.
+
+    The matrix [a b; c d] takes a stored place (x, y) to the place shown (a x + c y, b x + d y); other angles than
+    quarter turns are taken for the nearest.  Source: ISO/IEC 14496-12 section 6.2.2 and libavutil/display.h.
+    """
+    for data in picture.side_data:
+        if data.type.name == "DISPLAYMATRIX":
+            a, b, _, c, d = np.frombuffer(data, np.int32)[:5].tolist()
+            transposed = abs(b) > abs(a)
+            return (True, c < 0, b < 0) if transposed else (False, a < 0, d < 0)
+    return False, False, False
+
+
+def upright(light: np.ndarray, orientation: tuple[bool, bool, bool]) -> np.ndarray:
+    """The picture as it is to be shown; the very same array if nothing is to be turned."""
+    transposed, mirrored, flipped = orientation
+    if not any(orientation):
+        return light
+    light = light.T if transposed else light
+    return np.ascontiguousarray(light[:: -1 if flipped else 1, :: -1 if mirrored else 1])
+
+
+def codes_of(plane: Any, kind: Any) -> np.ndarray:
+    """Codes of a plane [rows x row length in memory]: uint8, or uint16 for more than 8 bits."""
+    dtype = np.uint8 if kind.components[0].bits <= 8 else np.uint16
+    return np.frombuffer(plane, dtype).reshape(plane.height, -1)
+
+
+def halvings_of(chroma_length: Any) -> int:
+    """How often chroma is halved along an axis."""
+    return (64 // chroma_length(64)).bit_length() - 1

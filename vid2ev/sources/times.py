@@ -1,0 +1,137 @@
+"""When frames were taken: exact int64 nanoseconds, strictly increasing.
+
+Stamps are rational numbers (ticks of a time base, decimals of a text file, multiples of 1 / fps); they are rounded
+once, to the nearest nanosecond, by integer arithmetic, so that frame 10**6 of a 24000/1001 fps clip is as exact as
+frame 1.
+
+`timestamps.txt` holds one line per frame; the last column counts, blank lines and lines that begin with `#` do not.
+The unit is
+
+* what a line `# unit: s`, `# unit: ms`, `# unit: us` or `# unit: ns` says; without such a line
+* seconds, if any of the numbers has a decimal point or an exponent;
+* for whole numbers, by their median spacing: milliseconds below 100 (100 us would be 10 000 fps), nanoseconds from
+  1 000 000 (1 s would be 1 fps), and microseconds between.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+
+NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
+
+
+def round_ns(seconds: Fraction) -> int:
+    """The nearest nanosecond, halves upwards."""
+    return (2 * seconds.numerator * 10**9 + seconds.denominator) // (2 * seconds.denominator)
+
+
+def parse_fps(fps: float | Fraction) -> Fraction:
+    """Frames per second as written: 29.97 is 2997/100, Fraction(30000, 1001) stays.  Raises UsageError."""
+    if not math.isfinite(fps) or not 0 < fps <= 10**9:
+        raise UsageError(f"fps {fps}: expected more than 0 and at most 1e9 frames per second")
+    return Fraction(str(fps))
+
+
+class Clock:
+    """Gives each frame of a source its time, and counts the stamps that cannot be used.
+
+    fps       if given, frame k is at k / fps and the stamps of the source do not count
+    rate      the nominal rate, for frames without a stamp: one period after the frame before
+    """
+
+    def __init__(self, fps: Fraction | None = None, rate: Fraction | None = None):
+        self.fps, self.rate = fps, rate
+        self.frames = self.dropped = self.without_stamp = 0
+        self._last_ns: int | None = None
+        self._last = Fraction(0)
+
+    def next(self, seconds: Fraction | None) -> int | None:
+        """Time [ns] of the next frame, given its stamp; None if that is not after the frame before: drop it."""
+        if self.fps is not None:
+            seconds = self.frames / self.fps
+        elif seconds is None:
+            if not self.rate:
+                raise DataError(f"frame {self.frames} has no presentation time and the file no frame rate; give --fps")
+            self.without_stamp += 1
+            seconds = Fraction(0) if self._last_ns is None else self._last + 1 / self.rate
+        self.frames += 1
+        t_ns = round_ns(seconds)
+        if self._last_ns is not None and t_ns <= self._last_ns:
+            self.dropped += 1
+            return None
+        self._last_ns, self._last = t_ns, seconds
+        return t_ns
+
+    def remarks(self) -> list[str]:
+        """What a person should know about the stamps."""
+        remarks = []
+        if self.dropped:
+            remarks.append(f"dropped {self.dropped} of {self.frames} frames whose time is not after the frame before")
+        if self.without_stamp:
+            remarks.append(
+                f"{self.without_stamp} frames without a presentation time were placed at {float(self.rate or 0):g} fps;"
+                " give --fps if that is wrong"
+            )
+        return remarks
+
+
+def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
+    """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
+    unit, words = None, []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read as text ({error}); expected one time per line") from error
+    for number, line in enumerate(lines, 1):
+        if line.lstrip().startswith("#"):
+            said = re.match(r"\s*#\s*unit\s*[:=]\s*(\w+)\s*$", line)
+            if said and said[1] not in NS_PER_UNIT:
+                raise DataError(f"{path}, line {number}: unit '{said[1]}', expected s, ms, us or ns")
+            unit = said[1] if said else unit
+        elif line.strip():
+            words.append(line.replace(",", " ").split()[-1])
+    try:
+        values = [Fraction(word) for word in words]
+    except (ValueError, ZeroDivisionError) as error:
+        raise DataError(f"{path}: {error}; expected a time in the last column of every line") from error
+    if unit is None:
+        whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
+        unit = unit_of_integers([int(value) for value in values]) if whole else "s"
+    return _in_seconds(values, unit, path), unit
+
+
+def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
+    """Stamps [s] of a one-dimensional .npy: floating point is seconds, whole numbers by their spacing (rule above)."""
+    try:
+        stamps = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise DataError(f"{path}: cannot be read as a .npy array ({error}); write it with numpy.save") from error
+    if stamps.ndim != 1 or stamps.dtype.kind not in "iuf" or not np.all(np.isfinite(stamps)):
+        raise DataError(f"{path}: {stamps.dtype} of shape {stamps.shape}, expected one finite time per frame")
+    values = stamps.tolist()
+    unit = "s" if stamps.dtype.kind == "f" else unit_of_integers(values)
+    return _in_seconds([Fraction(value) for value in values], unit, path), unit
+
+
+def unit_of_integers(values: Sequence[int]) -> str:
+    """The unit of whole numbers without one, by their median spacing (rule above)."""
+    spacings = sorted(b - a for a, b in pairwise(values))
+    median = spacings[len(spacings) // 2] if spacings else 0
+    return "ms" if median < 100 else "us" if median < 10**6 else "ns"
+
+
+def _in_seconds(values: Iterable[Fraction], unit: str, path: Path) -> list[Fraction]:
+    seconds = [value * NS_PER_UNIT[unit] / 10**9 for value in values]
+    if any(abs(second) * 10**9 > LONGEST_NS for second in seconds):
+        raise DataError(f"{path}: a time beyond 146 years in {unit}; subtract the start, or state the unit")
+    return seconds

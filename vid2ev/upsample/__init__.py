@@ -1,0 +1,65 @@
+"""Denser in time: frames of light between the frames of the source.
+
+A new method is a class that satisfies `Upsampler`, in a module of its own, and a line in `make_upsampler`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, Protocol
+
+from vid2ev.errors import UsageError
+from vid2ev.stream.frames import Frame
+
+__all__ = ["METHODS", "Upsampler", "make_upsampler"]
+
+METHODS = ("none", "linear", "flow")
+Subframes = int | Literal["auto"]
+
+
+class Upsampler(Protocol):
+    """Fills the intervals between frames."""
+
+    limited: int  # intervals so far that asked for more than max_subframes
+
+    def between(self, a: Frame, b: Frame) -> Iterator[Frame]:
+        """The frames after a up to and including b, in order of time.
+
+        The last one is b, the very same object; it is the only one with `original`.  What comes out depends
+        on a and b alone, so that a recording can be taken up in the middle.  a and b have one shape, and a
+        comes before b.
+        """
+
+
+def make_upsampler(
+    method: str, subframes: Subframes = "auto", max_subframes: int = 64, threshold: float = 0.15
+) -> Upsampler:
+    """The upsampler of a name.
+
+    none     the frames of the source and nothing else
+    linear   cross-fades in linear light; "auto" adds nothing, because a sensor takes light to go straight anyway
+    flow     light carried along the motion between the frames (dense optical flow)
+
+    subframes      steps per interval, or "auto": what motion and contrast call for (`subframes.py`), one if still
+    max_subframes  the most that "auto" may take
+    threshold      contrast threshold of the sensor [nat]: what changes much less asks for no frames
+
+    Raises UsageError for an unknown method or a number that cannot be meant.
+    """
+    if method not in METHODS:
+        raise UsageError(f"upsampling '{method}': expected one of {', '.join(METHODS)}")
+    if subframes != "auto" and subframes < 1:
+        raise UsageError(f"subframes {subframes}: expected a whole number of at least 1, or auto")
+    if max_subframes < 1 or not threshold > 0:
+        raise UsageError(f"max_subframes {max_subframes}, threshold {threshold}: expected at least 1, and more than 0")
+    if method == "none":
+        from vid2ev.upsample.none import NoUpsampling
+
+        return NoUpsampling()
+    if method == "linear":
+        from vid2ev.upsample.linear import LinearUpsampling
+
+        return LinearUpsampling(1 if subframes == "auto" else subframes)
+    from vid2ev.upsample.flow import FlowUpsampling
+
+    return FlowUpsampling(subframes, max_subframes, threshold)
