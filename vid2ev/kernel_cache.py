@@ -1,7 +1,8 @@
 """Compiled kernels on disk are dropped when any of their sources has changed.
 
-numba keeps compiled code beside the file of the cached function and looks only at that file's date; the laws that a kernel
-calls are in other files.  So the dates of all of them are stamped into one file, and a new stamp empties the caches.
+numba keeps compiled code beside the file of the cached function and looks only at that file's date; the laws that a
+kernel calls are in other files.  So the dates of all of them are stamped into one file, and a new stamp empties the
+caches.
 """
 
 from __future__ import annotations

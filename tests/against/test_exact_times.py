@@ -197,10 +197,6 @@ SLOW_TIMINGS = [
     ("frame", "before", (300.0, 100.0)),
     ("frame", "before", (0.0, 0.0)),
 ]
-    ("linear", "after", (300.0, 100.0)),
-    ("frame", "before", (300.0, 100.0)),
-    ("frame", "before", (0.0, 0.0)),
-]
 
 
 @pytest.mark.parametrize(

@@ -252,8 +252,8 @@ def _take_general(
                 j += 1
             if every or (j < forced and place_of_candidate(forced_keys[j], iv)[0] == hits[k]):
                 out, n = walk_pixel(
-                    block, scratch, hits[k], p0, lanes, pixels, forced_keys, chance, forced, knots, j, planes, flags, num, iv,
-                    out, n, tally,
+                    block, scratch, hits[k], p0, lanes, pixels, forced_keys, chance, forced, knots, j, planes, flags,
+                    num, iv, out, n, tally,
                 )  # fmt: skip
             else:
                 hits[left] = hits[k]

@@ -1,7 +1,7 @@
 """Levels are reached: the memories move, events are sent unless a pixel is refractory.
 
-Every slow path ends in `cross_all`, so there is one text of what a crossing does.  It takes a batch of lanes, one crossing
-each, in loops that vectorise.  An event is a 64-bit key,
+Every slow path ends in `cross_all`, so there is one text of what a crossing does.  It takes a batch of lanes, one
+crossing each, in loops that vectorise.  An event is a 64-bit key,
 
     microseconds after the interval's first_us << 28 | pixel << 3 | polarity << 2 | label
 """

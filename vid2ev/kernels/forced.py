@@ -31,7 +31,7 @@ def _add(keys, chance, n, local, since_t0, share):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
-    """Arrivals in a cell are equally likely anywhere along (pixel of the block) x (time): a walk of exponential gaps."""
+    """Arrivals in a cell are equally likely anywhere in (pixels of the block) x (time): a walk of exponential gaps."""
     per_block = BLOCK * num.shot_rate_hz * CELL_NS * 1e-9
     place, k, last = 0.0, 0, iv.t0_ns + np.int64(iv.dt_ns)
     while True:

@@ -1,8 +1,8 @@
 """Slow path for everything at once: one pixel, one interval, scalar code.
 
-Used where the closed forms of the two fast slow paths do not hold: a drift or noise added after a low-pass before the log,
-forced events, photoreceptor noise that the interval does not resolve, and the refractory kind `track`.  The comparator's
-input is
+Used where the closed forms of the two fast slow paths do not hold: a drift or noise added after a low-pass before the
+log, forced events, photoreceptor noise that the interval does not resolve, and the refractory kind `track`.  The
+comparator's input is
 
     F(s) = curve(y(s)) + leak + noise,     y the response in the filter's domain, leak and noise linear in s
 

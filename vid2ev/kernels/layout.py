@@ -23,7 +23,8 @@ ON = (0,)
 OFF = ()
 
 # Planes of `fast`, in units of PITCH; after the lags in use come
-# three of the photoreceptor noise (its pair, the comparator's input without it) and, for a light-dependent pole, the light of the last frame.
+# three of the photoreceptor noise (its pair, the comparator's input without it) and, for a light-dependent pole, the
+# light of the last frame.
 INPUT, HIGH, LOW, LAG1, LAG2 = range(5)
 
 # Counters kept by the walk.

@@ -1,8 +1,8 @@
 """Events of one interval in order of (time, row, column).
 
-A stable counting sort of the keys on their microsecond, in passes of 16 bits (one pass for intervals up to 65 ms), then an
-insertion sort on the pixel within each microsecond: keys come block by block and each pixel's in order of time, so it finds
-them nearly sorted.
+A stable counting sort of the keys on their microsecond, in passes of 16 bits (one pass for intervals up to 65 ms),
+then an insertion sort on the pixel within each microsecond: keys come block by block and each pixel's in order of
+time, so it finds them nearly sorted.
 """
 
 from __future__ import annotations

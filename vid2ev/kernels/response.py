@@ -1,9 +1,9 @@
 """Slow path for the filter's response: crossing times by a root of the closed form, many pixels at a time.
 
-The flagged pixels of a block become lanes.  Each lane holds its response, y(s) = y0 + rise s + c1 (e^-as - 1) + c2 (e^-bs - 1),
-and the monotone piece [s0, s1] it is in.  Rounds of: pick the level that the piece reaches, solve (three steps of Halley's
-method, vector code), cross, until no lane is left.  The few lanes that three steps do not settle are finished by a bracketed
-search.  Levels are in the filter's domain: nats, or light.
+The flagged pixels of a block become lanes.  Each lane holds its response, y(s) = y0 + rise s + c1 (e^-as - 1) + c2
+(e^-bs - 1), and the monotone piece [s0, s1] it is in.  Rounds of: pick the level that the piece reaches, solve (three
+steps of Halley's method, vector code), cross, until no lane is left.  The few lanes that three steps do not settle are
+finished by a bracketed search.  Levels are in the filter's domain: nats, or light.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from vid2ev.physics.photoreceptor import (
     separate_rates,
 )
 
-# The response, the piece, the crossings so far; what follows (from the levels in the filter's domain) is made anew in each
-# round.
+# The response, the piece, the crossings so far; what follows (from the levels in the filter's domain) is made anew in
+# each round.
 Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, SOLVED, UPPER, LOWER = (FREE + k * PITCH for k in range(14))
 REACHED, TARGET, STEP, LOW_S, HIGH_S, ADDED0, ADDED1 = (LOWER + (1 + k) * PITCH for k in range(7))
 SLOPE0, SLOPE1, BEND0, BEND1 = (ADDED1 + (1 + k) * PITCH for k in range(4))
@@ -118,8 +118,8 @@ def may_turn(lanes, j):
     """Whether a turning point inside the interval may matter to lane j.
 
     There is none where neither slope nor curvature changes its sign.  Where only the slope does, the turning point lies
-    beyond the ends by less than the smaller of the two slopes (times the interval, which is 1): without a level that near,
-    the signal is as good as monotone.
+    beyond the ends by less than the smaller of the two slopes (times the interval, which is 1): without a level that
+    near, the signal is as good as monotone.
     """
     slope_0, slope_1, bend_0, bend_1 = lanes[SLOPE0 + j], lanes[SLOPE1 + j], lanes[BEND0 + j], lanes[BEND1 + j]
     start, end, beyond = lanes[F0 + j], lanes[F1 + j], min(abs(slope_0), abs(slope_1))
@@ -155,7 +155,7 @@ def levels_of(lanes, count, flags, num):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def pick(lanes, count, b, floor):
-    """Move each lane to the piece in which it reaches a level: REACHED is 1 and TARGET, UP and AT are set, or it is 0."""
+    """Move each lane to the piece in which it reaches a level (REACHED 1; TARGET, UP, AT set), or find none (0)."""
     # (light has a floor of 0: after a flash of many decades the arithmetic may leave less than nothing of it)
     pieces = 0
     for j in range(count):

@@ -21,8 +21,9 @@ OPTIONS = {"nogil": True, "error_model": "numpy"}
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
 BRIGHTEST = F(1e30)
 
-# Planes of the scratch of one block: the new light, the new input of the filter and its output, the lags before, the sign of
-# a turning point, the clock of the first pole (dt/tau1), the noise and the comparator's input without it, before and after.
+# Planes of the scratch of one block: the new light, the new input of the filter and its output, the lags before, the
+# sign of a turning point, the clock of the first pole (dt/tau1), the noise and the comparator's input without it,
+# before and after.
 LIGHT, NEW, FILTERED, OLD1, OLD2, TURN, CLOCK, NOISE0, NOISE1, SEEN0, SEEN1 = (k * PITCH for k in range(11))
 SCRATCH = 11 * PITCH
 
@@ -74,7 +75,8 @@ def scan(block, scratch, flagged, p0, n, flags, num, iv):
     """Advance the lags of a block by one interval and flag the pixels that may cross a level in it.
 
     `block` is the float32 state of the block, planes of BLOCK; `scratch` holds the new light and receives what the slow
-    path needs of the old state.  The plane INPUT is left as it was: `remember_input` follows when that is no longer needed.
+    path needs of the old state.  The plane INPUT is left as it was: `remember_input` follows when that is no longer
+    needed.
     """
     poles = len(flags.poles)
     if len(flags.log_input):
@@ -135,7 +137,7 @@ def log_light(scratch, n, num):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def advance_lags(block, scratch, n, flags, num, iv):
-    """One step of the poles: new lags into the block; old lags, output, and the sign of a turning point into scratch."""
+    """One step of the poles: new lags into the block; old lags, output, sign of a turning point into scratch."""
     if len(flags.light_bandwidth):
         set_clock(block, scratch, n, flags, num, iv)
     x1, w1, x2, g, w2 = iv.x1, iv.w1, iv.x2, iv.g, iv.w2

@@ -1,7 +1,7 @@
 """Slow path for a comparator input that is a straight line in nats between frames: crossing times in closed form.
 
-That is ESIM's model (no filter, or `timing = "linear"`), and `timing = "frame"`, where only the order is kept.  The flagged
-pixels of a block become lanes; each round takes the next crossing of every lane that has one.
+That is ESIM's model (no filter, or `timing = "linear"`), and `timing = "frame"`, where only the order is kept.  The
+flagged pixels of a block become lanes; each round takes the next crossing of every lane that has one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Turning points of many responses at a time: the vector form of `physics.photoreceptor.turning_points`.
 
-Lanes that may turn are gathered, the first zero of the slope is found by four bracketed steps of Halley's method, and the
-few that are not settled then, or turn twice, are finished one by one.
+Lanes that may turn are gathered, the first zero of the slope is found by four bracketed steps of Halley's method, and
+the few that are not settled then, or turn twice, are finished one by one.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ def second_turn(turns, k, b):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def find_turns(turns, count, b):
-    """ROOT is the first turning point of each lane (meaningless where KIND is NEVER), VALUE the response there, less y0."""
+    """ROOT is the first turning point of each lane (meaningless where KIND is NEVER), VALUE the response there, less
+    y0.
+    """
     bracket_turns(turns, count, b)
     solve_turns(turns, count, b)
     for k in range(count):

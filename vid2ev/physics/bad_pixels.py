@@ -1,12 +1,13 @@
 """Hot and cold pixels: some fire all the time, some never.
 
-    hot    ON events, a Poisson process of hot_rate_hz [Hz], whatever the light      P(hot) = hot_probability
-    cold   no events                                                              P(cold) = cold_probability (1 - P(hot))
+    hot    ON events, Poisson, hot_rate_hz [Hz], whatever the light    P(hot) = hot_probability
+    cold   no events                                            P(cold) = cold_probability (1 - P(hot))
 
 A hot pixel sends ON events as a Poisson process of `hot_rate_hz`, whatever the light; a cold pixel sends none.  Which
 pixels are bad is drawn once per camera and seed.
 
-Source: the paper, "bad pixel probability", drawn anew at each conversion; the rate is ours (the paper: "always emitted").
+Source: the paper, "bad pixel probability", drawn anew at each conversion; the rate is ours (the paper: "always
+emitted").
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
     ON  when y >= c_on:   the memory becomes c_on,   and c_on, c_off move to memory + theta_on, memory - theta_off
     OFF when y <= c_off:  the memory becomes c_off,  likewise
 
-Levels are float64 nats, so they do not drift.  The memory starts at the first signal, or, with `random_phase`, such that
-c_on lies anywhere within one threshold above it: real pixels are not in step, and without noise a scene that returns to
-its first value would sit exactly on a level.
+Levels are float64 nats, so they do not drift.  The memory starts at the first signal, or, with `random_phase`, such
+that c_on lies anywhere within one threshold above it: real pixels are not in step, and without noise a scene that
+returns to its first value would sit exactly on a level.
 
 Sources: the paper, section II.A (thresholds apart, the level updated at every potential crossing); timing `linear` is
 ESIM (Rebecq, Gehrig, Scaramuzza, CoRL 2018).

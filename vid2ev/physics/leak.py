@@ -1,6 +1,6 @@
 """Leak: the memory drifts down, so a pixel at rest sends ON events at `leak_rate_hz`.
 
-    d memory / dt = -leak_rate_hz threshold_on      (seen from the comparator: the signal rises by leak_rate_hz threshold_on)
+    d memory / dt = -leak_rate_hz threshold_on      [nat/s]
 
 The drift is added to the signal inside each interval, not per frame, so its rate does not depend on the sampling.
 

@@ -3,10 +3,11 @@
     theta = mean + sigma z,   z standard normal, one draw per pixel and polarity, camera and seed
 
 z is clipped symmetrically at min(4, (mean - floor)/sigma) with floor = mean/10, so that no threshold reaches zero and
-the mean stays; up to sigma = 0.35 mean the spread stays within 1 % (a one-sided clamp would move the mean).  Beyond, the
-thresholds crowd against the clip, and the spread that is reached is below the one asked for.
+the mean stays; up to sigma = 0.35 mean the spread stays within 1 % (a one-sided clamp would move the mean).  Beyond,
+the thresholds crowd against the clip, and the spread that is reached is below the one asked for.
 
-Sources: the paper (time-invariant Gaussian noise on the threshold); Gaussian in Lichtsteiner et al. 2008, 2.1 % contrast.
+Sources: the paper (time-invariant Gaussian noise on the threshold); Gaussian in Lichtsteiner et al. 2008, 2.1 %
+contrast.
 """
 
 from __future__ import annotations

@@ -16,9 +16,9 @@ interval of length T in which u rises by du, with a = T/tau1 and b = T/tau2:
 Two equal poles are held apart by 2e-7 of their value (`separate`), which moves the output by less than 1e-7 of the
 step and keeps the one formula; in float64 it then cancels at most half of the digits.
 
-Sources: the cascade is the paper's "two-pole low pass filter"; weights by the variation of constants (any text on linear
-systems), checked against 60-digit arithmetic in the tests.  `bandwidth = "light"` is v2e's intensity-dependent first
-pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark), dark = 20/255.
+Sources: the cascade is the paper's "two-pole low pass filter"; weights by the variation of constants (any text on
+linear systems), checked against 60-digit arithmetic in the tests. `bandwidth = "light"` is v2e's intensity-dependent
+first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark), dark = 20/255.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Photoreceptor(BaseModel, frozen=True, extra="forbid"):
     )
     bandwidth: Literal["constant", "light"] = Field(
         "constant",
-        description="first pole constant, or faster with more light: tau1 (1 + bandwidth_dark)/(light + bandwidth_dark)",
+        description="first pole constant, or faster with light: tau1 (1 + bandwidth_dark)/(light + bandwidth_dark)",
     )
     bandwidth_dark: float = Field(
         20.0 / 255.0,
@@ -103,7 +103,7 @@ def step_weights(dt: float, tau1: float, tau2: float) -> Weights:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def light_weights_32(a1, a2):
-    """`step_weights` in float32 for a first pole that differs from pixel to pixel; a1 = dt/tau1 > 0, a2 = dt/tau2 > 0."""
+    """`step_weights` in float32 for a first pole that differs from pixel to pixel; a = dt/tau > 0."""
     slow, fast = min(a1, a2), max(a1, a2)
     x_slow = -expm1_32(-slow)
     apart = max(fast - slow, F(1e-6))
@@ -136,7 +136,7 @@ def response_slope(s, du, c1, c2, a, b):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
-    """Where the slope changes sign between lo and hi: Newton's method in a bracket, to 1e-8 of the faster time constant."""
+    """Where the slope changes sign in [lo, hi]: bracketed Newton steps, to 1e-8 of the faster time constant."""
     enough = 1e-8 / max(1.0, max(a, b))
     s = 0.5 * (lo + hi)
     for k in range(60):
@@ -156,7 +156,7 @@ def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def turning_points(at_0, at_1, du, c1, c2, a, b):
-    """The interior extrema of y, in order: (x1, x2), each 1.0 where there is none; at_0, at_1 are the slopes at the ends.
+    """The interior extrema of y, in order, each 1.0 where there is none; at_0, at_1 are the slopes at the ends.
 
     The slope is a constant and two exponentials: it has at most two zeros, and at most one turning point of its own, at
     the inflection.  Unequal signs at the ends mean one zero, equal signs none, or two if the inflection has the other.

@@ -6,10 +6,11 @@ Its rate of up-crossings of a level theta away is Rice's (*Mathematical analysis
 
     nu(theta) = exp(-theta^2 / (2 sigma^2)) / (2 pi sqrt(tau1 tau2))
 
-Where the interval **resolves** it (dt <= tau2 / RESOLVED) the pair (n1, n2) takes one exact step of its Gaussian process
-per interval, and the line between its ends is added to the signal.  Where it does not, sampling would miss most
-crossings; events are then a Poisson process of Rice's rate at the distance the level has at each instant.  So the event
-rate does not depend on the frame rate, though the path within an interval does; the tick is the interval's number.
+Where the interval **resolves** it (dt <= tau2 / RESOLVED) the pair (n1, n2) takes one exact step of its Gaussian
+process per interval, and the line between its ends is added to the signal.  Where it does not, sampling would miss
+most crossings; events are then a Poisson process of Rice's rate at the distance the level has at each instant.  So the
+event rate does not depend on the frame rate, though the path within an interval does; the tick is the interval's
+number.
 
 Source: Rice 1944 for the rate; the covariance of white noise through two poles is ours, checked in the tests.
 """

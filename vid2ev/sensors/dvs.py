@@ -92,9 +92,9 @@ class Dvs:
     def step(self, light: np.ndarray, t_ns: int) -> Events:
         """Advance to a frame of light at t_ns [int, ns]; returns the events in (previous frame, this frame].
 
-        `light` is [height, width]: floating point is linear light (1.0 diffuse white; NaN and negative count as 0, what is
-        above 1e30 as 1e30), uint8 or uint16 are codes of `transfer`.  The first frame settles the sensor and has no events.
-        Raises UsageError for another shape or type, or a time that is not after the last one.
+        `light` is [height, width]: floating point is linear light (1.0 diffuse white; NaN and negative count as 0,
+        what is above 1e30 as 1e30), uint8 or uint16 are codes of `transfer`.  The first frame settles the sensor and
+        has no events. Raises UsageError for another shape or type, or a time that is not after the last one.
         """
         flat, table = self._light(light)
         t_ns = int(t_ns)
@@ -103,8 +103,8 @@ class Dvs:
             return Events.empty(self.labels)
         if not self._t_ns < t_ns < self._t_ns + LONGEST_INTERVAL_NS:
             raise UsageError(
-                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours; sort the frames and drop"
-                " repeated times"
+                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours;"
+                " sort the frames and drop repeated times"
             )
         self._rebase_leak(t_ns)
         interval = interval_of(

@@ -48,8 +48,8 @@ class DvsSpec(  # the order of the bases, last to first, is the order of the fie
     def _noise_needs_two_poles(self) -> DvsSpec:
         if self.photoreceptor_noise > 0 and not (self.photoreceptor_tau_us > 0 and self.follower_tau_us > 0):
             raise ValueError(
-                "photoreceptor_noise needs photoreceptor_tau_us and follower_tau_us above 0 (white noise through one pole"
-                " crosses a level infinitely often); set both or leave the noise out"
+                "photoreceptor_noise needs photoreceptor_tau_us and follower_tau_us above 0 (white noise through"
+                " one pole crosses a level infinitely often); set both or leave the noise out"
             )
         return self
 
