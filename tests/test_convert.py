@@ -36,7 +36,7 @@ def manifest_of(directory: Path) -> dict[str, Any]:
 @pytest.mark.parametrize(
     "changed",
     [{"threads": 2}, {"threads": 5}, {"piece": 1}, {"piece": 1 << 21}, {"preview": False}, {"report": lambda *_: None}],
-    ids=str,
+    ids=["two threads", "five threads", "smallest pieces", "small pieces", "no preview", "reported"],
 )
 def test_what_does_not_count_changes_no_bit(reference: Path, tmp_path: Path, changed: dict[str, Any]) -> None:
     convert(CLIP, tmp_path / "out", **({"threads": 1} | OPTIONS | changed))

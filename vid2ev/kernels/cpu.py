@@ -15,6 +15,7 @@ from vid2ev.kernels.general import FIRST, KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
 from vid2ev.kernels.response import LANES, load_responses, prepare_responses, respond
 from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan, scan_level
+from vid2ev.kernels.shots import SHOTS, fire
 from vid2ev.kernels.straight import load_lines, prepare_lines, straight
 from vid2ev.kernels.turns import TURNS
 from vid2ev.physics.comparator import initial_phase
@@ -66,8 +67,8 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     scratch, lanes, turns = np.zeros(SCRATCH, np.float32), np.empty(LANES, np.float64), np.empty(TURNS, np.float64)
     flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
     loaded, live = np.empty(BLOCK, np.int64), np.empty(BLOCK + 1, np.int64)
-    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
-    forced_keys, chance, forced = np.empty(128, np.int64), np.empty(128, np.float64), 0
+    one_lane, one_pixel = np.empty(SHOTS, np.float64), np.empty(BLOCK, np.int64)
+    keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
     knots = np.empty(KNOTS, np.float64)
     n, used = np.int64(0), np.int64(0)
     for index in range(first_block, last_block):
@@ -76,33 +77,16 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         block = planes.fast[index * stride : (index + 1) * stride]
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, scratch, flagged, p0, size, flags, num, iv)
-        if len(flags.forced):
-            forced_keys, chance, forced = candidates(forced_keys, chance, p0, size, planes.hot, num, iv)
-            forced = keep_likely(block, scratch, forced_keys, chance, forced, flags, num, iv)
-            for j in range(forced):
-                flagged[place_of_candidate(forced_keys[j], iv)[0]] = 1
+        keys, chance, forced, out, n = take_forced(
+            block, scratch, flagged, keys, chance, p0, size, one_lane, one_pixel, knots, planes, flags, num, iv, out, n,
+            tally,
+        )  # fmt: skip
         flagged[size:] = 0
         count = hits_of(flagged, hits)
         count, out, n = take_general(
-            block,
-            scratch,
-            hits,
-            count,
-            p0,
-            one_lane,
-            one_pixel,
-            forced_keys,
-            chance,
-            forced,
-            knots,
-            planes,
-            flags,
-            num,
-            iv,
-            out,
-            n,
+            block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv, out, n,
             tally,
-        )
+        )  # fmt: skip
         if used + count > BLOCK:
             enough = min(FEW, BLOCK - count)
             used, out, n = solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
@@ -121,27 +105,16 @@ def solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, 
     """Events of the lanes loaded so far, until at most `enough` are left: (how many are left, out, n)."""
 
 
-def take_general(
-    block,
-    scratch,
-    hits,
-    count,
-    p0,
-    lanes,
-    pixels,
-    forced_keys,
-    chance,
-    forced,
-    knots,
-    planes,
-    flags,
-    num,
-    iv,
-    out,
-    n,
-    tally,
+def take_forced(
+    block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
 ):
-    """Walk the flagged pixels that need the general path and keep the others in `hits`: (how many are left, out, n)."""
+    """Shots and hot pixels of a block: sent, or flagged and left as candidates: (keys, chance, their number, out, n)."""
+
+
+def take_general(
+    block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
+):
+    """Walk the flagged pixels that need the general path; the others stay in `hits`: (how many, out, n)."""
 
 
 @overload(load, jit_options=OPTIONS)
@@ -174,53 +147,56 @@ def _solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out,
     return solve
 
 
+def always_general(flags):
+    """Whether no flagged pixel has a closed form, by the numba type of the flags."""
+    # A drift after a low-pass that acts on the light has none, nor has a memory that jumps to the signal.
+    curved = not is_on(flags, "straight") and not is_on(flags, "log_input")
+    return is_on(flags, "track") or (curved and (is_on(flags, "leak") or is_on(flags, "noise")))
+
+
+@overload(take_forced, jit_options=OPTIONS)
+def _take_forced(
+    block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
+):
+    always = always_general(flags)
+    if not is_on(flags, "forced"):
+
+        def none(
+            block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
+        ):
+            return keys, chance, 0, out, n
+
+        return none
+
+    def some(
+        block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
+    ):
+        keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+        forced = keep_likely(block, scratch, keys, chance, forced, flags, num, iv)
+        if always or (len(flags.noise) > 0 and not iv.noise_resolved):
+            for j in range(forced):
+                flagged[place_of_candidate(keys[j], iv)[0]] = 1
+        else:
+            forced, out, n = fire(
+                block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, knots, planes, flags, num, iv, out, n,
+                tally,
+            )  # fmt: skip
+        return keys, chance, forced, out, n
+
+    return some
+
+
 @overload(take_general, jit_options=OPTIONS)
 def _take_general(
-    block,
-    scratch,
-    hits,
-    count,
-    p0,
-    lanes,
-    pixels,
-    forced_keys,
-    chance,
-    forced,
-    knots,
-    planes,
-    flags,
-    num,
-    iv,
-    out,
-    n,
-    tally,
+    block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
 ):
-    # A drift after a low-pass that acts on the light has no closed form.
-    curved = not is_on(flags, "straight") and not is_on(flags, "log_input")
-    added = is_on(flags, "leak") or is_on(flags, "noise")
-    always = is_on(flags, "track") or (curved and added)
+    always = always_general(flags)
     if not (always or is_on(flags, "forced") or is_on(flags, "noise")):
 
         def nothing(
-            block,
-            scratch,
-            hits,
-            count,
-            p0,
-            lanes,
-            pixels,
-            forced_keys,
-            chance,
-            forced,
-            knots,
-            planes,
-            flags,
-            num,
-            iv,
-            out,
-            n,
-            tally,
-        ):
+            block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out,
+            n, tally,
+        ):  # fmt: skip
             return count, out, n
 
         return nothing
@@ -233,7 +209,7 @@ def _take_general(
         p0,
         lanes,
         pixels,
-        forced_keys,
+        keys,
         chance,
         forced,
         knots,
@@ -248,12 +224,12 @@ def _take_general(
         left, j = np.int64(0), 0
         every = always or (len(flags.noise) > 0 and not iv.noise_resolved)
         for k in range(count):
-            while j < forced and place_of_candidate(forced_keys[j], iv)[0] < hits[k]:
+            while j < forced and place_of_candidate(keys[j], iv)[0] < hits[k]:
                 j += 1
-            if every or (j < forced and place_of_candidate(forced_keys[j], iv)[0] == hits[k]):
+            if every or (j < forced and place_of_candidate(keys[j], iv)[0] == hits[k]):
                 out, n = walk_pixel(
-                    block, scratch, hits[k], p0, lanes, pixels, forced_keys, chance, forced, knots, j, planes, flags,
-                    num, iv, out, n, tally,
+                    block, scratch, hits[k], 0.0, p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv,
+                    out, n, tally,
                 )  # fmt: skip
             else:
                 hits[left] = hits[k]
