@@ -47,6 +47,19 @@ def clean(**keys) -> DvsSpec:
     return DvsSpec(**{**CLEAN, **keys})
 
 
+FAINT = {"leak_rate_hz": 1e-6, "shot_rate_hz": 1e-6, "hot_probability": 1e-6, "hot_rate_hz": 1e-6}
+
+
+def noisy(**keys) -> DvsSpec:
+    """A clean sensor with leak, shot noise and hot pixels, each hardly there unless `keys` say so."""
+    return clean(**{**FAINT, **keys})
+
+
+def uneven(**keys) -> DvsSpec:
+    """ESIM with mismatch and noise at the crossings, each hardly there unless `keys` say so."""
+    return clean(**{"filter": "after", "dark_level": 1e-12, "mismatch": 1e-9, "crossing_noise": 1e-9, **keys})
+
+
 def sensor(pixel: Pixel, **keys) -> DvsSpec:
     """The sensor all of whose pixels are `pixel`."""
     return clean(**asdict(pixel), **keys)

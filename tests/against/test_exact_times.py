@@ -191,11 +191,12 @@ def test_flicker_between_two_codes_turns_inside_the_interval(order):
     judged(Pixel(0.09, 0.11, 300, 100, filter=order), t_ns, light[:, None, :], least=200)
 
 
-TIMINGS = [("linear", "before", (300.0, 100.0)), ("linear", "before", (0.0, 0.0)), ("frame", "after", (0.0, 0.0))]
+TIMINGS = [("linear", "before", (300.0, 100.0)), ("linear", "before", (0.0, 0.0))]
 SLOW_TIMINGS = [
     ("linear", "after", (300.0, 100.0)),
     ("frame", "before", (300.0, 100.0)),
     ("frame", "before", (0.0, 0.0)),
+    ("frame", "after", (0.0, 0.0)),
 ]
 
 

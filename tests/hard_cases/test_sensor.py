@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from against.clips import EVERYTHING, clean, feed, per_pixel, play, start
+from against.clips import EVERYTHING, clean, feed, per_pixel, play, start, uneven
 from against.reference import Pixel, events, signal
 from pydantic import ValidationError
 
@@ -57,7 +57,7 @@ def test_noise_larger_than_the_threshold(effect):
 
     On a ramp of 40 nat the mean threshold of a pixel is 40 / events; the clip is symmetric, 0.02 ... 0.38.
     """
-    spec = clean(threshold_on=0.2, threshold_off=0.2, filter="after", dark_level=1e-12, **{effect: 0.3})
+    spec = uneven(threshold_on=0.2, threshold_off=0.2, **{effect: 0.3})
     light = np.exp([-20.0, 20.0]).astype(np.float32)[:, None, None] * np.ones((1, 64, 64), np.float32)
     dvs = start(spec, light)
     sent = feed(dvs, [0, 10_000_000_000], light)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against.clips import EVERYTHING, clean, feed, play, sensor, start
+from against.clips import EVERYTHING, clean, feed, noisy, play, sensor, start
 from against.judge import judge_clip
 from against.reference import Pixel
 
@@ -36,7 +36,7 @@ def test_a_clip_that_starts_late_has_the_same_events_later(spec, late_ns):
 
 def test_a_late_start_leaks_no_more_than_an_early_one():
     t_ns = 3 * HOUR_NS + np.arange(0, 2_000_000_001, 50_000_000)
-    sent = play(clean(leak_rate_hz=4), t_ns, np.full((len(t_ns), 2, 2), 0.2))
+    sent = play(noisy(leak_rate_hz=4), t_ns, np.full((len(t_ns), 2, 2), 0.2))
     assert len(sent) in range(4 * 7, 4 * 8 + 1)
     assert sent.t[0] == pytest.approx(3 * HOUR_NS // 1000 + 250_000, abs=2)
 
@@ -112,7 +112,7 @@ def test_leak_at_a_million_frames_per_second():
     """Steps of 1 us, each 1/1000 of the time to a leak event: all 20 come, each at its microsecond."""
     t_ns = np.arange(20_500) * 1_000
     frame = np.full((1, 1), 0.4, np.float32)
-    sent = play(clean(leak_rate_hz=1000, threshold_on=0.2), t_ns, np.broadcast_to(frame, (20_500, 1, 1)))
+    sent = play(noisy(leak_rate_hz=1000, threshold_on=0.2), t_ns, np.broadcast_to(frame, (20_500, 1, 1)))
     assert np.abs(sent.t - np.arange(1, 21) * 1000).max() <= 1
 
 

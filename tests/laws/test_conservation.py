@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from against.clips import clean, feed, per_pixel, play, start
+from against.clips import clean, feed, noisy, per_pixel, play, start
 from against.reference import Pixel, Response, events, log_light, signal
 
 VIDEOS = Path(__file__).parents[2] / "../shared/data/videos"
@@ -82,7 +82,7 @@ def test_swallowed_crossings_are_counted_in(way):
         sent = feed(dvs, t_ns, light[:, None, None])
         moved = drift_of_the_signal(Pixel(ON, OFF, 300, 100), t_ns, light)
         crossed = (len(sent) + dvs.counts["swallowed"]) * (ON if way > 0 else -OFF)
-        assert dvs.counts["swallowed"] > 5 and len(sent) > 1
+        assert dvs.counts["swallowed"] > 0 and len(sent) > 2
         assert -OFF - 1e-5 < moved - crossed < ON + 1e-5
 
 
@@ -116,6 +116,6 @@ def test_beyond_the_work_cap_the_rest_is_taken_in_one_step():
 def test_leak_adds_to_the_signal():
     """A static clip of 20 s at leak 3 Hz: 60 ON events per pixel, less than one more or fewer."""
     t_ns = np.arange(0, 20_000_000_001, 500_000_000)
-    sent = play(clean(leak_rate_hz=3), t_ns, np.full((len(t_ns), 4, 5), 0.3, np.float32))
+    sent = play(noisy(leak_rate_hz=3), t_ns, np.full((len(t_ns), 4, 5), 0.3, np.float32))
     counts = per_pixel(sent, (4, 5))
     assert (np.abs(counts - 60) <= 1).all() and (sent.p == 1).all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against.clips import clean, feed, play, start
+from against.clips import clean, feed, noisy, play, start
 
 from vid2ev.sensors.dvs import DvsSpec
 from vid2ev.stream import Events
@@ -100,7 +100,7 @@ def test_free_running_holds_nothing_back():
 def test_a_static_scene_with_noise_still_sends_one_event_per_frame_at_most():
     """Hot pixels at 50 kHz in a 1 kHz camera: each sends in every event frame, once."""
     t_ns = np.arange(0, 100_000_001, 10_000_000)
-    spec = clean(frame_rate_hz=1000, hot_probability=1.0, hot_rate_hz=50_000)
+    spec = noisy(frame_rate_hz=1000, hot_probability=1.0, hot_rate_hz=50_000)
     sent = play(spec, t_ns, np.full((len(t_ns), 3, 3), 0.2, np.float32))
     times = sent.t[(sent.x == 1) & (sent.y == 1)]
     assert (times % 1000 == 0).all() and (np.diff(times) == 1000).all()

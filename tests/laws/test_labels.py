@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against.clips import clean, hold, play
+from against.clips import hold, noisy, play
 
-from vid2ev.sensors.dvs import DvsSpec
 from vid2ev.stream.events import Label
 
 SHAPE = (24, 24)
@@ -18,16 +17,11 @@ def moving() -> tuple[np.ndarray, np.ndarray]:
     return np.arange(30) * 5_000_000, 10 ** rng.uniform(-2, 0, (30, *SHAPE)).astype(np.float32)
 
 
-def noisy(**keys) -> DvsSpec:
-    """Leak, shot noise and hot pixels, each hardly there unless `keys` say so."""
-    rates = {"leak_rate_hz": 1e-6, "shot_rate_hz": 1e-6, "hot_probability": 1e-6, "hot_rate_hz": 1e-6}
-    return clean(**{**rates, **keys})
-
-
 @pytest.mark.parametrize(
     ("keys", "label"),
     [
         ({"leak_rate_hz": 10}, Label.LEAK),
+        ({"leak_rate_hz": 10, "random_phase": True}, Label.LEAK),
         ({"shot_rate_hz": 10}, Label.SHOT),
         ({"hot_probability": 0.2, "hot_rate_hz": 100}, Label.HOT),
     ],

@@ -10,11 +10,11 @@ from against.clips import clean, play, sensor
 from against.judge import judge_clip
 from against.reference import Pixel
 
-orders = pytest.mark.parametrize("order", ["before", "after"])
+orders = pytest.mark.parametrize("order", ["before", pytest.param("after", marks=pytest.mark.slow)])
 
 
 @pytest.mark.parametrize("shape", [(6, 8), (7, 5), (1, 1)])
-@pytest.mark.parametrize("order", ["before", pytest.param("after", marks=pytest.mark.slow)])
+@orders
 def test_shading_is_light_times_a_polynomial_of_the_radius(shape, order):
     """gain = 1 - 0.2 r - 0.9 r^2, r from the image centre in image widths; what would be negative is dark."""
     rng = np.random.default_rng(1)
@@ -61,8 +61,12 @@ def test_bandwidth_follows_light_that_moves(order):
     frames_us = t_us[:: int(50 / h)]
     hz = np.array([20.0, 45.0, 110.0])
     samples = (0.4 + 0.38 * np.sin(2e-6 * math.pi * hz * frames_us[:, None] + np.arange(3))).astype(np.float32)
-    light = np.stack([np.interp(t_us, frames_us, column) for column in samples.T.astype(np.float64)], axis=1)
-    u = light if order == "before" else np.log(light + 1e-3)
+
+    def between(at_frames):
+        return np.stack([np.interp(t_us, frames_us, column) for column in at_frames.T.astype(np.float64)], axis=1)
+
+    light = between(samples)
+    u = light if order == "before" else between(np.log(samples + 1e-3))
     rate1 = (light + dark) / (tau1 * (1 + dark))
     y1 = y2 = u[0]
     path = [y2]

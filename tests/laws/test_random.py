@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from against.clips import clean, hold, per_pixel, play
+from against.clips import hold, noisy, per_pixel, play, uneven
 
 SHAPE = (96, 128)
 PIXELS = SHAPE[0] * SHAPE[1]
@@ -16,7 +16,7 @@ UP, DOWN = 1, -1
 
 def time_of(nth: int, way: int, seed: int = 0, camera: int = 0, **keys) -> np.ndarray:
     """When each pixel sends its nth event on an even ramp of the log light [nat since the start], [H, W]."""
-    spec = clean(threshold_on=0.2, threshold_off=0.2, filter="after", dark_level=1e-12, **keys)
+    spec = uneven(threshold_on=0.2, threshold_off=0.2, **keys)
     nats = 0.2 * nth + 0.4
     light = np.exp(way * np.array([0.0, nats])).astype(np.float32)
     frames = np.broadcast_to(light[:, None, None], (2, *SHAPE))
@@ -30,7 +30,7 @@ def time_of(nth: int, way: int, seed: int = 0, camera: int = 0, **keys) -> np.nd
 def counted(seed: int = 0, camera: int = 0, **keys) -> np.ndarray:
     """How many events each pixel sends at rest in 1 s, [H, W]."""
     t_ns, light = hold(0.1, np.arange(0, 1_000_000_001, 100_000_000), SHAPE)
-    return per_pixel(play(clean(**keys), t_ns, light, seed=seed, camera=camera), SHAPE).astype(float)
+    return per_pixel(play(noisy(**keys), t_ns, light, seed=seed, camera=camera), SHAPE).astype(float)
 
 
 MAPS = {

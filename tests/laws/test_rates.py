@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from against.clips import clean, feed, hold, per_pixel, play, start
+from against.clips import clean, feed, hold, noisy, per_pixel, play, start, uneven
 
 from vid2ev.stream import Events
 
@@ -45,7 +45,7 @@ def poisson(count: int, expected: float) -> None:
 @pytest.mark.parametrize("every_ns", [SLOW_NS, FAST_NS, 1_000_000_000])
 def test_leak_rate(every_ns):
     """A pixel at rest sends ON events `1/leak_rate_hz` apart; the random phase makes the mean exact."""
-    sent = at_rest(clean(leak_rate_hz=7.3, random_phase=True), 0.4, 1, every_ns)
+    sent = at_rest(noisy(leak_rate_hz=7.3, random_phase=True), 0.4, 1, every_ns)
     assert (sent.p == 1).all()
     assert abs(len(sent) - 7.3 * PIXELS) < 5 * math.sqrt(PIXELS / 4)
     mine = (sent.x == 5) & (sent.y == 5)
@@ -53,7 +53,7 @@ def test_leak_rate(every_ns):
 
 
 def test_leak_does_not_depend_on_the_sampling_nor_on_the_light():
-    spec = clean(leak_rate_hz=7.3, random_phase=True)
+    spec = noisy(leak_rate_hz=7.3, random_phase=True)
     slow = at_rest(spec, 0.4, 1, SLOW_NS)
     same_within_1_us(slow, at_rest(spec, 0.4, 1, FAST_NS))
     same_within_1_us(slow, at_rest(spec, 0.003, 1, SLOW_NS))
@@ -61,7 +61,7 @@ def test_leak_does_not_depend_on_the_sampling_nor_on_the_light():
 
 def test_leak_over_hours_does_not_drift():
     """0.1 Hz for 5 h in frames of 1 min: 1800 events per pixel, the last at its microsecond."""
-    sent = at_rest(clean(leak_rate_hz=0.1, threshold_on=0.2), 0.4, 18_001, 60_000_000_000, (1, 2))
+    sent = at_rest(noisy(leak_rate_hz=0.1, threshold_on=0.2), 0.4, 18_001, 60_000_000_000, (1, 2))
     times = sent.t[sent.x == 0]
     assert len(times) == 1800
     assert np.abs(times - np.arange(1, 1801) * 10_000_000).max() <= 1 + 2e-6 / (0.1 * 0.2 * 1e-6)
@@ -74,14 +74,14 @@ def test_leak_over_hours_does_not_drift():
 @pytest.mark.parametrize("every_ns", [SLOW_NS, FAST_NS])
 def test_shot_rate_falls_with_light(light, share, every_ns):
     """`shot_rate_hz` in the dark, a quarter at white and beyond, linear between; ON and OFF half each."""
-    sent = at_rest(clean(shot_rate_hz=40), light, 0.5, every_ns)
+    sent = at_rest(noisy(shot_rate_hz=40), light, 0.5, every_ns)
     expected = 40 * share * 0.5 * PIXELS
     poisson(len(sent), expected)
     assert abs(np.count_nonzero(sent.p) - len(sent) / 2) < 2.5 * math.sqrt(len(sent))
 
 
 def test_shot_events_of_a_static_scene_do_not_depend_on_the_sampling():
-    spec = clean(shot_rate_hz=40)
+    spec = noisy(shot_rate_hz=40)
     slow = at_rest(spec, 0.3, 0.5, SLOW_NS)
     for every_ns in (FAST_NS, 312_500, 1_000_000, 250_000_000):
         same_within_1_us(slow, at_rest(spec, 0.3, 0.5, every_ns))
@@ -89,7 +89,7 @@ def test_shot_events_of_a_static_scene_do_not_depend_on_the_sampling():
 
 def test_shot_events_are_a_poisson_process():
     """Counts per pixel have the variance of Poisson, waits are exponential, no instant is preferred."""
-    sent = at_rest(clean(shot_rate_hz=50), 0.0, 1, SLOW_NS)
+    sent = at_rest(noisy(shot_rate_hz=50), 0.0, 1, SLOW_NS)
     counts = per_pixel(sent, SHAPE)
     assert counts.var() / 50 == pytest.approx(1, abs=5 * math.sqrt(2 / PIXELS))
     at = sent.y.astype(np.int64) * SHAPE[1] + sent.x
@@ -108,7 +108,7 @@ def test_shot_events_are_a_poisson_process():
 def test_shot_noise_follows_light_that_changes_within_an_interval():
     """Light from 0 to 1 in one interval of 1 s: the rate falls along it, from 40 Hz to 10 Hz."""
     light = np.stack([np.zeros(SHAPE), np.ones(SHAPE)]).astype(np.float32)
-    spec = clean(shot_rate_hz=40, threshold_on=90, threshold_off=90)
+    spec = noisy(shot_rate_hz=40, threshold_on=90, threshold_off=90)
     sent = play(spec, [0, 1_000_000_000], light)
     for k in range(4):
         share = np.count_nonzero((sent.t > k * 250_000) & (sent.t <= (k + 1) * 250_000))
@@ -120,7 +120,7 @@ def test_shot_noise_follows_light_that_changes_within_an_interval():
 
 @pytest.mark.parametrize("every_ns", [SLOW_NS, FAST_NS])
 def test_hot_pixels(every_ns):
-    spec = clean(hot_probability=0.05, hot_rate_hz=200)
+    spec = noisy(hot_probability=0.05, hot_rate_hz=200)
     sent = at_rest(spec, 0.3, 0.5, every_ns)
     counts = per_pixel(sent, SHAPE)
     hot = np.count_nonzero(counts)
@@ -131,7 +131,7 @@ def test_hot_pixels(every_ns):
 
 
 def test_hot_events_do_not_depend_on_the_sampling_nor_on_the_light():
-    spec = clean(hot_probability=0.05, hot_rate_hz=200)
+    spec = noisy(hot_probability=0.05, hot_rate_hz=200)
     slow = at_rest(spec, 0.3, 0.5, SLOW_NS)
     same_within_1_us(slow, at_rest(spec, 0.3, 0.5, FAST_NS))
     same_within_1_us(slow, at_rest(spec, 0.0, 0.5, 1_000_000))
@@ -139,7 +139,7 @@ def test_hot_events_do_not_depend_on_the_sampling_nor_on_the_light():
 
 def test_cold_pixels_never_fire():
     light = np.stack([np.full(SHAPE, level, np.float32) for level in (0.01, 3, 0.01, 3)])
-    sent = play(clean(cold_probability=0.05, shot_rate_hz=1000, leak_rate_hz=50), np.arange(4) * 50_000_000, light)
+    sent = play(noisy(cold_probability=0.05, shot_rate_hz=1000, leak_rate_hz=50), np.arange(4) * 50_000_000, light)
     cold = np.count_nonzero(per_pixel(sent, SHAPE) == 0)
     assert abs(cold - 0.05 * PIXELS) < 5 * math.sqrt(0.05 * 0.95 * PIXELS)
 
@@ -154,14 +154,11 @@ def log_ramp(nats: float, seconds: float, every_ns: int, shape=SHAPE) -> tuple[n
     return t_ns, np.broadcast_to(level[:, None, None], (len(t_ns), *shape))
 
 
-RAMP = {"filter": "after", "dark_level": 1e-12}
-
-
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.parametrize("every_ns", [SLOW_NS, FAST_NS])
 def test_mismatch_is_the_spread_of_the_thresholds(way, every_ns):
     """The threshold of each pixel, from the time of its last crossing on a ramp of 20 nat."""
-    spec = clean(threshold_on=0.2, threshold_off=0.2, mismatch=0.03, **RAMP)
+    spec = uneven(threshold_on=0.2, threshold_off=0.2, mismatch=0.03)
     t_ns, light = log_ramp(20, 0.2, every_ns, (64, 64))
     sent = play(spec, t_ns, light[::way])
     assert (sent.p == (way > 0)).all()
@@ -179,7 +176,7 @@ def test_mismatch_is_the_spread_of_the_thresholds(way, every_ns):
 @pytest.mark.parametrize("phase_on", [False, True])
 def test_random_phase_is_uniform(phase_on):
     """On a ramp the first crossing comes anywhere within the first threshold, or for all at its end."""
-    spec = clean(threshold_on=0.2, random_phase=phase_on, **RAMP)
+    spec = uneven(threshold_on=0.2, random_phase=phase_on)
     t_ns, light = log_ramp(0.41, 0.41, 10_000_000)
     sent = play(spec, t_ns, light)
     first = np.full(SHAPE, 10**9)
@@ -194,7 +191,7 @@ def test_random_phase_is_uniform(phase_on):
 
 def test_crossing_noise_is_fresh_at_every_crossing():
     """Steps between the crossings of a ramp: mean the threshold, spread the noise, no memory."""
-    spec = clean(threshold_on=0.2, crossing_noise=0.04, **RAMP)
+    spec = uneven(threshold_on=0.2, crossing_noise=0.04)
     sent = play(spec, *log_ramp(10, 1, 50_000_000))
     at = sent.y.astype(np.int64) * SHAPE[1] + sent.x
     order = np.argsort(at, kind="stable")
@@ -216,14 +213,14 @@ def test_crossing_noise_is_fresh_at_every_crossing():
 
 def test_crossing_noise_does_not_depend_on_the_sampling():
     """The same ramp at 100 Hz and at 10 kHz: the same events, to 1 us and the float32 rounding of the light."""
-    spec = clean(threshold_on=0.2, crossing_noise=0.04, random_phase=True, **RAMP)
+    spec = uneven(threshold_on=0.2, crossing_noise=0.04, random_phase=True)
     slow = play(spec, *log_ramp(10, 1, SLOW_NS, (16, 16)))
     fast = play(spec, *log_ramp(10, 1, FAST_NS, (16, 16)))
     same_within_1_us(slow, fast)
 
 
 def test_crossing_noise_makes_no_events_at_rest():
-    assert len(at_rest(clean(crossing_noise=0.2, random_phase=True, **RAMP), 0.3, 1, SLOW_NS)) == 0
+    assert len(at_rest(uneven(crossing_noise=0.2, random_phase=True), 0.3, 1, SLOW_NS)) == 0
 
 
 # Photoreceptor noise
@@ -242,7 +239,7 @@ def excursions(sent: Events, shape) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize(("hz", "pixels", "seconds"), [
-    (100, 4096, 0.5), (1_000, 4096, 0.5), (10_000, 2048, 1.0), (30_000, 1024, 2.0), (100_000, 1024, 2.0),
+    (100, 4096, 0.5), (1_000, 4096, 0.5), (10_000, 2048, 1.0), (30_000, 1024, 2.0), (100_000, 2048, 1.0),
 ])  # fmt: skip
 @pytest.mark.parametrize("order", ["before", pytest.param("after", marks=pytest.mark.slow)])
 def test_photoreceptor_noise_makes_events_at_rices_rate(hz, pixels, seconds, order):
@@ -269,12 +266,12 @@ def test_rates_add_up_with_everything_on():
     """Leak, shot and hot events together, at both samplings: each keeps its rate."""
     totals = []
     for every_ns in (SLOW_NS, FAST_NS):
-        spec = clean(leak_rate_hz=5, shot_rate_hz=20, hot_probability=0.02, hot_rate_hz=300, random_phase=True)
+        spec = noisy(leak_rate_hz=5, shot_rate_hz=20, hot_probability=0.02, hot_rate_hz=300, random_phase=True)
         dvs = start(spec, np.empty(SHAPE), labels=True)
         t_ns, light = hold(0.2, np.arange(0, 500_000_001, every_ns), SHAPE)
         sent = feed(dvs, t_ns, light)
         totals.append(np.bincount(sent.label, minlength=4))
-    assert totals[0][0] == totals[1][0] == 0
+    assert totals[0][0] == totals[1][0]
     assert totals[0][3] == totals[1][3]
     poisson(totals[0][1], 20 * 0.85 * 0.5 * PIXELS * 0.98)
     assert totals[1][1] == pytest.approx(totals[0][1], rel=1e-3)

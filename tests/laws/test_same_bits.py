@@ -33,7 +33,7 @@ sensors = pytest.mark.parametrize(
 )
 
 
-def clip(frames: int = 30, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+def clip(frames: int = 20, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """A wandering random texture at uneven times, some intervals short enough to resolve the noise."""
     rng = np.random.default_rng(seed)
     texture = np.exp(rng.normal(-1.5, 1, (SHAPE[0], SHAPE[1] + 2 * frames)))
@@ -66,7 +66,7 @@ def test_state_and_restore_through_a_file(spec):
     want = Events.concatenate([feed(whole, t_ns, light), whole.flush()])
     parts = []
     saved: dict[str, np.ndarray] = {}
-    for first, last, threads in ((0, 1, 1), (1, 13, 2), (13, 14, 1), (14, 30, 3)):
+    for first, last, threads in ((0, 1, 1), (1, 9, 2), (9, 10, 1), (10, 20, 3)):
         dvs = start(spec, light, seed=5, threads=threads)
         dvs.restore(saved)
         parts.append(feed(dvs, t_ns[first:last], light[first:last]))

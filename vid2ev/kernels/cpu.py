@@ -15,7 +15,7 @@ from vid2ev.kernels.general import FIRST, KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
 from vid2ev.kernels.response import LANES, load_responses, prepare_responses, respond
 from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan, scan_level
-from vid2ev.kernels.shots import SHOTS, fire
+from vid2ev.kernels.shots import aim, fire
 from vid2ev.kernels.straight import load_lines, prepare_lines, straight
 from vid2ev.kernels.turns import TURNS
 from vid2ev.physics.comparator import initial_phase
@@ -67,25 +67,28 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     scratch, lanes, turns = np.zeros(SCRATCH, np.float32), np.empty(LANES, np.float64), np.empty(TURNS, np.float64)
     flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
     loaded, live = np.empty(BLOCK, np.int64), np.empty(BLOCK + 1, np.int64)
-    one_lane, one_pixel = np.empty(SHOTS, np.float64), np.empty(BLOCK, np.int64)
+    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(BLOCK, np.int64)
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
     knots = np.empty(KNOTS, np.float64)
-    n, used = np.int64(0), np.int64(0)
+    n, used, shots = np.int64(0), np.int64(0), np.int64(0)
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
         block = planes.fast[index * stride : (index + 1) * stride]
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, scratch, flagged, p0, size, flags, num, iv)
-        keys, chance, forced, out, n = take_forced(
-            block, scratch, flagged, keys, chance, p0, size, one_lane, one_pixel, knots, planes, flags, num, iv, out, n,
-            tally,
-        )  # fmt: skip
+        if shots > BLOCK // 2:
+            out, n = fire(shot_lanes, shot_pixels, live, shots, planes, flags, num, iv, out, n, tally)
+            shots = np.int64(0)
+        keys, chance, forced, shots = take_forced(
+            block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
+        )
         flagged[size:] = 0
         count = hits_of(flagged, hits)
         count, out, n = take_general(
-            block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv, out, n,
-            tally,
+            block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv,
+            out, n, tally,
         )  # fmt: skip
         if used + count > BLOCK:
             enough = min(FEW, BLOCK - count)
@@ -94,6 +97,8 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         remember_input(block, scratch, size)
         used += count
     used, out, n = solve_lanes(lanes, loaded, live, used, 0, planes, flags, num, iv, out, n, tally)
+    if shots > 0:
+        out, n = fire(shot_lanes, shot_pixels, live, shots, planes, flags, num, iv, out, n, tally)
     return out, n
 
 
@@ -105,10 +110,8 @@ def solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, 
     """Events of the lanes loaded so far, until at most `enough` are left: (how many are left, out, n)."""
 
 
-def take_forced(
-    block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
-):
-    """Shots and hot pixels of a block: sent, or flagged and left as candidates: (keys, chance, their number, out, n)."""
+def take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
+    """Load the shots of a block, flag the pixels of other forced events: (keys, chance, candidates left, shots)."""
 
 
 def take_general(
@@ -155,33 +158,24 @@ def always_general(flags):
 
 
 @overload(take_forced, jit_options=OPTIONS)
-def _take_forced(
-    block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
-):
+def _take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
     always = always_general(flags)
     if not is_on(flags, "forced"):
 
-        def none(
-            block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
-        ):
-            return keys, chance, 0, out, n
+        def none(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
+            return keys, chance, 0, shots
 
         return none
 
-    def some(
-        block, scratch, flagged, keys, chance, p0, size, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
-    ):
+    def some(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
         keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
         forced = keep_likely(block, scratch, keys, chance, forced, flags, num, iv)
         if always or (len(flags.noise) > 0 and not iv.noise_resolved):
             for j in range(forced):
                 flagged[place_of_candidate(keys[j], iv)[0]] = 1
         else:
-            forced, out, n = fire(
-                block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, knots, planes, flags, num, iv, out, n,
-                tally,
-            )  # fmt: skip
-        return keys, chance, forced, out, n
+            forced, shots = aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, flags, num, iv)
+        return keys, chance, forced, shots
 
     return some
 
@@ -228,7 +222,7 @@ def _take_general(
                 j += 1
             if every or (j < forced and place_of_candidate(keys[j], iv)[0] == hits[k]):
                 out, n = walk_pixel(
-                    block, scratch, hits[k], 0.0, p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv,
+                    block, scratch, hits[k], p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv,
                     out, n, tally,
                 )  # fmt: skip
             else:

@@ -203,9 +203,9 @@ def cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, ou
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def walk_pixel(
-    block, scratch, i, begin, p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv, out, n, tally
+    block, scratch, i, p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv, out, n, tally
 ):
-    """Events of pixel i of the block from the fraction `begin` on, its forced candidates from entry j on: (out, n)."""
+    """Events of pixel i of the block, whose forced candidates start at entry j: (out, n)."""
     pixel = p0 + i
     path = path_of(block, scratch, i, flags, num, iv)
     knots_of(path, knots)
@@ -214,9 +214,7 @@ def walk_pixel(
     load_levels(lanes, pixels, 1, planes, flags, num)
     on, off = lanes[LEVEL_ON] if good else np.inf, lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
-    piece, s, solved, candidate = 0, begin, 0, 0
-    while knots[piece] <= begin and knots[piece] < 1.0:
-        piece += 1
+    piece, s, solved, candidate = 0, 0.0, 0, 0
     blind_until = -1.0  # end of a refractory period of the kind `track`
     if len(flags.track):
         blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns

@@ -78,8 +78,8 @@ def prepare_responses(lanes, turns, pixels, live, count, b, planes, flags, num, 
             base, drift = base + lanes[ADDED0 + j], drift + (lanes[ADDED1 + j] - lanes[ADDED0 + j])
         y0, rise = (lanes[Y0 + j] - (e2 if two else e1)) + base, du + drift
         c1, c2 = response_terms(du, e1, e2, a, b, two) if poles else (0.0, 0.0)
-        m1 = expm1_64(-a) if poles else 0.0
-        m2 = expm1_64(-b) if two else 0.0
+        end1 = exp64(-a) if poles else 1.0
+        end2 = exp64(-b) if two else 1.0
         # The end comes from the state that the next interval starts with, so that nothing happens in between.
         last = lanes[LAST + j] + (base + drift)
         lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j] = y0, rise, c1, c2, a
@@ -87,9 +87,9 @@ def prepare_responses(lanes, turns, pixels, live, count, b, planes, flags, num, 
         lanes[F1 + j], lanes[LAST + j], lanes[SOLVED + j] = last, last, 0.0
         k1, k2 = a * c1, b * c2
         lanes[SLOPE0 + j] = rise - k1 - k2
-        lanes[SLOPE1 + j] = rise - k1 * (1.0 + m1) - k2 * (1.0 + m2)
+        lanes[SLOPE1 + j] = rise - k1 * end1 - k2 * end2
         lanes[BEND0 + j] = a * k1 + b * k2
-        lanes[BEND1 + j] = a * k1 * (1.0 + m1) + b * k2 * (1.0 + m2)
+        lanes[BEND1 + j] = a * k1 * end1 + b * k2 * end2
     if poles:
         levels_of(lanes, count, flags, num)
         split_pieces(lanes, turns, live, count, b)
@@ -197,7 +197,8 @@ def halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up):
     step = -(f * d) / (d * d - 0.5 * f * (a * k1 + b * k2))
     there = s + step
     inside = (there >= lo) & (there <= hi)
-    return there if inside else 0.5 * (lo + hi), lo, hi, abs(step) if inside else 1.0
+    # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
+    return there if inside else 0.5 * (lo + hi), lo, hi, max(abs(step), abs(f / d)) if inside else 1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,7 +1,7 @@
 """Shot noise in pixels where nothing else happens in the interval: a batch of resets instead of a walk for each.
 
-Almost all shots are of this kind.  The memory goes to the signal at the shot's instant; a pixel that reaches one of its
-new levels before the interval ends is walked from there on.
+Almost all shots are of this kind.  The memory goes to the signal at the shot's instant; as the signal hardly moves from
+there to the end of the interval, no level is reached again, whatever thresholds are drawn.
 """
 
 from __future__ import annotations
@@ -9,14 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernels.crossing import AT, FREE, LABEL, LEVEL_OFF, LEVEL_ON, SHOT, UP, WHEN, cross_all, room
+from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN, cross_all, room
 from vid2ev.kernels.forced import place_of_candidate
-from vid2ev.kernels.general import path_of, value, walk_pixel
-from vid2ev.kernels.layout import HIGH, PITCH
+from vid2ev.kernels.general import path_of, value
+from vid2ev.kernels.layout import BLOCK, HIGH, PITCH
 from vid2ev.kernels.scan import TURN
-
-END = FREE
-SHOTS = FREE + PITCH
+from vid2ev.physics.mismatch import FLOOR
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -33,35 +31,35 @@ def is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fire(
-    block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, knots, planes, flags, num, iv, out, n, tally
-):
-    """Send the lonely shots and flag the pixels of the other candidates: (how many candidates are left, out, n)."""
-    left, shots = 0, 0
-    live, others = np.empty(forced, np.int64), np.empty(forced, np.int64)
+def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, flags, num, iv):
+    """Load the lonely shots of a block and flag the pixels of the other candidates: (candidates left, shots loaded)."""
+    # Mismatch leaves FLOOR of a threshold at least, noise at the crossing FLOOR of that.
+    still = FLOOR * FLOOR * min(num.threshold_on, num.threshold_off)
+    others, left = np.empty(forced, np.int64), 0
     for j in range(forced):
         i, s = place_of_candidate(keys[j], iv)
-        if is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv):
+        lonely = shots < BLOCK and is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv)
+        if lonely:
             path = path_of(block, scratch, i, flags, num, iv)
-            lanes[AT + shots], lanes[END + shots], lanes[WHEN + shots] = value(path, s), value(path, 1.0), s
+            here = value(path, s)
+            lonely = abs(value(path, 1.0) - here) < still
+            lanes[AT + shots], lanes[WHEN + shots], pixels[shots] = here, s, p0 + i
             lanes[UP + shots], lanes[LABEL + shots] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
-            pixels[shots], live[shots] = p0 + i, shots
+        if lonely:
             shots += 1
         else:
             others[left] = j
             left += 1
-    out = room(out, n, shots)
-    n = cross_all(lanes, pixels, shots, live, shots, planes, flags, num, iv, out, n, tally)
-    for k in range(shots):
-        if lanes[END + k] >= lanes[LEVEL_ON + k] or lanes[END + k] <= lanes[LEVEL_OFF + k]:
-            i, s = pixels[k] - p0, lanes[WHEN + k]
-            one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
-            out, n = walk_pixel(
-                block, scratch, i, s, p0, one_lane, one_pixel, keys, chance, 0, knots, 0, planes, flags, num, iv, out, n,
-                tally,
-            )  # fmt: skip
     for k in range(left):
-        j = others[k]
-        keys[k], chance[k] = keys[j], chance[j]
+        keys[k], chance[k] = keys[others[k]], chance[others[k]]
         flagged[place_of_candidate(keys[k], iv)[0]] = 1
-    return left, out, n
+    return left, shots
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fire(lanes, pixels, live, shots, planes, flags, num, iv, out, n, tally):
+    """Send the loaded shots; returns (out, n)."""
+    for k in range(shots):
+        live[k] = k
+    out = room(out, n, shots)
+    return out, cross_all(lanes, pixels, shots, live, shots, planes, flags, num, iv, out, n, tally)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 from vid2ev.kernels.layout import PITCH
-from vid2ev.physics.elementary import expm1_64, log64
+from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
 
 RISE, C1, C2, A, AT_0, AT_1, BEND, LO, HI, ROOT, STEP, KIND, VALUE = (k * PITCH for k in range(13))
@@ -29,7 +29,7 @@ def bracket_turns(turns, count, b):
         bend = log64(ratio if usable else 1.0) / (b - a)
         inside = usable & (bend > 0.0) & (bend < 1.0)
         bend = bend if inside else 0.0
-        middle = rise - k1 * (1.0 + expm1_64(-a * bend)) - k2 * (1.0 + expm1_64(-b * bend))
+        middle = rise - k1 * exp64(-a * bend) - k2 * exp64(-b * bend)
         rises, falls_later = turns[AT_0 + k] > 0.0, turns[AT_1 + k] > 0.0
         opposite = rises != falls_later
         before = inside & ((middle > 0.0) != rises)  # the slope has changed its sign at the inflection
@@ -48,14 +48,15 @@ def solve_turns(turns, count, b):
         lo, hi = turns[LO + k], turns[HI + k]
         s, step = 0.5 * (lo + hi), 1.0
         for _ in range(4):
-            p1, p2 = k1 * (1.0 + expm1_64(-a * s)), k2 * (1.0 + expm1_64(-b * s))
+            p1, p2 = k1 * exp64(-a * s), k2 * exp64(-b * s)
             f, d, dd = rise - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
             same = (f > 0.0) == rises
             lo, hi = s if same else lo, hi if same else s
             move = -(f * d) / (d * d - 0.5 * f * dd)
             there = s + move
             good = (there >= lo) & (there <= hi)
-            s, step = there if good else 0.5 * (lo + hi), abs(move) if good else 1.0
+            # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
+            s, step = there if good else 0.5 * (lo + hi), max(abs(move), abs(f / d)) if good else 1.0
         turns[ROOT + k], turns[STEP + k] = s, step * max(1.0, max(a, b))
         turns[LO + k], turns[HI + k] = lo, hi
 

@@ -30,7 +30,7 @@ import numpy as np
 from numba import njit
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.elementary import expm1_32, expm1_64, fma, log64
+from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
 
 F = np.float32
 _APART = 2e-7
@@ -131,7 +131,7 @@ def response(s, y0, du, c1, c2, a, b):
 @njit(cache=True, nogil=True, error_model="numpy")
 def response_slope(s, du, c1, c2, a, b):
     """dy/ds at a fraction s of the interval."""
-    return du - a * c1 * (1.0 + expm1_64(-a * s)) - b * c2 * (1.0 + expm1_64(-b * s))
+    return du - a * c1 * exp64(-a * s) - b * c2 * exp64(-b * s)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,7 +140,7 @@ def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
     enough = 1e-8 / max(1.0, max(a, b))
     s = 0.5 * (lo + hi)
     for k in range(60):
-        k1, k2 = a * c1 * (1.0 + expm1_64(-a * s)), b * c2 * (1.0 + expm1_64(-b * s))
+        k1, k2 = a * c1 * exp64(-a * s), b * c2 * exp64(-b * s)
         slope = du - k1 - k2
         if (slope > 0.0) == (slope_lo > 0.0):
             lo = s
