@@ -2,7 +2,7 @@
 
 The flagged pixels of a block become lanes.  Each lane holds its response, y(s) = y0 + rise s + c1 (e^-as - 1) + c2
 (e^-bs - 1), and the monotone piece [s0, s1] it is in.  Rounds of: pick the level that the piece reaches, solve (three
-steps of Halley's method, vector code), cross, until no lane is left.  The few lanes that three steps do not settle are
+steps of Halley's method, vector code), cross, until no lane is left.  The few lanes that four steps do not settle are
 finished by a bracketed search.  Levels are in the filter's domain: nats, or light.
 """
 
@@ -43,8 +43,9 @@ Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, SOLVED, UPPER, LOWER = (FREE + 
 REACHED, TARGET, STEP, LOW_S, HIGH_S, ADDED0, ADDED1 = (LOWER + (1 + k) * PITCH for k in range(7))
 SLOPE0, SLOPE1, BEND0, BEND1 = (ADDED1 + (1 + k) * PITCH for k in range(4))
 LANES = BEND1 + PITCH
-# A last step this small (in units of the faster time constant), with a method of third order, leaves 1e-5 of that unit.
-ENOUGH = 0.03
+# Accepted last step, in units of the faster time constant: the method is of third order, with a large constant near a
+# turning point.
+ENOUGH = 2e-3
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -203,7 +204,7 @@ def halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def solve(lanes, count, flags, b):
-    """Three steps for each lane, from the chord's root."""
+    """Four steps for each lane, from the chord's root."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
     for j in range(count):
         y0, rise, c1, c2, a = lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j]
@@ -211,6 +212,7 @@ def solve(lanes, count, flags, b):
         up = f1 > f0
         s = lo + (hi - lo) * (target - f0) / (f1 - f0)
         s = min(max(s, lo), hi)
+        s, lo, hi, step = halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up)
         s, lo, hi, step = halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up)
         s, lo, hi, step = halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up)
         s, lo, hi, step = halley(s, lo, hi, y0, rise, c1, c2, a, b, two, poles, target, up)
