@@ -234,7 +234,7 @@ def _take_general(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_tile(first_block, last_block, pixels, light, lut, bad, random_phase, planes, flags, num, tally):
+def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, tally):
     """The state after a long time in this light: no lags, levels about the signal."""
     poles = len(flags.poles)
     stride = (LAG1 + poles + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
@@ -269,6 +269,10 @@ def settle_tile(first_block, last_block, pixels, light, lut, bad, random_phase, 
                 load_levels(one_lane, one_pixel, 1, planes, flags, num)
                 block[HIGH * PITCH + i] = scan_level(one_lane[LEVEL_ON], True, flags, num)
                 block[LOW * PITCH + i] = scan_level(one_lane[LEVEL_OFF], False, flags, num)
+            if len(flags.labels) and len(flags.leak):
+                # Nothing but leak has lifted a settled signal above its memory.
+                lifted = level - planes.memory[pixel]
+                planes.t_reset[pixel] = t_ns - np.int64(lifted / num.leak_nat_per_ns)
             if bad[pixel]:
                 block[HIGH * PITCH + i], block[LOW * PITCH + i] = np.inf, -np.inf
 

@@ -207,13 +207,12 @@ class Dvs:
     def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
-                first, last, self._bad.size, flat, table, self._bad, self.spec.random_phase, self._planes, self._flags,
-                self._numbers, self._tallies[k],
+                first, last, self._bad.size, flat, table, t_ns, self._bad, self.spec.random_phase, self._planes,
+                self._flags, self._numbers, self._tallies[k],
             )  # fmt: skip
 
         self._each_tile(settle)
         self._t_ns = self._leak_since_ns = t_ns
-        self._planes.t_reset[...] = t_ns
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
         if self._frames is not None:
             self._frames.origin_us = t_ns // 1000
