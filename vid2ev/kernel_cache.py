@@ -1,18 +1,31 @@
-"""Compiled kernels on disk are dropped when any of their sources has changed.
+"""Compiled kernels on disk are dropped when any of their sources has changed, and two processes never mix theirs up.
 
 numba keeps compiled code beside the file of the cached function and looks only at that file's date; the laws that a
 kernel calls are in other files.  So the dates of all of them are stamped into one file, and a new stamp empties the
 caches.
+
+numba also numbers the files of a function's variants 1, 2, ...: two processes that compile different variants at the
+same time both write number 1, and whoever reads the index then runs the wrong code.  A process's own mark in the
+names keeps them apart; the variant whose place in the index is lost that way is compiled again.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import uuid
 from pathlib import Path
+
+from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
 _COMPILED = ("physics", "kernels")
+_MARK = uuid.uuid4().hex[:8]
+
+
+def mark_our_kernels() -> None:
+    """Let this process's compiled kernels have names that no other process writes."""
+    IndexDataCacheFile._data_name = lambda cache, number: f"{Path(cache._index_name).stem}.{_MARK}.{number}.nbc"  # type: ignore[method-assign]
 
 
 def drop_stale_kernels() -> None:

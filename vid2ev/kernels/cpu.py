@@ -9,12 +9,22 @@ import numpy as np
 from numba import njit
 from numba.core.extending import overload
 
-from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, load_levels, move_memories
+from vid2ev.kernels.crossing import (
+    AT,
+    FREE,
+    LEVEL_ON,
+    SCAN_OFF,
+    SCAN_ON,
+    compare_levels,
+    load_levels,
+    move_memories,
+)
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import FIRST, KNOTS, walk_pixel
+from vid2ev.kernels.ladder import climb
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
 from vid2ev.kernels.response import LANES, load_responses, prepare_responses, respond
-from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan, scan_level
+from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan
 from vid2ev.kernels.shots import aim, fire
 from vid2ev.kernels.straight import load_lines, prepare_lines, straight
 from vid2ev.kernels.turns import TURNS
@@ -123,11 +133,14 @@ def take_general(
 @overload(load, jit_options=OPTIONS)
 def _load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
     if is_on(flags, "straight"):
+        rounds = levels_change(flags)
 
         def lines(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
             free, pixels = lanes[used:], loaded[used:]
             load_lines(block, scratch, free, pixels, hits, count, p0, flags)
-            prepare_lines(free, pixels, count, planes, flags, num, iv)
+            prepare_lines(free, count, flags, num, iv)
+            if rounds:
+                load_levels(free, pixels, count, planes, flags, num)
 
         return lines
 
@@ -142,12 +155,24 @@ def _load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, pla
 
 @overload(solve_lanes, jit_options=OPTIONS)
 def _solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
+    if is_on(flags, "straight") and not levels_change(flags):
+
+        def solve_at_once(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
+            out, n = climb(lanes, loaded, used, planes, flags, num, iv, out, n, tally)
+            return 0, out, n
+
+        return solve_at_once
     solver = straight if is_on(flags, "straight") else respond
 
     def solve(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
         return solver(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
 
     return solve
+
+
+def levels_change(flags):
+    """Whether a pixel's levels are not an equal step apart, or a crossing's label depends on the one before."""
+    return is_on(flags, "crossing_noise") or (is_on(flags, "labels") and is_on(flags, "leak"))
 
 
 def always_general(flags):
@@ -253,9 +278,9 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
             u = scratch[NEW + i]
             if len(flags.light_bandwidth):
                 block[(LAG1 + poles + 3 * len(flags.noise)) * PITCH + i] = u
-            level = log_level(np.float64(u), num.curve, num.dark)
+            level = log_level(np.float64(u), num.curve)
             if len(flags.log_input):
-                u = log_level_32(u, num.curve, np.float32(num.dark))
+                u = log_level_32(u, num.curve)
                 level = np.float64(u)
             block[INPUT * PITCH + i] = u
             if len(flags.noise):
@@ -267,8 +292,8 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
                 phase = initial_phase(num.seed, num.camera, pixel)
                 planes.memory[pixel] = level - (1.0 - phase) * (one_lane[LEVEL_ON] - level)
                 load_levels(one_lane, one_pixel, 1, planes, flags, num)
-                block[HIGH * PITCH + i] = scan_level(one_lane[LEVEL_ON], True, flags, num)
-                block[LOW * PITCH + i] = scan_level(one_lane[LEVEL_OFF], False, flags, num)
+                compare_levels(one_lane, 1, flags, num)
+                block[HIGH * PITCH + i], block[LOW * PITCH + i] = one_lane[SCAN_ON], one_lane[SCAN_OFF]
             if len(flags.labels) and len(flags.leak):
                 # Nothing but leak has lifted a settled signal above its memory.
                 lifted = level - planes.memory[pixel]
@@ -288,5 +313,5 @@ def shift_levels(pixels, by, planes, flags, num):
         planes.memory[p] -= by
         if abs(planes.fast[at + HIGH * PITCH]) < np.inf:  # a bad or a blind pixel keeps its sign
             load_levels(lanes, pixel, 1, planes, flags, num)
-            planes.fast[at + HIGH * PITCH] = scan_level(lanes[LEVEL_ON], True, flags, num)
-            planes.fast[at + LOW * PITCH] = scan_level(lanes[LEVEL_OFF], False, flags, num)
+            compare_levels(lanes, 1, flags, num)
+            planes.fast[at + HIGH * PITCH], planes.fast[at + LOW * PITCH] = lanes[SCAN_ON], lanes[SCAN_OFF]

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from vid2ev.kernels.layout import HIGH, LOW, PITCH, SWALLOWED, place_of, stride_of
-from vid2ev.kernels.scan import scan_level
+from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.physics.crossing_noise import noisy_thresholds
 
 SIGNAL, SHOT, LEAK, HOT = range(4)
@@ -33,9 +33,9 @@ def room(out, n, more):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def key_of(s, pixel, polarity, label, iv):
-    """The key of an event at a fraction s of the interval: its time the nearest microsecond in (t0, t1]."""
-    k = np.int64((iv.offset_ns + s * iv.dt_ns) * 1e-3 + 0.5)
+def key_of(when_ns, pixel, polarity, label, iv):
+    """The key of an event `when_ns` after t0: its time is the nearest microsecond in (t0, t1]."""
+    k = np.int64((iv.offset_ns + when_ns) * 1e-3 + 0.5)
     k = min(max(k, np.int64(1)), iv.last_us)
     return np.uint64((k << np.int64(28)) | (pixel << np.int64(3)) | (polarity << np.int64(2)) | label)
 
@@ -78,19 +78,29 @@ def move_memories(lanes, pixels, count, live, alive, planes, flags, num):
                 np.float32(lanes[LEVEL_ON + j]),
                 np.float32(lanes[LEVEL_OFF + j]),
             )
-    for j in range(count):
-        lanes[LEVEL_ON + j] = lanes[AT + j] + lanes[LEVEL_ON + j]
-        lanes[LEVEL_OFF + j] = lanes[AT + j] - lanes[LEVEL_OFF + j]
-    for j in range(count):
-        lanes[SCAN_ON + j] = scan_level(lanes[LEVEL_ON + j], True, flags, num)
-    for j in range(count):
-        lanes[SCAN_OFF + j] = scan_level(lanes[LEVEL_OFF + j], False, flags, num)
+    scan_levels(lanes, count, flags, num)
     stride = stride_of(flags)
     for k in range(alive):
         j = live[k]
         at = place_of(pixels[j], stride)
         fast[at + HIGH * PITCH] = np.float32(lanes[SCAN_ON + j])
         fast[at + LOW * PITCH] = np.float32(lanes[SCAN_OFF + j])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def scan_levels(lanes, count, flags, num):
+    """From the memory AT and the thresholds to levels [nat], and those that the scan compares."""
+    for j in range(count):
+        lanes[LEVEL_ON + j] = lanes[AT + j] + lanes[LEVEL_ON + j]
+        lanes[LEVEL_OFF + j] = lanes[AT + j] - lanes[LEVEL_OFF + j]
+    compare_levels(lanes, count, flags, num)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def compare_levels(lanes, count, flags, num):
+    """From levels [nat] to those that the scan compares."""
+    compared(lanes[SCAN_ON:], lanes[LEVEL_ON:], -MARGIN, count, flags, num)
+    compared(lanes[SCAN_OFF:], lanes[LEVEL_OFF:], MARGIN, count, flags, num)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -120,7 +130,7 @@ def cross_all(lanes, pixels, count, live, alive, planes, flags, num, iv, out, n,
         j = live[k]
         label = np.int64(lanes[LABEL + j]) if len(flags.labels) else np.int64(SIGNAL)
         polarity = np.int64(1) if lanes[UP + j] > 0.0 else np.int64(0)
-        out[n] = key_of(lanes[WHEN + j], pixels[j], polarity, label, iv)
+        out[n] = key_of(lanes[WHEN + j] * iv.dt_ns, pixels[j], polarity, label, iv)
         if len(flags.refractory):
             t_ns = iv.t0_ns + np.int64(lanes[WHEN + j] * iv.dt_ns)
             blind = t_ns - t_last[pixels[j]] < num.refractory_ns

@@ -105,7 +105,7 @@ def keep_likely(block, scratch, keys, chance, n, flags, num, iv):
         before, after = np.float64(block[INPUT * PITCH + i]), np.float64(scratch[NEW + i])
         light = before + (after - before) * s
         if len(flags.log_input):
-            light = light_at(light, num.curve, num.dark)
+            light = light_at(light, num.curve)
         if chance[j] == 0.0 or abs(chance[j]) < shot_share(light, num.shot_light_factor):
             keys[left], chance[left] = keys[j], chance[j]
             left += 1

@@ -35,7 +35,7 @@ from vid2ev.kernels.crossing import (
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LAG1, LAG2, LOW, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, OLD1, OLD2
-from vid2ev.physics.log_curve import log_level, log_slope
+from vid2ev.physics.log_curve import Curve, log_level, log_slope
 from vid2ev.physics.photoreceptor import (
     response,
     response_slope,
@@ -63,8 +63,7 @@ class Path(NamedTuple):
     light: bool  # y is light, and the log is still to come
     base: float  # leak and noise at the start [nat]
     drift: float  # and their rise over the interval
-    curve: int
-    dark: float
+    curve: Curve
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -85,15 +84,15 @@ def path_of(block, scratch, i, flags, num, iv):
     if len(flags.straight):
         start = u0 - lag
         if len(flags.log_input) == 0:
-            start = log_level(max(start, 0.0), num.curve, num.dark)
-            after = log_level(max(after, 0.0), num.curve, num.dark)
+            start = log_level(max(start, 0.0), num.curve)
+            after = log_level(max(after, 0.0), num.curve)
         rise = after - start
-        return Path(start, after, rise, 0.0, 0.0, 0.0, 0.0, False, base, drift, num.curve, num.dark)
+        return Path(start, after, rise, 0.0, 0.0, 0.0, 0.0, False, base, drift, num.curve)
     b = iv.b if two else 0.0
     a = separate_rates(np.float64(scratch[CLOCK + i]), b) if len(flags.light_bandwidth) else iv.a
     c1, c2 = response_terms(du, e1, e2, a, b, two) if poles > 0 else (0.0, 0.0)
     light = len(flags.log_input) == 0
-    return Path(u0 - lag, after, du, c1, c2, a, b, light, base, drift, num.curve, num.dark)
+    return Path(u0 - lag, after, du, c1, c2, a, b, light, base, drift, num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -101,7 +100,7 @@ def value(path, s):
     """F(s) [nat]."""
     y = path.end if s >= 1.0 else response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
     if path.light:
-        y = log_level(max(y, 0.0), path.curve, path.dark)
+        y = log_level(max(y, 0.0), path.curve)
     return y + path.base + path.drift * s
 
 
@@ -111,7 +110,7 @@ def slope(path, s):
     d = response_slope(s, path.rise, path.c1, path.c2, path.a, path.b)
     if path.light:
         y = response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
-        d *= log_slope(max(y, 0.0), path.curve, path.dark)
+        d *= log_slope(max(y, 0.0), path.curve)
     return d + path.drift
 
 
@@ -284,7 +283,7 @@ def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, nu
     if chance == 0.0:  # a hot pixel
         if not blind:
             planes.t_last[pixel % planes.t_last.size] = t_ns
-            out[n] = key_of(s, pixel, np.int64(1), HOT, iv)
+            out[n] = key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv)
             n += 1
         return on, off, n
     if on == np.inf or (blind and len(flags.track)):

@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from vid2ev.physics.log_curve import Curve
+
 BLOCK_BITS = 10
 BLOCK = 1 << BLOCK_BITS
 PITCH = BLOCK + 16  # distance of planes: at a power of two apart they would fight for the same lines of the cache
@@ -57,8 +59,7 @@ class Numbers(NamedTuple):
 
     seed: np.uint64
     camera: int
-    curve: int
-    dark: float
+    curve: Curve
     threshold_on: float
     threshold_off: float
     crossing_noise: float  # [nat]

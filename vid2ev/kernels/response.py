@@ -30,7 +30,7 @@ from vid2ev.kernels.crossing import (
 from vid2ev.kernels.layout import CAPPED, INPUT, LAG1, LAG2, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, OLD1, OLD2
 from vid2ev.physics.elementary import exp64, expm1_64
-from vid2ev.physics.log_curve import OFFSET, light_at, log_level
+from vid2ev.physics.log_curve import light_at, log_level
 from vid2ev.physics.photoreceptor import (
     response,
     response_terms,
@@ -143,15 +143,11 @@ def levels_of(lanes, count, flags, num):
     if len(flags.log_input):
         for j in range(count):
             lanes[UPPER + j], lanes[LOWER + j] = lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j]
-    elif num.curve == OFFSET:
-        for j in range(count):
-            lanes[UPPER + j] = exp64(lanes[LEVEL_ON + j]) - num.dark
-        for j in range(count):
-            lanes[LOWER + j] = exp64(lanes[LEVEL_OFF + j]) - num.dark
     else:
         for j in range(count):
-            lanes[UPPER + j] = light_at(lanes[LEVEL_ON + j], num.curve, num.dark)
-            lanes[LOWER + j] = light_at(lanes[LEVEL_OFF + j], num.curve, num.dark)
+            lanes[UPPER + j] = light_at(lanes[LEVEL_ON + j], num.curve)
+        for j in range(count):
+            lanes[LOWER + j] = light_at(lanes[LEVEL_OFF + j], num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -251,7 +247,7 @@ def take_the_rest(lanes, live, alive, flags, num):
             lanes[WHEN + j], lanes[S1 + j] = 1.0, 1.0
             last = lanes[LAST + j]
             lanes[F1 + j], lanes[TARGET + j] = last, last
-            lanes[AT + j] = last if len(flags.log_input) else log_level(max(last, 0.0), num.curve, num.dark)
+            lanes[AT + j] = last if len(flags.log_input) else log_level(max(last, 0.0), num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

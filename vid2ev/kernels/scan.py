@@ -90,7 +90,7 @@ def scan(block, scratch, flagged, p0, n, flags, num, iv):
         y = scratch[FILTERED + i] if poles > 0 else scratch[NEW + i]
         if len(flags.log_compare):
             if not len(flags.log_input):
-                y = log_level_32(max(y, F(0.0)), num.curve, F(num.dark))
+                y = log_level_32(max(y, F(0.0)), num.curve)
             y = y + F(iv.leak1)
             if len(flags.noise):
                 scratch[SEEN0 + i], scratch[SEEN1 + i] = block[seen + i], y
@@ -128,11 +128,10 @@ def may_reach(block, scratch, i, high, low, flags, iv):
 @njit(cache=True, nogil=True, error_model="numpy")
 def log_light(scratch, n, num):
     """The new light to nats; the light itself stays in LIGHT."""
-    curve, dark = num.curve, F(num.dark)
     for i in range(n):
         light = scratch[NEW + i]
         scratch[LIGHT + i] = light
-        scratch[NEW + i] = log_level_32(light, curve, dark)
+        scratch[NEW + i] = log_level_32(light, num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -215,11 +214,12 @@ def flag_rice(block, scratch, flagged, p0, n, num, iv):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def scan_level(level, upper, flags, num):
-    """A level [nat] as the scan compares it: light or nats, float32, drawn in by the margin."""
-    inward = level - MARGIN if upper else level + MARGIN
+def compared(into, levels, inward, count, flags, num):
+    """Levels [nat] as the scan compares them, in nats or light, drawn in by the margin."""
     if len(flags.log_compare):
-        return F(inward)
-    if len(flags.leak):
-        return F(light_at(inward, num.curve, num.dark) + num.dark)
-    return F(light_at(inward, num.curve, num.dark))
+        for j in range(count):
+            into[j] = levels[j] + inward
+    else:
+        raised = num.curve.dark if len(flags.leak) else 0.0
+        for j in range(count):
+            into[j] = light_at(levels[j] + inward, num.curve) + raised

@@ -19,15 +19,13 @@ from vid2ev.kernels.crossing import (
     WHEN,
     cross_all,
     keep_lanes,
-    load_levels,
     over_cap,
     reached_lanes,
     room,
 )
 from vid2ev.kernels.layout import CAPPED, INPUT, LAG1, LAG2, PITCH
 from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, OLD1, OLD2
-from vid2ev.physics.elementary import log64
-from vid2ev.physics.log_curve import OFFSET, log_level
+from vid2ev.physics.log_curve import log_level
 
 START, END, PER_NAT, SOLVED, REACHED, ADDED0, ADDED1 = (FREE + k * PITCH for k in range(7))
 
@@ -52,9 +50,8 @@ def load_lines(block, scratch, lanes, pixels, hits, count, p0, flags):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def prepare_lines(lanes, pixels, count, planes, flags, num, iv):
-    """The loaded lines in nats, leak and noise included, and their levels."""
-    load_levels(lanes, pixels, count, planes, flags, num)
+def prepare_lines(lanes, count, flags, num, iv):
+    """The loaded lines in nats, leak and noise included."""
     if len(flags.log_input) == 0:
         to_nats(lanes[START:], count, num)
         to_nats(lanes[END:], count, num)
@@ -69,12 +66,8 @@ def prepare_lines(lanes, pixels, count, planes, flags, num, iv):
 @njit(cache=True, nogil=True, error_model="numpy")
 def to_nats(plane, count, num):
     """A plane of light to nats."""
-    if num.curve == OFFSET:
-        for j in range(count):
-            plane[j] = log64(max(plane[j], 0.0) + num.dark)
-    else:
-        for j in range(count):
-            plane[j] = log_level(max(plane[j], 0.0), num.curve, num.dark)
+    for j in range(count):
+        plane[j] = log_level(max(plane[j], 0.0), num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

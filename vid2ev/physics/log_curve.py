@@ -12,7 +12,8 @@ Light is relative to diffuse white (1.0); y is in nats.
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,11 +23,6 @@ from vid2ev.physics.elementary import exp64, log32, log64
 
 F = np.float32
 KNEE = 20.0 / 255.0
-_LN_KNEE = float(np.log(KNEE))
-_V2E_BLACK = float(np.log(1.0 / 255.0))
-_V2E_SLOPE = float(np.log(20.0)) / KNEE
-OFFSET, TOE, V2E = range(3)
-CURVES = {"offset": OFFSET, "toe": TOE, "v2e": V2E}
 
 
 class LogCurve(BaseModel, frozen=True, extra="forbid"):
@@ -44,37 +40,47 @@ class LogCurve(BaseModel, frozen=True, extra="forbid"):
     )
 
 
+class Curve(NamedTuple):
+    """All curves in one form: slope light + black below the knee, ln(light + dark) from there on."""
+
+    dark: float
+    knee: float
+    log_knee: float
+    slope: float
+    black: float
+
+
+def curve_of(name: str, dark_level: float) -> Curve:
+    """The numbers of a curve; `dark_level` is used by `offset` alone."""
+    if name == "offset":
+        return Curve(dark_level, 0.0, -math.inf, 0.0, 0.0)
+    log_knee = math.log(KNEE)
+    if name == "toe":
+        return Curve(0.0, KNEE, log_knee, 1.0 / KNEE, log_knee - 1.0)
+    return Curve(0.0, KNEE, log_knee, math.log(20.0) / KNEE, math.log(1.0 / 255.0))
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_level(light, curve, dark):
+def log_level(light, curve):
     """Comparator level [nat] of a light (float64, >= 0)."""
-    if curve == OFFSET:
-        return log64(light + dark)
-    below = light / KNEE - 1.0 + _LN_KNEE if curve == TOE else light * _V2E_SLOPE + _V2E_BLACK
-    return below if light < KNEE else log64(max(light, KNEE))
+    return light * curve.slope + curve.black if light < curve.knee else log64(max(light, curve.knee) + curve.dark)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def light_at(level, curve, dark):
+def light_at(level, curve):
     """The light whose level this is: the inverse of `log_level`; below the curve's range it goes on below zero."""
-    if curve == OFFSET:
-        return exp64(level) - dark
-    below = (level + 1.0 - _LN_KNEE) * KNEE if curve == TOE else (level - _V2E_BLACK) / _V2E_SLOPE
-    return below if level < _LN_KNEE else exp64(level)
+    return (level - curve.black) / curve.slope if level < curve.log_knee else exp64(level) - curve.dark
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_slope(light, curve, dark):
+def log_slope(light, curve):
     """Derivative of `log_level` [nat per unit of light]."""
-    if curve == OFFSET:
-        return 1.0 / (light + dark)
-    below = 1.0 / KNEE if curve == TOE else _V2E_SLOPE
-    return below if light < KNEE else 1.0 / light
+    return curve.slope if light < curve.knee else 1.0 / (light + curve.dark)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_level_32(light, curve, dark):
+def log_level_32(light, curve):
     """`log_level` in float32, for the scan."""
-    if curve == OFFSET:
-        return log32(light + dark)
-    below = light * F(1.0 / KNEE) + F(_LN_KNEE - 1.0) if curve == TOE else light * F(_V2E_SLOPE) + F(_V2E_BLACK)
-    return below if light < F(KNEE) else log32(max(light, F(KNEE)))
+    knee = F(curve.knee)
+    below = light * F(curve.slope) + F(curve.black)
+    return below if light < knee else log32(max(light, knee) + F(curve.dark))

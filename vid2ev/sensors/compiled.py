@@ -8,7 +8,7 @@ import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, OFF, ON, Flags, Interval, Numbers, Planes, stride_of
 from vid2ev.physics.bad_pixels import bad_pixel_map
-from vid2ev.physics.log_curve import CURVES
+from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.mismatch import fill_thresholds
 from vid2ev.physics.photoreceptor import separate, step_weights
 from vid2ev.physics.photoreceptor_noise import RESOLVED, noise_step
@@ -53,8 +53,7 @@ def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
     return Numbers(
         seed=np.uint64(seed),
         camera=camera,
-        curve=CURVES[spec.log_curve],
-        dark=spec.dark_level,
+        curve=curve_of(spec.log_curve, spec.dark_level),
         threshold_on=spec.threshold_on,
         threshold_off=spec.threshold_off,
         crossing_noise=spec.crossing_noise,
@@ -128,7 +127,7 @@ def interval_of(
         leak0=leak0,
         leak1=leak1,
         gain=F(gain),
-        shift=F(num.dark * gain),
+        shift=F(num.curve.dark * gain),
         noise_keep1=F(keep1),
         noise_mix=F(mix),
         noise_keep2=F(keep2),
