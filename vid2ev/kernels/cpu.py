@@ -9,35 +9,16 @@ import numpy as np
 from numba import njit
 from numba.core.extending import overload
 
-from vid2ev.kernels.crossing import (
-    AT,
-    FREE,
-    LEVEL_ON,
-    SCAN_OFF,
-    SCAN_ON,
-    compare_levels,
-    load_levels,
-    move_memories,
-)
+from vid2ev.kernels.crossing import AT, EVERY, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
-from vid2ev.kernels.general import FIRST, KNOTS, walk_pixel
-from vid2ev.kernels.ladder import climb
+from vid2ev.kernels.general import KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
-from vid2ev.kernels.response import LANES, load_responses, prepare_responses, respond
 from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan
-from vid2ev.kernels.shots import aim, fire
-from vid2ev.kernels.straight import load_lines, prepare_lines, straight
-from vid2ev.kernels.turns import TURNS
+from vid2ev.kernels.shots import aim
+from vid2ev.kernels.slow import climb, is_on, load, new_work
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
 
-
-def is_on(flags, name):
-    """Whether a flag is on, from the numba type of the flags."""
-    return len(flags.types[flags.fields.index(name)]) > 0
-
-
-FEW = 256  # lanes that wait for company, so that rounds with few lanes are rare
 _ADD_BYTES = np.uint64(0x0101010101010101)
 
 
@@ -74,9 +55,8 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     Flagged pixels are gathered over as many blocks as fill the lanes, so that the vector code has something to do.
     """
     stride = stride_of(flags)
-    scratch, lanes, turns = np.zeros(SCRATCH, np.float32), np.empty(LANES, np.float64), np.empty(TURNS, np.float64)
+    work, scratch = new_work(), np.zeros(SCRATCH, np.float32)
     flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
-    loaded, live = np.empty(BLOCK, np.int64), np.empty(BLOCK + 1, np.int64)
     one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
     shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(BLOCK, np.int64)
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
@@ -89,7 +69,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, scratch, flagged, p0, size, flags, num, iv)
         if shots > BLOCK // 2:
-            out, n = fire(shot_lanes, shot_pixels, live, shots, planes, flags, num, iv, out, n, tally)
+            out, n = cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
             shots = np.int64(0)
         keys, chance, forced, shots = take_forced(
             block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
@@ -101,23 +81,13 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             out, n, tally,
         )  # fmt: skip
         if used + count > BLOCK:
-            enough = min(FEW, BLOCK - count)
-            used, out, n = solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
-        load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv)
+            out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
+            used = np.int64(0)
+        load(block, scratch, work.lanes[used:], work.pixels[used:], hits, count, p0, flags)
         remember_input(block, scratch, size)
         used += count
-    used, out, n = solve_lanes(lanes, loaded, live, used, 0, planes, flags, num, iv, out, n, tally)
-    if shots > 0:
-        out, n = fire(shot_lanes, shot_pixels, live, shots, planes, flags, num, iv, out, n, tally)
-    return out, n
-
-
-def load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
-    """Load the flagged pixels of a block into lanes used, ..."""
-
-
-def solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
-    """Events of the lanes loaded so far, until at most `enough` are left: (how many are left, out, n)."""
+    out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
+    return cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
 
 
 def take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
@@ -128,51 +98,6 @@ def take_general(
     block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
 ):
     """Walk the flagged pixels that need the general path; the others stay in `hits`: (how many, out, n)."""
-
-
-@overload(load, jit_options=OPTIONS)
-def _load(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
-    if is_on(flags, "straight"):
-        rounds = levels_change(flags)
-
-        def lines(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
-            free, pixels = lanes[used:], loaded[used:]
-            load_lines(block, scratch, free, pixels, hits, count, p0, flags)
-            prepare_lines(free, count, flags, num, iv)
-            if rounds:
-                load_levels(free, pixels, count, planes, flags, num)
-
-        return lines
-
-    def responses(block, scratch, lanes, turns, loaded, live, used, hits, count, p0, planes, flags, num, iv):
-        free, pixels = lanes[used:], loaded[used:]
-        load_responses(block, scratch, free, pixels, hits, count, p0, flags, iv)
-        b = iv.b if len(flags.poles) == 2 else 0.0
-        prepare_responses(free, turns, pixels, live, count, b, planes, flags, num, iv)
-
-    return responses
-
-
-@overload(solve_lanes, jit_options=OPTIONS)
-def _solve_lanes(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
-    if is_on(flags, "straight") and not levels_change(flags):
-
-        def solve_at_once(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
-            out, n = climb(lanes, loaded, used, planes, flags, num, iv, out, n, tally)
-            return 0, out, n
-
-        return solve_at_once
-    solver = straight if is_on(flags, "straight") else respond
-
-    def solve(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally):
-        return solver(lanes, loaded, live, used, enough, planes, flags, num, iv, out, n, tally)
-
-    return solve
-
-
-def levels_change(flags):
-    """Whether a pixel's levels are not an equal step apart, or a crossing's label depends on the one before."""
-    return is_on(flags, "crossing_noise") or (is_on(flags, "labels") and is_on(flags, "leak"))
 
 
 def always_general(flags):
@@ -287,13 +212,13 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
                 block[(LAG1 + poles + 2) * PITCH + i] = level
             one_pixel[0] = pixel
             one_lane[AT] = level
-            move_memories(one_lane, one_pixel, 1, FIRST, 1, planes, flags, num)
+            fresh_thresholds(one_lane, one_pixel, EVERY, 1, planes, flags, num)
+            leave_levels(one_lane, one_pixel, 1, planes, flags, num)
             if random_phase:
                 phase = initial_phase(num.seed, num.camera, pixel)
                 planes.memory[pixel] = level - (1.0 - phase) * (one_lane[LEVEL_ON] - level)
-                load_levels(one_lane, one_pixel, 1, planes, flags, num)
-                compare_levels(one_lane, 1, flags, num)
-                block[HIGH * PITCH + i], block[LOW * PITCH + i] = one_lane[SCAN_ON], one_lane[SCAN_OFF]
+                load_thresholds(one_lane, one_pixel, 1, planes, flags, num)
+                leave_levels(one_lane, one_pixel, 1, planes, flags, num)
             if len(flags.labels) and len(flags.leak):
                 # Nothing but leak has lifted a settled signal above its memory.
                 lifted = level - planes.memory[pixel]
@@ -312,6 +237,5 @@ def shift_levels(pixels, by, planes, flags, num):
         at = place_of(p, stride)
         planes.memory[p] -= by
         if abs(planes.fast[at + HIGH * PITCH]) < np.inf:  # a bad or a blind pixel keeps its sign
-            load_levels(lanes, pixel, 1, planes, flags, num)
-            compare_levels(lanes, 1, flags, num)
-            planes.fast[at + HIGH * PITCH], planes.fast[at + LOW * PITCH] = lanes[SCAN_ON], lanes[SCAN_OFF]
+            load_thresholds(lanes, pixel, 1, planes, flags, num)
+            leave_levels(lanes, pixel, 1, planes, flags, num)

@@ -18,6 +18,7 @@ from numba import njit
 
 from vid2ev.kernels.crossing import (
     AT,
+    EVERY,
     HOT,
     LABEL,
     LEVEL_OFF,
@@ -26,10 +27,11 @@ from vid2ev.kernels.crossing import (
     SIGNAL,
     UP,
     WHEN,
-    cross_all,
+    cross,
+    fresh_thresholds,
     key_of,
-    load_levels,
-    move_memories,
+    leave_levels,
+    load_thresholds,
     room,
 )
 from vid2ev.kernels.forced import place_of_candidate
@@ -46,7 +48,6 @@ from vid2ev.physics.photoreceptor import (
 from vid2ev.physics.photoreceptor_noise import rice_expected, rice_gap
 from vid2ev.physics.random import RICE, philox, unit
 
-FIRST = np.zeros(1, np.int64)  # the one live lane
 KNOTS = 8  # room for the ends of the pieces: three of the response, each cut once at most
 
 
@@ -193,11 +194,11 @@ def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, out, n, tally):
-    """`cross_all` for one pixel: (c_on, c_off, n)."""
+    """`cross` for one pixel: (c_on, c_off, out, n)."""
     pixels[0] = pixel
     lanes[AT], lanes[WHEN], lanes[UP], lanes[LABEL] = at, s, 1.0 if up else 0.0, label
-    n = cross_all(lanes, pixels, 1, FIRST, 1, planes, flags, num, iv, out, n, tally)
-    return lanes[LEVEL_ON], lanes[LEVEL_OFF], n
+    out, n = cross(lanes, pixels, 1, planes, flags, num, iv, out, n, tally)
+    return lanes[LEVEL_ON], lanes[LEVEL_OFF], out, n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -210,8 +211,9 @@ def walk_pixel(
     knots_of(path, knots)
     good = block[HIGH * PITCH + i] < np.inf or block[LOW * PITCH + i] > -np.inf  # a bad pixel has no levels
     pixels[0] = pixel
-    load_levels(lanes, pixels, 1, planes, flags, num)
-    on, off = lanes[LEVEL_ON] if good else np.inf, lanes[LEVEL_OFF] if good else -np.inf
+    load_thresholds(lanes, pixels, 1, planes, flags, num)
+    on = lanes[AT] + lanes[LEVEL_ON] if good else np.inf
+    off = lanes[AT] - lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
     piece, s, solved, candidate = 0, 0.0, 0, 0
     blind_until = -1.0  # end of a refractory period of the kind `track`
@@ -227,7 +229,6 @@ def walk_pixel(
         blind_s = blind_until if blind else 2.0
         stop = min(min(knots[piece], forced_s), min(rice_s, blind_s))
         end = value(path, stop)
-        out = room(out, n, 1)
         if not blind and (end >= on or end <= off):
             up = end >= on
             at = on if up else off
@@ -237,7 +238,7 @@ def walk_pixel(
                 tally[CAPPED] += 1
                 here, at = stop, end
             s = here
-            on, off, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
+            on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
             if len(flags.track):
                 blind_until = s + num.refractory_ns / iv.dt_ns
             if rice:
@@ -247,11 +248,12 @@ def walk_pixel(
         s = stop
         if stop == blind_s:
             pixels[0], lanes[AT] = pixel, end
-            move_memories(lanes, pixels, 1, FIRST, 1, planes, flags, num)
+            fresh_thresholds(lanes, pixels, EVERY, 1, planes, flags, num)
+            leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
             blind_until = -1.0
         elif stop == forced_s:
-            on, off, n = force(
+            on, off, out, n = force(
                 lanes, pixels, pixel, path, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
             )
             if len(flags.track):
@@ -262,7 +264,7 @@ def walk_pixel(
             candidate += 1
             if polarity != 0 and not blind:
                 at = on if polarity > 0 else off
-                on, off, n = cross_one(
+                on, off, out, n = cross_one(
                     lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
                 )
             rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
@@ -277,15 +279,16 @@ def walk_pixel(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
-    """A forced candidate at s, where the signal is `end`: (c_on, c_off, n)."""
+    """A forced candidate at s, where the signal is `end`: (c_on, c_off, out, n)."""
     t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)
     blind = len(flags.refractory) > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns
     if chance == 0.0:  # a hot pixel
         if not blind:
             planes.t_last[pixel % planes.t_last.size] = t_ns
+            out = room(out, n, 1)
             out[n] = key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv)
             n += 1
-        return on, off, n
+        return on, off, out, n
     if on == np.inf or (blind and len(flags.track)):
-        return on, off, n
+        return on, off, out, n
     return cross_one(lanes, pixels, pixel, chance > 0.0, end, s, SHOT, planes, flags, num, iv, out, n, tally)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN, cross_all, room
+from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
 from vid2ev.kernels.layout import BLOCK, HIGH, PITCH
@@ -54,12 +54,3 @@ def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots,
         keys[k], chance[k] = keys[others[k]], chance[others[k]]
         flagged[place_of_candidate(keys[k], iv)[0]] = 1
     return left, shots
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def fire(lanes, pixels, live, shots, planes, flags, num, iv, out, n, tally):
-    """Send the loaded shots; returns (out, n)."""
-    for k in range(shots):
-        live[k] = k
-    out = room(out, n, shots)
-    return out, cross_all(lanes, pixels, shots, live, shots, planes, flags, num, iv, out, n, tally)

@@ -1,7 +1,6 @@
 """Slow path for a comparator input that is a straight line in nats between frames: crossing times in closed form.
 
-That is ESIM's model (no filter, or `timing = "linear"`), and `timing = "frame"`, where only the order is kept.  The
-flagged pixels of a block become lanes; each round takes the next crossing of every lane that has one.
+That is ESIM's model (no filter, or `timing = "linear"`), and `timing = "frame"`, where only the order is kept.
 """
 
 from __future__ import annotations
@@ -9,25 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernels.crossing import (
-    AT,
-    FREE,
-    LABEL,
-    LEVEL_OFF,
-    LEVEL_ON,
-    UP,
-    WHEN,
-    cross_all,
-    keep_lanes,
-    over_cap,
-    reached_lanes,
-    room,
-)
-from vid2ev.kernels.layout import CAPPED, INPUT, LAG1, LAG2, PITCH
+from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
+from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
+from vid2ev.kernels.layout import INPUT, LAG1, LAG2, PITCH
 from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, OLD1, OLD2
 from vid2ev.physics.log_curve import log_level
 
-START, END, PER_NAT, SOLVED, REACHED, ADDED0, ADDED1 = (FREE + k * PITCH for k in range(7))
+START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * PITCH for k in range(4))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -60,7 +47,7 @@ def prepare_lines(lanes, count, flags, num, iv):
         if len(flags.noise):
             before, after = before + lanes[ADDED0 + j], after + lanes[ADDED1 + j]
         lanes[START + j], lanes[END + j], lanes[PER_NAT + j] = before, after, 1.0 / (after - before)
-        lanes[WHEN + j], lanes[SOLVED + j] = 0.0, 0.0
+        lanes[RUNGS + j] = 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -71,44 +58,46 @@ def to_nats(plane, count, num):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def next_crossings(lanes, count, flags, num):
-    """The next crossing of each lane into AT, WHEN and UP; REACHED is 1 where there is one.
-
-    Beyond the work cap the memory goes to the signal at the end of the interval, in one event.
-    """
-    cap = np.float64(num.max_crossings)
-    for j in range(count):
-        start, end, on, off = lanes[START + j], lanes[END + j], lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j]
-        up = end >= on
-        at = on if up else off
-        here = (at - start) * lanes[PER_NAT + j]
-        when = lanes[WHEN + j]
-        # (a NaN, from a line without a slope, keeps the earlier time)
-        when = min(here, 1.0) if here > when else when
-        if len(flags.frame_time):
-            when = 1.0
-        rest = lanes[SOLVED + j] >= cap
-        lanes[SOLVED + j] += 1.0
-        reached = up | (end <= off)
-        lanes[REACHED + j] = 1.0 if reached else 0.0
-        lanes[END + j] = end if reached else np.nan  # a lane that is through stays so
-        lanes[UP + j], lanes[LABEL + j] = 1.0 if up else 0.0, 0.0
-        lanes[AT + j] = end if rest else at
-        lanes[WHEN + j] = 1.0 if rest else when
+def line_times(levels, when, who, count, lanes, flags):
+    """Times of a batch of crossings."""
+    for k in range(count):
+        j = who[k]
+        here = (levels[k] - lanes[START + j]) * lanes[PER_NAT + j]
+        # (a NaN, from a line without a slope, is its start)
+        when[k] = 1.0 if len(flags.frame_time) else (min(here, 1.0) if here > 0.0 else 0.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def straight(lanes, pixels, live, count, enough, planes, flags, num, iv, out, n, tally):
-    """Rounds of crossings until at most `enough` lanes may have one left: (those lanes' number, out, n)."""
-    while True:
-        next_crossings(lanes, count, flags, num)
-        alive = reached_lanes(lanes, REACHED, count, live)
-        if 4 * alive < 3 * count:
-            keep_lanes(lanes, AT, REACHED, pixels, live, alive)
-            count = alive
-        tally[CAPPED] += over_cap(lanes, SOLVED, live, alive, num)
-        out = room(out, n, alive)
-        n = cross_all(lanes, pixels, count, live, alive, planes, flags, num, iv, out, n, tally)
-        if alive <= enough:
-            keep_lanes(lanes, WHEN, REACHED, pixels, live, alive)
-            return alive, out, n
+def send_lines(lanes, pixels, count, crossings, flags, num, iv, out, n):
+    """Keys of all crossings of lanes that have only to be counted, without a batch between: (out, n).
+
+    Most lanes have one or two, so two are made for each, in vector code, and counted if there are any.
+    """
+    out = room(out, n, crossings + 2)
+    stamps = np.empty(2 * PITCH, np.uint64)
+    for j in range(count):
+        first, rung = rung_times(lanes, j, flags, iv)
+        polarity = np.int64(lanes[UP + j])
+        stamps[j] = key_of(first, pixels[j], polarity, SIGNAL, iv)
+        stamps[PITCH + j] = key_of(first + rung, pixels[j], polarity, SIGNAL, iv)
+    for j in range(count):
+        rungs = np.int64(lanes[RUNGS + j])
+        out[n], out[n + 1] = stamps[j], stamps[PITCH + j]
+        if rungs > 2:
+            polarity = np.int64(lanes[UP + j])
+            first, rung = rung_times(lanes, j, flags, iv)
+            for k in range(2, rungs):
+                out[n + k] = key_of(first + k * rung, pixels[j], polarity, SIGNAL, iv)
+        n += rungs
+        if rungs > num.max_crossings:
+            out[n - 1] = key_of(iv.dt_ns, pixels[j], np.int64(lanes[UP + j]), SIGNAL, iv)
+    return out, n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rung_times(lanes, j, flags, iv):
+    """Time of lane j's first rung, and from one to the next [ns since t0]."""
+    if len(flags.frame_time):
+        return iv.dt_ns, 0.0
+    per_nat = lanes[PER_NAT + j] * iv.dt_ns
+    return (lanes[FIRST + j] - lanes[START + j]) * per_nat, lanes[STEP + j] * per_nat

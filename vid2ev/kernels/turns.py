@@ -6,6 +6,7 @@ the few that are not settled then, or turn twice, are finished one by one.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from vid2ev.kernels.layout import PITCH
@@ -40,24 +41,27 @@ def bracket_turns(turns, count, b):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve_turns(turns, count, b):
-    """The first turning point of each lane."""
+def start_turns(turns, count):
+    """Start in the middle of each bracket."""
     for k in range(count):
-        rise, a, rises = turns[RISE + k], turns[A + k], turns[AT_0 + k] > 0.0
-        k1, k2 = a * turns[C1 + k], b * turns[C2 + k]
-        lo, hi = turns[LO + k], turns[HI + k]
-        s, step = 0.5 * (lo + hi), 1.0
-        for _ in range(4):
-            p1, p2 = k1 * exp64(-a * s), k2 * exp64(-b * s)
-            f, d, dd = rise - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
-            same = (f > 0.0) == rises
-            lo, hi = s if same else lo, hi if same else s
-            move = -(f * d) / (d * d - 0.5 * f * dd)
-            there = s + move
-            good = (there >= lo) & (there <= hi)
-            # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-            s, step = there if good else 0.5 * (lo + hi), max(abs(move), abs(f / d)) if good else 1.0
-        turns[ROOT + k], turns[STEP + k] = s, step * max(1.0, max(a, b))
+        turns[ROOT + k] = 0.5 * (turns[LO + k] + turns[HI + k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def step_turns(turns, count, b):
+    """One bracketed step towards the first turning point of each lane."""
+    for k in range(count):
+        rise, a, s = turns[RISE + k], turns[A + k], turns[ROOT + k]
+        p1, p2 = a * turns[C1 + k] * exp64(-a * s), b * turns[C2 + k] * exp64(-b * s)
+        f, d, dd = rise - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
+        same = (f > 0.0) == (turns[AT_0 + k] > 0.0)
+        lo, hi = s if same else turns[LO + k], turns[HI + k] if same else s
+        move = -(f * d) / (d * d - 0.5 * f * dd)
+        there = s + move
+        good = (there >= lo) & (there <= hi)
+        # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
+        turns[ROOT + k] = there if good else 0.5 * (lo + hi)
+        turns[STEP + k] = max(abs(move), abs(f / d)) * max(1.0, max(a, b)) if good else np.inf
         turns[LO + k], turns[HI + k] = lo, hi
 
 
@@ -76,7 +80,9 @@ def find_turns(turns, count, b):
     y0.
     """
     bracket_turns(turns, count, b)
-    solve_turns(turns, count, b)
+    start_turns(turns, count)
+    for _ in range(4):
+        step_turns(turns, count, b)
     for k in range(count):
         if turns[KIND + k] != NEVER and not turns[STEP + k] < ENOUGH:
             rise, c1, c2, a = turns[RISE + k], turns[C1 + k], turns[C2 + k], turns[A + k]

@@ -1,0 +1,210 @@
+"""The slow path: events of the pixels that the scan flagged, some blocks' worth at a time.
+
+Monotone piece by monotone piece: which levels are reached (`ladder`), when (`straight` or `response`), and what that
+leaves behind and sends (`crossing`).  Which of them a walk needs is known from the types of its flags, so `overload`
+picks it, and numba compiles no other.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.core.extending import overload
+
+from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
+from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, next_rungs
+from vid2ev.kernels.layout import BLOCK
+from vid2ev.kernels.response import GUESSES, JOBS, LANES, load_responses, next_pieces, prepare_responses, response_times
+from vid2ev.kernels.scan import OPTIONS
+from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
+from vid2ev.kernels.turns import TURNS
+
+
+class Work(NamedTuple):
+    """Scratch: lanes and the pixels in them, a batch of crossings (lane, level, time), and what finding times needs."""
+
+    lanes: np.ndarray  # float64
+    pixels: np.ndarray  # int64
+    live: np.ndarray  # int64
+    who: np.ndarray  # int64
+    levels: np.ndarray  # float64 [nat]
+    when: np.ndarray  # float64, fraction of the interval
+    jobs: np.ndarray  # float64
+    guesses: np.ndarray  # float32
+    turns: np.ndarray  # float64
+
+
+@njit(cache=True, nogil=True)
+def new_work():
+    """Scratch for BLOCK lanes."""
+    return Work(
+        np.empty(LANES, np.float64),
+        np.empty(BLOCK, np.int64),
+        np.empty(BLOCK + 1, np.int64),
+        np.empty(BLOCK, np.int64),
+        np.empty(BLOCK, np.float64),
+        np.empty(BLOCK, np.float64),
+        np.empty(JOBS, np.float64),
+        np.empty(GUESSES, np.float32),
+        np.empty(TURNS, np.float64),
+    )
+
+
+def is_on(flags, name):
+    """Whether a flag is on, from the numba type of the flags."""
+    return len(flags.types[flags.fields.index(name)]) > 0
+
+
+def load(block, scratch, lanes, pixels, hits, count, p0, flags):
+    """Load the flagged pixels of a block into lanes."""
+
+
+def prepare(work, count, flags, num, iv):
+    """Make the signals of the loaded lanes, each on its first monotone piece."""
+
+
+def take_piece(work, count, planes, flags, num, iv, out, n, tally):
+    """Events of each lane's piece, the memories in AT: (out, n)."""
+
+
+def find_times(work, count, flags, num, iv):
+    """The times `when` of a batch of crossings."""
+
+
+def go_on(work, count, flags, num, iv):
+    """Keep the lanes with another piece, and move them to it; returns their number."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def climb(work, count, planes, flags, num, iv, out, n, tally):
+    """All events of `count` loaded lanes: (out, n)."""
+    prepare(work, count, flags, num, iv)
+    while count > 0:
+        load_thresholds(work.lanes, work.pixels, count, planes, flags, num)
+        if len(flags.labels):
+            work.lanes[LABEL : LABEL + count] = 0.0
+        out, n = take_piece(work, count, planes, flags, num, iv, out, n, tally)
+        leave_levels(work.lanes, work.pixels, count, planes, flags, num)
+        count = go_on(work, count, flags, num, iv)
+    return out, n
+
+
+@overload(load, jit_options=OPTIONS)
+def _load(block, scratch, lanes, pixels, hits, count, p0, flags):
+    loader = load_lines if is_on(flags, "straight") else load_responses
+
+    def load_them(block, scratch, lanes, pixels, hits, count, p0, flags):
+        loader(block, scratch, lanes, pixels, hits, count, p0, flags)
+
+    return load_them
+
+
+@overload(prepare, jit_options=OPTIONS)
+def _prepare(work, count, flags, num, iv):
+    if is_on(flags, "straight"):
+
+        def lines(work, count, flags, num, iv):
+            prepare_lines(work.lanes, count, flags, num, iv)
+
+        return lines
+
+    def responses(work, count, flags, num, iv):
+        b = iv.b if len(flags.poles) == 2 else 0.0
+        prepare_responses(work.lanes, work.turns, work.live, count, b, flags, num, iv)
+
+    return responses
+
+
+@overload(find_times, jit_options=OPTIONS)
+def _find_times(work, count, flags, num, iv):
+    if is_on(flags, "straight"):
+
+        def lines(work, count, flags, num, iv):
+            line_times(work.levels, work.when, work.who, count, work.lanes, flags)
+
+        return lines
+
+    def responses(work, count, flags, num, iv):
+        b = iv.b if len(flags.poles) == 2 else 0.0
+        response_times(work.levels, work.when, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num)
+
+    return responses
+
+
+@overload(go_on, jit_options=OPTIONS)
+def _go_on(work, count, flags, num, iv):
+    if is_on(flags, "straight"):
+        return lambda work, count, flags, num, iv: 0
+
+    def responses(work, count, flags, num, iv):
+        b = iv.b if len(flags.poles) == 2 else 0.0
+        return next_pieces(work.lanes, work.pixels, work.live, count, b, flags, num)
+
+    return responses
+
+
+@overload(take_piece, jit_options=OPTIONS)
+def _take_piece(work, count, planes, flags, num, iv, out, n, tally):
+    if is_on(flags, "crossing_noise"):
+        return _drawn_levels
+    in_turn = is_on(flags, "refractory") or (is_on(flags, "labels") and is_on(flags, "leak"))
+    if in_turn or not is_on(flags, "straight"):
+        return _steady_levels
+
+    def counted(work, count, planes, flags, num, iv, out, n, tally):
+        crossings = count_rungs(work.lanes, count, num, tally)
+        return send_lines(work.lanes, work.pixels, count, crossings, flags, num, iv, out, n)
+
+    return counted
+
+
+def _steady_levels(work, count, planes, flags, num, iv, out, n, tally):
+    count_rungs(work.lanes, count, num, tally)
+    j, rung = 0, 0
+    while j < count:
+        j, rung, waiting = fill_batch(work.lanes, work.who, work.levels, j, rung, count, num)
+        find_times(work, waiting, flags, num, iv)
+        out, n = send(work.when, work.who, waiting, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+    return out, n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_batch(lanes, who, levels, j, rung, count, num):
+    """Crossings from a rung of lane j on, as many as fit: (lane and rung that come next, how many)."""
+    waiting = 0
+    while j < count:
+        rungs, first, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
+        some = min(rungs, rung + BLOCK - waiting)
+        for k in range(rung, some):
+            who[waiting], levels[waiting] = j, first + k * step
+            waiting += 1
+        if some == num.max_crossings + 1:
+            levels[waiting - 1] = lanes[AT + j]
+        if some < rungs:
+            return j, some, waiting
+        j, rung = j + 1, 0
+    return j, 0, waiting
+
+
+def _drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
+    waiting = 0
+    while True:
+        alive = next_rungs(work.lanes, count, work.live, num, tally)
+        if waiting + alive > BLOCK or alive == 0:
+            find_times(work, waiting, flags, num, iv)
+            out, n = send(work.when, work.who, waiting, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+            waiting = 0
+        if alive == 0:
+            return out, n
+        add_to_batch(work.lanes, work.who, work.levels, work.live, alive, waiting)
+        waiting += alive
+        fresh_thresholds(work.lanes, work.pixels, work.live, alive, planes, flags, num)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add_to_batch(lanes, who, levels, live, alive, waiting):
+    """The crossings that the lanes live[:alive] have just made."""
+    for k in range(alive):
+        who[waiting + k], levels[waiting + k] = live[k], lanes[AT + live[k]]
