@@ -13,7 +13,7 @@ from vid2ev.kernels.crossing import AT, EVERY, FREE, LEVEL_ON, cross, fresh_thre
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
-from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, read_light, remember_input, scan
+from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, commit, read_light, scan
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.slow import climb, is_on, load, new_work
 from vid2ev.physics.comparator import initial_phase
@@ -66,8 +66,9 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
         block = planes.fast[index * stride : (index + 1) * stride]
+        rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
-        scan(block, scratch, flagged, p0, size, flags, num, iv)
+        scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
         if shots > BLOCK // 2:
             out, n = cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
             shots = np.int64(0)
@@ -84,7 +85,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
             used = np.int64(0)
         load(block, scratch, work.lanes[used:], work.pixels[used:], hits, count, p0, flags)
-        remember_input(block, scratch, size)
+        commit(block, scratch, size, flags)
         used += count
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
     return cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)

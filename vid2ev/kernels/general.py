@@ -35,8 +35,8 @@ from vid2ev.kernels.crossing import (
     room,
 )
 from vid2ev.kernels.forced import place_of_candidate
-from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LAG1, LAG2, LOW, PITCH
-from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, OLD1, OLD2
+from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LOW, PITCH
+from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.log_curve import Curve, log_level, log_slope
 from vid2ev.physics.photoreceptor import (
     response,
@@ -76,12 +76,12 @@ def path_of(block, scratch, i, flags, num, iv):
     if len(flags.noise):
         base += scratch[NOISE0 + i]
         drift += np.float64(scratch[NOISE1 + i]) - np.float64(scratch[NOISE0 + i])
-    e1 = np.float64(scratch[OLD1 + i]) if poles > 0 else 0.0
-    e2 = np.float64(scratch[OLD2 + i]) if two else 0.0
+    e1 = old_lag(block, scratch, 1, i, flags) if poles > 0 else 0.0
+    e2 = old_lag(block, scratch, 2, i, flags) if two else 0.0
     lag = e2 if two else e1
     after = np.float64(scratch[NEW + i])
     if poles > 0:
-        after -= block[(LAG2 if two else LAG1) * PITCH + i]
+        after -= new_lag(scratch, poles, i, flags)
     if len(flags.straight):
         start = u0 - lag
         if len(flags.log_input) == 0:

@@ -83,11 +83,11 @@ class Interval(NamedTuple):
     first_us: int  # the integer microsecond at or before t0
     offset_ns: float  # t0 after that microsecond
     last_us: int  # the last microsecond that an event may have, counted from first_us
-    x1: np.float32
-    w1: np.float32
-    x2: np.float32
-    g: np.float32
-    w2: np.float32
+    x1: float
+    w1: float
+    x2: float
+    g: float
+    w2: float
     a: float  # dt / tau1, the faster clock of a light-dependent pole being formed per pixel
     b: float  # dt / tau2
     leak0: float  # leak since its reference at the start [nat]
@@ -108,6 +108,7 @@ class Planes(NamedTuple):
     """State of the pixels; a plane that nothing uses has one entry."""
 
     fast: np.ndarray  # float32, blocks x planes x BLOCK
+    rest: np.ndarray  # float32, blocks x 2 x PITCH: what steep lags have beyond float32 (scan.refine)
     memory: np.ndarray  # float64 [n]: the level that each pixel memorised [nat]
     theta: np.ndarray  # float32 [2 n]: its ON and OFF threshold [nat]
     drawn: np.ndarray  # float32 [2 n]: the same with the noise of the crossing to come

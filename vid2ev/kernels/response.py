@@ -1,9 +1,9 @@
 """Slow path for the filter's response: crossing times by a root of the closed form, many at a time.
 
 The flagged pixels of some blocks become lanes.  Each lane holds its response, y(s) = y0 + rise s + c1 (e^-as - 1) +
-c2 (e^-bs - 1), and the monotone piece [s0, s1] it is in.  Which levels a piece reaches is known from its end (`ladder`);
-the times are then roots in [s0, s1], found for a batch at a time: four steps of Halley's method in float32, and as
-many in float64 as it takes, vector code all of it.  What that does not settle is finished by a bracketed search.
+c2 (e^-bs - 1), and the monotone piece [s0, s1] it is in.  Which levels a piece reaches is known from its end
+(`ladder`); the times are then roots in [s0, s1], found for a batch at a time: four steps of Halley's method in float32,
+and as many in float64 as it takes, vector code all of it.  What is not settled then is finished by a bracketed search.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from numba import njit
 
 from vid2ev.kernels import turns as T
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED, RUNGS, keep_lanes, reached_lanes
-from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, PITCH
-from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, OLD1, OLD2
+from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH
+from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64
 from vid2ev.physics.log_curve import light_at, log_level
 from vid2ev.physics.photoreceptor import response, response_terms, separate_rates
@@ -46,10 +46,10 @@ def load_responses(block, scratch, lanes, pixels, hits, count, p0, flags):
         lanes[Y0 + j], lanes[RISE + j], lanes[LAST + j] = old, new - old, new
         lanes[UPPER + j], lanes[LOWER + j] = block[HIGH * PITCH + i], block[LOW * PITCH + i]
         if len(flags.poles):
-            lanes[LAST + j] = new - block[(LAG1 if len(flags.poles) == 1 else LAG2) * PITCH + i]
-            lanes[C1 + j] = scratch[OLD1 + i]
+            lanes[LAST + j] = new - new_lag(scratch, len(flags.poles), i, flags)
+            lanes[C1 + j] = old_lag(block, scratch, 1, i, flags)
         if len(flags.poles) == 2:
-            lanes[C2 + j] = scratch[OLD2 + i]
+            lanes[C2 + j] = old_lag(block, scratch, 2, i, flags)
         if len(flags.light_bandwidth):
             lanes[A + j] = scratch[CLOCK + i]
         if len(flags.noise):

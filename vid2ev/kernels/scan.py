@@ -20,12 +20,14 @@ F = np.float32
 OPTIONS = {"nogil": True, "error_model": "numpy"}
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
 BRIGHTEST = F(1e30)
+STEEP = 2.0
 
-# Planes of the scratch of one block: the new light, the new input of the filter and its output, the lags before, the
-# sign of a turning point, the clock of the first pole (dt/tau1), the noise and the comparator's input without it,
-# before and after.
-LIGHT, NEW, FILTERED, OLD1, OLD2, TURN, CLOCK, NOISE0, NOISE1, SEEN0, SEEN1 = (k * PITCH for k in range(11))
-SCRATCH = 11 * PITCH
+# Planes of the scratch of one block: the new light, input of the filter and lags; the clock of the first pole
+# (dt/tau1); the noise before and after, the comparator's input without it; what the lags before and after have beyond
+# their float32 (`refine`).
+LIGHT, NEW, NEW1, NEW2, CLOCK, NOISE0, NOISE1, SEEN, OLD_REST1, OLD_REST2, REST1, REST2 = (k * PITCH for k in range(12))
+REFINED = 12 * PITCH  # more than 0 where one of the last four is not
+SCRATCH = 12 * PITCH + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -71,49 +73,100 @@ def _take_light(scratch, light, lut, tally):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def scan(block, scratch, flagged, p0, n, flags, num, iv):
-    """Advance the lags of a block by one interval and flag the pixels that may cross a level in it.
+def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
+    """Find the state of a block after one interval, and flag the pixels that may cross a level in it.
 
-    `block` is the float32 state of the block, planes of BLOCK; `scratch` holds the new light and receives what the slow
-    path needs of the old state.  The plane INPUT is left as it was: `remember_input` follows when that is no longer
-    needed.
+    `block` is the float32 state of the block, planes of PITCH, and stays as it is: the new input and lags go to
+    `scratch`, and into the block with `commit` when the slow path no longer needs the old ones.
     """
     poles = len(flags.poles)
     if len(flags.log_input):
-        log_light(scratch, n, num)
+        log_light(scratch, n, flags, num)
+    if len(flags.light_bandwidth):
+        set_clock(block, scratch, n, flags, num, iv)
     if len(flags.noise):
         advance_noise(block, scratch, p0, n, poles, num, iv)
-    if poles > 0:
-        advance_lags(block, scratch, n, flags, num, iv)
-    seen = (LAG1 + poles + 2) * PITCH
-    for i in range(n):
-        y = scratch[FILTERED + i] if poles > 0 else scratch[NEW + i]
-        if len(flags.log_compare):
-            if not len(flags.log_input):
-                y = log_level_32(max(y, F(0.0)), num.curve)
-            y = y + F(iv.leak1)
-            if len(flags.noise):
-                scratch[SEEN0 + i], scratch[SEEN1 + i] = block[seen + i], y
-                block[seen + i] = y
-                y = y + scratch[NOISE1 + i]
-        elif len(flags.leak):
-            y = y * iv.gain + iv.shift
-        high, low = block[HIGH * PITCH + i], block[LOW * PITCH + i]
-        flag = (y >= high) | (y <= low)
-        if (poles > 0) & (len(flags.straight) == 0):
-            flag = flag | (scratch[TURN + i] < F(0.0)) & may_reach(block, scratch, i, high, low, flags, iv)
-        flagged[i] = np.uint8(flag)
+    steep = advance(block, scratch, flagged, n, flags, num, iv)
+    if (poles > 0) & (len(flags.log_input) == 0):
+        if steep > 0 or scratch[REFINED] > F(0.0):
+            for plane in (OLD_REST1, OLD_REST2, REST1, REST2):
+                scratch[plane : plane + n] = F(0.0)
+            scratch[REFINED] = F(steep)
+        if steep > 0:
+            refine(block, rest, scratch, n, flags, num, iv)
+            for i in range(n):
+                flagged[i] = np.uint8(reaches(block, scratch, i, flags, num, iv))
     if len(flags.noise) and not iv.noise_resolved:
-        flag_rice(block, scratch, flagged, p0, n, num, iv)
+        flag_rice(block, scratch, flagged, p0, n, flags, num, iv)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def may_reach(block, scratch, i, high, low, flags, iv):
+def advance(block, scratch, flagged, n, flags, num, iv):
+    """One step of the poles and the flags that follow; returns how many pixels are too steep for float32."""
+    poles, steep = len(flags.poles), np.int32(0)
+    x1, w1, x2, g, w2 = F(iv.x1), F(iv.w1), F(iv.x2), F(iv.g), F(iv.w2)
+    for i in range(n):
+        if poles > 0:
+            du, e1 = scratch[NEW + i] - block[INPUT * PITCH + i], block[LAG1 * PITCH + i]
+            if len(flags.light_bandwidth):
+                x1, w1, x2, g, w2 = light_weights(scratch[CLOCK + i], F(iv.b), flags)
+            scratch[NEW1 + i] = (e1 - x1 * e1) + w1 * du
+            if poles > 1:
+                e2 = block[LAG2 * PITCH + i]
+                scratch[NEW2 + i] = (e2 - x2 * e2) + (g * e1 + w2 * du)
+            if len(flags.log_input) == 0:
+                steep = np.int32(steep + np.int32(was_steep(block, i, flags, num) | gets_steep(scratch, i, flags, num)))
+        flagged[i] = np.uint8(reaches(block, scratch, i, flags, num, iv))
+    return steep
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def light_weights(clock, b, flags):
+    """Weights of a step for one pixel's dt / tau1."""
+    if len(flags.poles) > 1:
+        return light_weights_32(clock, b)
+    x1 = -expm1_32(-clock)
+    return x1, x1 / clock, x1, x1, x1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def reaches(block, scratch, i, flags, num, iv):
+    """Whether pixel i may cross a level in the interval."""
+    poles = len(flags.poles)
+    y = scratch[NEW + i]
+    if poles > 0:
+        y = y - scratch[(NEW1 if poles == 1 else NEW2) + i]
+    if len(flags.log_compare):
+        if not len(flags.log_input):
+            y = log_level_32(max(y, F(0.0)), num.curve)
+        y = y + F(iv.leak1)
+        if len(flags.noise):
+            scratch[SEEN + i] = y
+            y = y + scratch[NOISE1 + i]
+    elif len(flags.leak):
+        y = y * iv.gain + iv.shift
+    flag = (y >= block[HIGH * PITCH + i]) | (y <= block[LOW * PITCH + i])
+    if (poles > 0) & (len(flags.straight) == 0):
+        flag = flag | turns_at(block, scratch, i, flags) & may_reach(block, scratch, i, flags, iv)
+    return flag
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def turns_at(block, scratch, i, flags):
+    """Whether the slope of either pole changes its sign: only then can y turn within the interval."""
+    e1, new1 = block[LAG1 * PITCH + i], scratch[NEW1 + i]
+    if len(flags.poles) > 1:
+        return min(e1 * new1, (block[LAG2 * PITCH + i] - e1) * (scratch[NEW2 + i] - new1)) < F(0.0)
+    return e1 * new1 < F(0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def may_reach(block, scratch, i, flags, iv):
     """Whether the hull of an interval with a turning point reaches a level: y stays among inputs and first pole."""
     if len(flags.log_compare) and not len(flags.log_input):
         return True  # the hull in nats would cost another logarithm
     old, new = block[INPUT * PITCH + i], scratch[NEW + i]
-    first = old - scratch[OLD1 + i]
+    first = old - block[LAG1 * PITCH + i]
     top, bottom = max(old, max(new, first)), min(old, min(new, first))
     if len(flags.log_compare):
         top, bottom = top + F(iv.leak1), bottom + F(iv.leak0)
@@ -122,48 +175,16 @@ def may_reach(block, scratch, i, high, low, flags, iv):
             top, bottom = top + swing, bottom - swing
     elif len(flags.leak):
         top, bottom = top * iv.gain + iv.shift, bottom * iv.gain + iv.shift
-    return (top >= high) | (bottom <= low)
+    return (top >= block[HIGH * PITCH + i]) | (bottom <= block[LOW * PITCH + i])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_light(scratch, n, num):
-    """The new light to nats; the light itself stays in LIGHT."""
+def log_light(scratch, n, flags, num):
+    """The new light to nats; where the bandwidth depends on it, the light itself stays in LIGHT."""
     for i in range(n):
-        light = scratch[NEW + i]
-        scratch[LIGHT + i] = light
-        scratch[NEW + i] = log_level_32(light, num.curve)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def advance_lags(block, scratch, n, flags, num, iv):
-    """One step of the poles: new lags into the block; old lags, output, sign of a turning point into scratch."""
-    if len(flags.light_bandwidth):
-        set_clock(block, scratch, n, flags, num, iv)
-    x1, w1, x2, g, w2 = iv.x1, iv.w1, iv.x2, iv.g, iv.w2
-    for i in range(n):
-        new = scratch[NEW + i]
-        du = new - block[INPUT * PITCH + i]
-        e1 = block[LAG1 * PITCH + i]
-        scratch[OLD1 + i] = e1
         if len(flags.light_bandwidth):
-            if len(flags.poles) > 1:
-                x1, w1, x2, g, w2 = light_weights_32(scratch[CLOCK + i], F(iv.b))
-            else:
-                x1 = -expm1_32(-scratch[CLOCK + i])
-                w1 = x1 / scratch[CLOCK + i]
-        new1 = (e1 - x1 * e1) + w1 * du
-        block[LAG1 * PITCH + i] = new1
-        if len(flags.poles) > 1:
-            e2 = block[LAG2 * PITCH + i]
-            scratch[OLD2 + i] = e2
-            new2 = (e2 - x2 * e2) + (g * e1 + w2 * du)
-            block[LAG2 * PITCH + i] = new2
-            scratch[FILTERED + i] = new - new2
-            # Negative where the slope of either pole changes its sign: only then can y turn within the interval.
-            scratch[TURN + i] = min(e1 * new1, (e2 - e1) * (new2 - new1))
-        else:
-            scratch[FILTERED + i] = new - new1
-            scratch[TURN + i] = e1 * new1
+            scratch[LIGHT + i] = scratch[NEW + i]
+        scratch[NEW + i] = log_level_32(scratch[NEW + i], num.curve)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -180,10 +201,17 @@ def set_clock(block, scratch, n, flags, num, iv):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def remember_input(block, scratch, n):
-    """The new input becomes the old."""
+def commit(block, scratch, n, flags):
+    """The new state takes the place of the old."""
+    poles = len(flags.poles)
     for i in range(n):
         block[INPUT * PITCH + i] = scratch[NEW + i]
+        if poles > 0:
+            block[LAG1 * PITCH + i] = scratch[NEW1 + i]
+        if poles > 1:
+            block[LAG2 * PITCH + i] = scratch[NEW2 + i]
+        if len(flags.noise):
+            block[(LAG1 + poles + 2) * PITCH + i] = scratch[SEEN + i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -205,10 +233,12 @@ def advance_noise(block, scratch, p0, n, poles, num, iv):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def flag_rice(block, scratch, flagged, p0, n, num, iv):
+def flag_rice(block, scratch, flagged, p0, n, flags, num, iv):
     """Flag the pixels in which unresolved photoreceptor noise may reach a level in this interval."""
+    before = (LAG1 + len(flags.poles) + 2) * PITCH
     for i in range(n):
-        top, bottom = max(scratch[SEEN0 + i], scratch[SEEN1 + i]), min(scratch[SEEN0 + i], scratch[SEEN1 + i])
+        was, seen = block[before + i], scratch[SEEN + i]
+        top, bottom = max(was, seen), min(was, seen)
         expected = rice_expected(block[HIGH * PITCH + i] - top, bottom - block[LOW * PITCH + i], num, iv)
         flagged[i] |= np.uint8(rice_gap(p0 + i, 0, num, iv) < 1.01 * expected)
 
@@ -223,3 +253,71 @@ def compared(into, levels, inward, count, flags, num):
         raised = num.curve.dark if len(flags.leak) else 0.0
         for j in range(count):
             into[j] = light_at(levels[j] + inward, num.curve) + raised
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def was_steep(block, i, flags, num):
+    """Whether pixel i's lags are too large against its signal for float32, before the interval."""
+    e1 = block[LAG1 * PITCH + i]
+    e2 = block[LAG2 * PITCH + i] if len(flags.poles) > 1 else e1
+    return is_steep(block[INPUT * PITCH + i], e1, e2, num)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gets_steep(scratch, i, flags, num):
+    """The same after it."""
+    e1 = scratch[NEW1 + i]
+    e2 = scratch[NEW2 + i] if len(flags.poles) > 1 else e1
+    return is_steep(scratch[NEW + i], e1, e2, num)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def is_steep(light, e1, e2, num):
+    """Whether half a unit in the last place of the lags is more than 1.2e-7 of what the logarithm sees."""
+    return max(abs(e1), abs(e2)) > F(STEEP) * ((light - e2) + F(num.curve.floor))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def refine(block, rest, scratch, n, flags, num, iv):
+    """Where lags are steep, step them in float64: `rest` holds what they have beyond float32.
+
+    It counts for the pixels that are steep, and a pixel that is not is left as it is, whatever its neighbours are.
+    """
+    x1, w1, x2, g, w2 = iv.x1, iv.w1, iv.x2, iv.g, iv.w2
+    for i in range(n):
+        was, gets = was_steep(block, i, flags, num), gets_steep(scratch, i, flags, num)
+        if not (was or gets):
+            continue
+        if len(flags.light_bandwidth):
+            x1, w1, x2, g, w2 = light_weights(scratch[CLOCK + i], F(iv.b), flags)
+        du = np.float64(scratch[NEW + i]) - np.float64(block[INPUT * PITCH + i])
+        if was:
+            scratch[OLD_REST1 + i], scratch[OLD_REST2 + i] = rest[i], rest[PITCH + i]
+        e1 = old_lag(block, scratch, 1, i, flags)
+        new1 = (e1 - x1 * e1) + w1 * du
+        scratch[NEW1 + i] = new1
+        scratch[REST1 + i] = new1 - np.float64(scratch[NEW1 + i])
+        if len(flags.poles) > 1:
+            e2 = old_lag(block, scratch, 2, i, flags)
+            new2 = (e2 - x2 * e2) + (g * e1 + w2 * du)
+            scratch[NEW2 + i] = new2
+            scratch[REST2 + i] = new2 - np.float64(scratch[NEW2 + i])
+        rest[i], rest[PITCH + i] = scratch[REST1 + i], scratch[REST2 + i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def old_lag(block, scratch, pole, i, flags):
+    """Pixel i's lag of a pole (1 or 2) before the interval, in float64."""
+    lag = np.float64(block[(LAG1 if pole == 1 else LAG2) * PITCH + i])
+    if len(flags.log_input) == 0:
+        lag += scratch[(OLD_REST1 if pole == 1 else OLD_REST2) + i]
+    return lag
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def new_lag(scratch, pole, i, flags):
+    """Pixel i's lag of a pole (1 or 2) after the interval, in float64."""
+    lag = np.float64(scratch[(NEW1 if pole == 1 else NEW2) + i])
+    if len(flags.log_input) == 0:
+        lag += scratch[(REST1 if pole == 1 else REST2) + i]
+    return lag

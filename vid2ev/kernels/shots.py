@@ -13,7 +13,7 @@ from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
 from vid2ev.kernels.layout import BLOCK, HIGH, PITCH
-from vid2ev.kernels.scan import TURN
+from vid2ev.kernels.scan import turns_at
 from vid2ev.physics.mismatch import FLOOR
 
 
@@ -27,7 +27,7 @@ def is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv):
         return False
     if j + 1 < forced and place_of_candidate(keys[j + 1], iv)[0] == i:
         return False
-    return len(flags.poles) == 0 or scratch[TURN + i] >= 0.0
+    return len(flags.poles) == 0 or not turns_at(block, scratch, i, flags)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -10,8 +10,8 @@ from numba import njit
 
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
-from vid2ev.kernels.layout import INPUT, LAG1, LAG2, PITCH
-from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, OLD1, OLD2
+from vid2ev.kernels.layout import INPUT, PITCH
+from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.log_curve import log_level
 
 START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * PITCH for k in range(4))
@@ -26,11 +26,11 @@ def load_lines(block, scratch, lanes, pixels, hits, count, p0, flags):
         pixels[j] = p0 + i
         before, after = np.float64(block[INPUT * PITCH + i]), np.float64(scratch[NEW + i])
         if poles == 1:
-            before -= scratch[OLD1 + i]
-            after -= block[LAG1 * PITCH + i]
+            before -= old_lag(block, scratch, 1, i, flags)
+            after -= new_lag(scratch, 1, i, flags)
         elif poles == 2:
-            before -= scratch[OLD2 + i]
-            after -= block[LAG2 * PITCH + i]
+            before -= old_lag(block, scratch, 2, i, flags)
+            after -= new_lag(scratch, 2, i, flags)
         lanes[START + j], lanes[END + j] = before, after
         if len(flags.noise):
             lanes[ADDED0 + j], lanes[ADDED1 + j] = scratch[NOISE0 + i], scratch[NOISE1 + i]

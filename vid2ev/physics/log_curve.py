@@ -48,16 +48,17 @@ class Curve(NamedTuple):
     log_knee: float
     slope: float
     black: float
+    floor: float  # the light that a share of light is to be seen against at black: 1 / slope there
 
 
 def curve_of(name: str, dark_level: float) -> Curve:
     """The numbers of a curve; `dark_level` is used by `offset` alone."""
     if name == "offset":
-        return Curve(dark_level, 0.0, -math.inf, 0.0, 0.0)
+        return Curve(dark_level, 0.0, -math.inf, 0.0, 0.0, dark_level)
     log_knee = math.log(KNEE)
     if name == "toe":
-        return Curve(0.0, KNEE, log_knee, 1.0 / KNEE, log_knee - 1.0)
-    return Curve(0.0, KNEE, log_knee, math.log(20.0) / KNEE, math.log(1.0 / 255.0))
+        return Curve(0.0, KNEE, log_knee, 1.0 / KNEE, log_knee - 1.0, KNEE)
+    return Curve(0.0, KNEE, log_knee, math.log(20.0) / KNEE, math.log(1.0 / 255.0), KNEE / math.log(20.0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vid2ev.kernels.layout import BLOCK, OFF, ON, Flags, Interval, Numbers, Planes, stride_of
+from vid2ev.kernels.layout import BLOCK, OFF, ON, PITCH, Flags, Interval, Numbers, Planes, stride_of
 from vid2ev.physics.bad_pixels import bad_pixel_map
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.mismatch import fill_thresholds
@@ -84,6 +84,7 @@ def planes_of(spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int
     remembers_events = flags.refractory or num.hot_rate_hz > 0
     planes = Planes(
         fast=np.empty(blocks * stride_of(flags), np.float32),
+        rest=np.zeros(2 * PITCH * blocks if flags.poles and not flags.log_input else 0, np.float32),
         memory=np.empty(pixels, np.float64),
         theta=theta,
         drawn=np.empty(2 * pixels if flags.crossing_noise else 0, np.float32),
@@ -117,11 +118,11 @@ def interval_of(
         first_us=first_us,
         offset_ns=float(t0_ns - first_us * 1000),
         last_us=max(t1_ns // 1000 - first_us, 1),
-        x1=F(weights.x1),
-        w1=F(weights.w1),
-        x2=F(weights.x2),
-        g=F(weights.g),
-        w2=F(weights.w2),
+        x1=weights.x1,
+        w1=weights.w1,
+        x2=weights.x2,
+        g=weights.g,
+        w2=weights.w2,
         a=dt / num.tau1_ns if num.tau1_ns > 0 else 0.0,
         b=dt / num.tau2_ns if num.tau2_ns > 0 else 0.0,
         leak0=leak0,

@@ -24,7 +24,7 @@ __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 LEAK_REBASE_NAT = 0.5
-STATE_PLANES = ("fast", "memory", "drawn", "t_last", "count", "t_reset")
+STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
 
 
 class Dvs:
