@@ -12,7 +12,7 @@ from numba.core.extending import overload
 from vid2ev.kernels.crossing import AT, EVERY, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import KNOTS, walk_pixel
-from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LOW, PITCH, place_of, stride_of
+from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LANE_COUNT, LOW, PITCH, last_light, place_of, stride_of
 from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, commit, read_light, scan
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.slow import climb, is_on, load, new_work
@@ -58,7 +58,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     work, scratch = new_work(), np.zeros(SCRATCH, np.float32)
     flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
     one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
-    shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(BLOCK, np.int64)
+    shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(LANE_COUNT, np.int64)
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
     knots = np.empty(KNOTS, np.float64)
     n, used, shots = np.int64(0), np.int64(0), np.int64(0)
@@ -69,7 +69,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
-        if shots > BLOCK // 2:
+        if shots > LANE_COUNT // 2:
             out, n = cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
             shots = np.int64(0)
         keys, chance, forced, shots = take_forced(
@@ -81,12 +81,15 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv,
             out, n, tally,
         )  # fmt: skip
-        if used + count > BLOCK:
-            out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
-            used = np.int64(0)
-        load(block, scratch, work.lanes[used:], work.pixels[used:], hits, count, p0, flags)
+        first = np.int64(0)
+        while first < count:
+            if used == LANE_COUNT:
+                out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
+                used = np.int64(0)
+            some = min(count - first, LANE_COUNT - used)
+            load(block, scratch, work.lanes[used:], work.pixels[used:], hits[first:], some, p0, flags)
+            first, used = first + some, used + some
         commit(block, scratch, size, flags)
-        used += count
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
     return cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
 
@@ -188,7 +191,7 @@ def _take_general(
 def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, tally):
     """The state after a long time in this light: no lags, levels about the signal."""
     poles = len(flags.poles)
-    stride = (LAG1 + poles + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
+    stride = stride_of(flags)
     scratch = np.zeros(SCRATCH, np.float32)
     one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
     for index in range(first_block, last_block):
@@ -203,7 +206,7 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
             pixel = p0 + i
             u = scratch[NEW + i]
             if len(flags.light_bandwidth):
-                block[(LAG1 + poles + 3 * len(flags.noise)) * PITCH + i] = u
+                block[last_light(flags) + i] = u
             level = log_level(np.float64(u), num.curve)
             if len(flags.log_input):
                 u = log_level_32(u, num.curve)

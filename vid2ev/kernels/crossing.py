@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernels.layout import BLOCK, HIGH, LOW, PITCH, SWALLOWED, place_of, stride_of
+from vid2ev.kernels.layout import HIGH, LANE_COUNT, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.physics.crossing_noise import noisy_thresholds
 
@@ -19,10 +19,10 @@ SIGNAL, SHOT, LEAK, HOT = range(4)
 
 # Planes of the lanes that all slow paths share: memory [nat], thresholds (later levels) [nat], the levels as the scan
 # compares them; label, direction and time (fraction of the interval) of a crossing; what a draw of thresholds needs.
-AT, LEVEL_ON, LEVEL_OFF, SCAN_ON, SCAN_OFF, LABEL, UP, WHEN = (k * PITCH for k in range(8))
-DRAWN_ON, DRAWN_OFF, DRAWN_FOR, DRAWN_AT = ((8 + k) * PITCH for k in range(4))
-FREE = 12 * PITCH
-EVERY = np.arange(BLOCK)  # all lanes, for what takes a choice of them
+AT, LEVEL_ON, LEVEL_OFF, SCAN_ON, SCAN_OFF, LABEL, UP, WHEN = (k * LANE_PITCH for k in range(8))
+DRAWN_ON, DRAWN_OFF, DRAWN_FOR, DRAWN_AT = ((8 + k) * LANE_PITCH for k in range(4))
+FREE = 12 * LANE_PITCH
+EVERY = np.arange(LANE_COUNT)  # all lanes, for what takes a choice of them
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

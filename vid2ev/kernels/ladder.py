@@ -11,11 +11,11 @@ import numpy as np
 from numba import njit
 
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
-from vid2ev.kernels.layout import CAPPED, PITCH
+from vid2ev.kernels.layout import CAPPED, LANE_PITCH
 
 # Where the signal goes [nat]; crossings so far; the first level and the step to the next; whether there is one.
-END, RUNGS, FIRST, STEP, REACHED = (FREE + k * PITCH for k in range(5))
-AFTER_LADDER = FREE + 5 * PITCH
+END, RUNGS, FIRST, STEP, REACHED = (FREE + k * LANE_PITCH for k in range(5))
+AFTER_LADDER = FREE + 5 * LANE_PITCH
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -80,8 +80,8 @@ def reached_lanes(lanes, reached, count, live):
 @njit(cache=True, nogil=True, error_model="numpy")
 def keep_lanes(lanes, first, last, pixels, live, alive):
     """Move the lanes live[:alive] (ascending) to the front, in the planes from `first` to `last`."""
-    for start in range(first, last, PITCH):
-        plane = lanes[start : start + PITCH]
+    for start in range(first, last, LANE_PITCH):
+        plane = lanes[start : start + LANE_PITCH]
         for k in range(alive):
             plane[k] = plane[live[k]]
     for k in range(alive):

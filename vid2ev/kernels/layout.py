@@ -1,8 +1,8 @@
 """What the walk works on: planes of pixel state, numbers of the sensor, numbers of the interval, and flags.
 
-Pixels lie in blocks of 1024 in row-major order.  What the scan touches is interleaved by block (`fast`: block, plane,
-pixel), so that the compiler sees that planes do not overlap and the memory is read in one stream; what only the slow
-path touches is plain planes.
+Pixels lie in blocks of 2048 in row-major order.  What the scan touches is interleaved by block (`fast`: block, plane,
+pixel), so that the compiler sees that planes do not overlap and a block's work stays in the nearest caches; what only
+the slow path touches is plain planes.  The slow path takes pixels out into **lanes**, planes of its own.
 
 A **flag** is a tuple: empty when the effect is off, of length one when it is on.  Its type differs, so numba compiles a
 walk for each combination in use, and an effect that is off leaves no instruction behind.
@@ -17,9 +17,11 @@ from numba import njit
 
 from vid2ev.physics.log_curve import Curve
 
-BLOCK_BITS = 10
+BLOCK_BITS = 11  # larger, and the scratch leaves the cache; smaller, and each block starts too many streams
 BLOCK = 1 << BLOCK_BITS
-PITCH = BLOCK + 16  # distance of planes: at a power of two apart they would fight for the same lines of the cache
+LANE_COUNT = 1024
+# Distances of planes: at a power of two apart they would fight for the same lines of the cache.
+PITCH, LANE_PITCH = BLOCK + 16, LANE_COUNT + 16
 PIXEL_LIMIT = 1 << 25  # bits of the event key
 ON = (0,)
 OFF = ()
@@ -123,6 +125,12 @@ class Planes(NamedTuple):
 def stride_of(flags):
     """Length of a block in `fast` for these flags."""
     return (LAG1 + len(flags.poles) + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
+
+
+@njit(cache=True, nogil=True)
+def last_light(flags):
+    """Start of the plane of a block that has the light of the last frame, for a pole that depends on it."""
+    return (LAG1 + len(flags.poles) + 3 * len(flags.noise)) * PITCH
 
 
 @njit(cache=True, nogil=True)

@@ -13,7 +13,7 @@ from numba import njit
 
 from vid2ev.kernels import turns as T
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED, RUNGS, keep_lanes, reached_lanes
-from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH
+from vid2ev.kernels.layout import HIGH, INPUT, LANE_PITCH, LOW, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64
 from vid2ev.physics.log_curve import light_at, log_level
@@ -22,15 +22,15 @@ from vid2ev.physics.photoreceptor import response, response_terms, separate_rate
 F = np.float32
 # Planes of the lanes: the response, the piece, the end of the next piece and of the interval, the levels that the scan
 # compares; slopes and curvatures at both ends.
-Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, UPPER, LOWER = (AFTER_LADDER + k * PITCH for k in range(13))
-SLOPE0, SLOPE1, BEND0, BEND1, ADDED0, ADDED1 = (LOWER + (1 + k) * PITCH for k in range(6))
-LANES = ADDED1 + PITCH
+Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, UPPER, LOWER = (AFTER_LADDER + k * LANE_PITCH for k in range(13))
+SLOPE0, SLOPE1, BEND0, BEND1, ADDED0, ADDED1 = (LOWER + (1 + k) * LANE_PITCH for k in range(6))
+LANES = ADDED1 + LANE_PITCH
 # Planes of a batch: y0 less the target, the rest of the response, the piece, the last step.
-D0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, TO_S, FROM_Y, TO_Y, LAST_STEP = (k * PITCH for k in range(10))
-JOBS = LAST_STEP + PITCH
+D0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, TO_S, FROM_Y, TO_Y, LAST_STEP = (k * LANE_PITCH for k in range(10))
+JOBS = LAST_STEP + LANE_PITCH
 # Planes of a batch in float32.
-G_D0, G_RISE, G_C1, G_C2, G_A, G_S, G_LO, G_HI, G_UP = (k * PITCH for k in range(9))
-GUESSES = 9 * PITCH
+G_D0, G_RISE, G_C1, G_C2, G_A, G_S, G_LO, G_HI, G_UP = (k * LANE_PITCH for k in range(9))
+GUESSES = 9 * LANE_PITCH
 # Accepted last step, in units of the faster time constant: the method is of third order, with a large constant near a
 # turning point.
 ENOUGH = 2e-3

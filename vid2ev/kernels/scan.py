@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, types
 from numba.core.extending import overload
 
-from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH
+from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH, last_light
 from vid2ev.physics.elementary import expm1_32
 from vid2ev.physics.log_curve import light_at, log_level_32
 from vid2ev.physics.photoreceptor import light_weights_32
@@ -80,10 +80,6 @@ def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
     `scratch`, and into the block with `commit` when the slow path no longer needs the old ones.
     """
     poles = len(flags.poles)
-    if len(flags.log_input):
-        log_light(scratch, n, flags, num)
-    if len(flags.light_bandwidth):
-        set_clock(block, scratch, n, flags, num, iv)
     if len(flags.noise):
         advance_noise(block, scratch, p0, n, poles, num, iv)
     steep = advance(block, scratch, flagged, n, flags, num, iv)
@@ -105,11 +101,19 @@ def advance(block, scratch, flagged, n, flags, num, iv):
     """One step of the poles and the flags that follow; returns how many pixels are too steep for float32."""
     poles, steep = len(flags.poles), np.int32(0)
     x1, w1, x2, g, w2 = F(iv.x1), F(iv.w1), F(iv.x2), F(iv.g), F(iv.w2)
+    before, dark = last_light(flags), F(num.bandwidth_dark)
+    per_light = F(iv.a) / (F(1.0) + dark)
     for i in range(n):
+        if len(flags.light_bandwidth):
+            # dt / tau1 at the mean light of the interval, which for a ramp of light is its exact integral.
+            light = scratch[NEW + i]
+            mean = F(0.5) * (block[before + i] + light)
+            scratch[LIGHT + i], scratch[CLOCK + i] = light, max(per_light * (mean + dark), F(1e-9))
+            x1, w1, x2, g, w2 = light_weights(scratch[CLOCK + i], F(iv.b), flags)
+        if len(flags.log_input):
+            scratch[NEW + i] = log_level_32(scratch[NEW + i], num.curve)
         if poles > 0:
             du, e1 = scratch[NEW + i] - block[INPUT * PITCH + i], block[LAG1 * PITCH + i]
-            if len(flags.light_bandwidth):
-                x1, w1, x2, g, w2 = light_weights(scratch[CLOCK + i], F(iv.b), flags)
             scratch[NEW1 + i] = (e1 - x1 * e1) + w1 * du
             if poles > 1:
                 e2 = block[LAG2 * PITCH + i]
@@ -179,31 +183,9 @@ def may_reach(block, scratch, i, flags, iv):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log_light(scratch, n, flags, num):
-    """The new light to nats; where the bandwidth depends on it, the light itself stays in LIGHT."""
-    for i in range(n):
-        if len(flags.light_bandwidth):
-            scratch[LIGHT + i] = scratch[NEW + i]
-        scratch[NEW + i] = log_level_32(scratch[NEW + i], num.curve)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def set_clock(block, scratch, n, flags, num, iv):
-    """dt / tau1 of each pixel at the mean light of the interval, which for a ramp of light is its exact integral."""
-    last = (LAG1 + len(flags.poles) + 3 * len(flags.noise)) * PITCH
-    light = LIGHT if len(flags.log_input) else NEW
-    dark = F(num.bandwidth_dark)
-    per_light = F(iv.a) / (F(1.0) + dark)
-    for i in range(n):
-        mean = F(0.5) * (block[last + i] + scratch[light + i])
-        block[last + i] = scratch[light + i]
-        scratch[CLOCK + i] = max(per_light * (mean + dark), F(1e-9))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def commit(block, scratch, n, flags):
     """The new state takes the place of the old."""
-    poles = len(flags.poles)
+    poles, before = len(flags.poles), last_light(flags)
     for i in range(n):
         block[INPUT * PITCH + i] = scratch[NEW + i]
         if poles > 0:
@@ -212,6 +194,8 @@ def commit(block, scratch, n, flags):
             block[LAG2 * PITCH + i] = scratch[NEW2 + i]
         if len(flags.noise):
             block[(LAG1 + poles + 2) * PITCH + i] = scratch[SEEN + i]
+        if len(flags.light_bandwidth):
+            block[before + i] = scratch[LIGHT + i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

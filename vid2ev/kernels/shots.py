@@ -12,7 +12,7 @@ from numba import njit
 from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
-from vid2ev.kernels.layout import BLOCK, HIGH, PITCH
+from vid2ev.kernels.layout import HIGH, LANE_COUNT, PITCH
 from vid2ev.kernels.scan import turns_at
 from vid2ev.physics.mismatch import FLOOR
 
@@ -38,7 +38,7 @@ def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots,
     others, left = np.empty(forced, np.int64), 0
     for j in range(forced):
         i, s = place_of_candidate(keys[j], iv)
-        lonely = shots < BLOCK and is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv)
+        lonely = shots < LANE_COUNT and is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv)
         if lonely:
             path = path_of(block, scratch, i, flags, num, iv)
             here = value(path, s)

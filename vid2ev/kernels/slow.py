@@ -15,7 +15,7 @@ from numba.core.extending import overload
 
 from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, next_rungs
-from vid2ev.kernels.layout import BLOCK
+from vid2ev.kernels.layout import LANE_COUNT
 from vid2ev.kernels.response import GUESSES, JOBS, LANES, load_responses, next_pieces, prepare_responses, response_times
 from vid2ev.kernels.scan import OPTIONS
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
@@ -38,14 +38,14 @@ class Work(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def new_work():
-    """Scratch for BLOCK lanes."""
+    """Scratch for LANE_COUNT lanes."""
     return Work(
         np.empty(LANES, np.float64),
-        np.empty(BLOCK, np.int64),
-        np.empty(BLOCK + 1, np.int64),
-        np.empty(BLOCK, np.int64),
-        np.empty(BLOCK, np.float64),
-        np.empty(BLOCK, np.float64),
+        np.empty(LANE_COUNT, np.int64),
+        np.empty(LANE_COUNT + 1, np.int64),
+        np.empty(LANE_COUNT, np.int64),
+        np.empty(LANE_COUNT, np.float64),
+        np.empty(LANE_COUNT, np.float64),
         np.empty(JOBS, np.float64),
         np.empty(GUESSES, np.float32),
         np.empty(TURNS, np.float64),
@@ -176,7 +176,7 @@ def fill_batch(lanes, who, levels, j, rung, count, num):
     waiting = 0
     while j < count:
         rungs, first, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
-        some = min(rungs, rung + BLOCK - waiting)
+        some = min(rungs, rung + LANE_COUNT - waiting)
         for k in range(rung, some):
             who[waiting], levels[waiting] = j, first + k * step
             waiting += 1
@@ -192,7 +192,7 @@ def _drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
     waiting = 0
     while True:
         alive = next_rungs(work.lanes, count, work.live, num, tally)
-        if waiting + alive > BLOCK or alive == 0:
+        if waiting + alive > LANE_COUNT or alive == 0:
             find_times(work, waiting, flags, num, iv)
             out, n = send(work.when, work.who, waiting, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
             waiting = 0

@@ -10,11 +10,11 @@ from numba import njit
 
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
-from vid2ev.kernels.layout import INPUT, PITCH
+from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
 from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.log_curve import log_level
 
-START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * PITCH for k in range(4))
+START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * LANE_PITCH for k in range(4))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -74,15 +74,15 @@ def send_lines(lanes, pixels, count, crossings, flags, num, iv, out, n):
     Most lanes have one or two, so two are made for each, in vector code, and counted if there are any.
     """
     out = room(out, n, crossings + 2)
-    stamps = np.empty(2 * PITCH, np.uint64)
+    stamps = np.empty(2 * LANE_PITCH, np.uint64)
     for j in range(count):
         first, rung = rung_times(lanes, j, flags, iv)
         polarity = np.int64(lanes[UP + j])
         stamps[j] = key_of(first, pixels[j], polarity, SIGNAL, iv)
-        stamps[PITCH + j] = key_of(first + rung, pixels[j], polarity, SIGNAL, iv)
+        stamps[LANE_PITCH + j] = key_of(first + rung, pixels[j], polarity, SIGNAL, iv)
     for j in range(count):
         rungs = np.int64(lanes[RUNGS + j])
-        out[n], out[n + 1] = stamps[j], stamps[PITCH + j]
+        out[n], out[n + 1] = stamps[j], stamps[LANE_PITCH + j]
         if rungs > 2:
             polarity = np.int64(lanes[UP + j])
             first, rung = rung_times(lanes, j, flags, iv)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernels.layout import PITCH
+from vid2ev.kernels.layout import LANE_PITCH
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
 
-RISE, C1, C2, A, AT_0, AT_1, BEND, LO, HI, ROOT, STEP, KIND, VALUE = (k * PITCH for k in range(13))
-TURNS = 13 * PITCH
+RISE, C1, C2, A, AT_0, AT_1, BEND, LO, HI, ROOT, STEP, KIND, VALUE = (k * LANE_PITCH for k in range(13))
+TURNS = 13 * LANE_PITCH
 NEVER, ONCE, TWICE = 0.0, 1.0, 2.0
 ENOUGH = 1e-3  # last step, in units of the faster time constant: what is left is of third order in it
 
