@@ -6,14 +6,14 @@ Which slow path a walk needs is known from the types of its flags, so `overload`
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numba.core.extending import overload
 
-from vid2ev.kernels.crossing import AT, EVERY, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
+from vid2ev.kernel_cache import INNER_OPTIONS, compiled, inner
+from vid2ev.kernels.crossing import AT, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LANE_COUNT, LOW, PITCH, last_light, place_of, stride_of
-from vid2ev.kernels.scan import NEW, OPTIONS, SCRATCH, commit, read_light, scan
+from vid2ev.kernels.scan import NEW, SCRATCH, commit, read_light, scan
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.slow import climb, is_on, load, new_work
 from vid2ev.physics.comparator import initial_phase
@@ -22,7 +22,7 @@ from vid2ev.physics.log_curve import log_level, log_level_32
 _ADD_BYTES = np.uint64(0x0101010101010101)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def hits_of(flagged, hits):
     """Indices of the flagged pixels of a block into `hits` (BLOCK + 1 long); returns their number.
 
@@ -48,7 +48,7 @@ def hits_of(flagged, hits):
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, iv, out, tally):
     """Advance blocks first_block ... last_block - 1 by one interval; returns (keys, their number).
 
@@ -70,12 +70,13 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
         if shots > LANE_COUNT // 2:
-            out, n = cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
+            out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
             shots = np.int64(0)
         keys, chance, forced, shots = take_forced(
             block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
         )
-        flagged[size:] = 0
+        for i in range(size, BLOCK):
+            flagged[i] = 0
         count = hits_of(flagged, hits)
         count, out, n = take_general(
             block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv,
@@ -91,11 +92,28 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             first, used = first + some, used + some
         commit(block, scratch, size, flags)
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
-    return cross(shot_lanes, shot_pixels, shots, planes, flags, num, iv, out, n, tally)
+    return fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
 
 
 def take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
     """Load the shots of a block, flag the pixels of other forced events: (keys, chance, candidates left, shots)."""
+
+
+def fire(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
+    """Send the loaded shots: (out, n)."""
+
+
+@overload(fire, jit_options=INNER_OPTIONS)
+def _fire(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
+    if not is_on(flags, "forced"):
+        return lambda lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally: (out, n)
+
+    def some(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
+        for k in range(shots):
+            every[k] = k
+        return cross(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally)
+
+    return some
 
 
 def take_general(
@@ -111,7 +129,7 @@ def always_general(flags):
     return is_on(flags, "track") or (curved and (is_on(flags, "leak") or is_on(flags, "noise")))
 
 
-@overload(take_forced, jit_options=OPTIONS)
+@overload(take_forced, jit_options=INNER_OPTIONS)
 def _take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
     always = always_general(flags)
     if not is_on(flags, "forced"):
@@ -128,13 +146,15 @@ def _take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels,
             for j in range(forced):
                 flagged[place_of_candidate(keys[j], iv)[0]] = 1
         else:
-            forced, shots = aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, flags, num, iv)
+            forced, shots = aim(
+                block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv
+            )
         return keys, chance, forced, shots
 
     return some
 
 
-@overload(take_general, jit_options=OPTIONS)
+@overload(take_general, jit_options=INNER_OPTIONS)
 def _take_general(
     block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
 ):
@@ -187,18 +207,20 @@ def _take_general(
     return some
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, tally):
     """The state after a long time in this light: no lags, levels about the signal."""
     poles = len(flags.poles)
     stride = stride_of(flags)
     scratch = np.zeros(SCRATCH, np.float32)
     one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    first_lane = np.zeros(1, np.int64)
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
         block = planes.fast[index * stride : (index + 1) * stride]
-        block[:] = 0.0
+        for i in range(block.size):
+            block[i] = 0.0
         block[HIGH * PITCH : HIGH * PITCH + BLOCK] = np.inf
         block[LOW * PITCH : LOW * PITCH + BLOCK] = -np.inf
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
@@ -216,7 +238,7 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
                 block[(LAG1 + poles + 2) * PITCH + i] = level
             one_pixel[0] = pixel
             one_lane[AT] = level
-            fresh_thresholds(one_lane, one_pixel, EVERY, 1, planes, flags, num)
+            fresh_thresholds(one_lane, one_pixel, first_lane, 1, planes, flags, num)
             leave_levels(one_lane, one_pixel, 1, planes, flags, num)
             if random_phase:
                 phase = initial_phase(num.seed, num.camera, pixel)
@@ -231,7 +253,7 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
                 block[HIGH * PITCH + i], block[LOW * PITCH + i] = np.inf, -np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def shift_levels(pixels, by, planes, flags, num):
     """Lower all memories by `by` nats: what the leak has risen since its reference is taken into them."""
     stride = stride_of(flags)

@@ -9,9 +9,9 @@ loops that vectorise.  An event is a 64-bit key,
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernels.layout import HIGH, LANE_COUNT, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
+from vid2ev.kernel_cache import inner
+from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.physics.crossing_noise import noisy_thresholds
 
@@ -22,10 +22,9 @@ SIGNAL, SHOT, LEAK, HOT = range(4)
 AT, LEVEL_ON, LEVEL_OFF, SCAN_ON, SCAN_OFF, LABEL, UP, WHEN = (k * LANE_PITCH for k in range(8))
 DRAWN_ON, DRAWN_OFF, DRAWN_FOR, DRAWN_AT = ((8 + k) * LANE_PITCH for k in range(4))
 FREE = 12 * LANE_PITCH
-EVERY = np.arange(LANE_COUNT)  # all lanes, for what takes a choice of them
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_thresholds(lanes, pixels, count, planes, flags, num):
     """Memories [nat] into AT, thresholds [nat] into LEVEL_ON and LEVEL_OFF."""
     memory = planes.memory
@@ -34,14 +33,14 @@ def load_thresholds(lanes, pixels, count, planes, flags, num):
     if len(flags.crossing_noise) or len(flags.mismatch):
         theta = planes.drawn if len(flags.crossing_noise) else planes.theta
         for j in range(count):
-            lanes[LEVEL_ON + j] = theta[2 * pixels[j]]
-            lanes[LEVEL_OFF + j] = theta[2 * pixels[j] + 1]
+            lanes[LEVEL_ON + j] = theta[pixels[j], 0]
+            lanes[LEVEL_OFF + j] = theta[pixels[j], 1]
     else:
         for j in range(count):
             lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = num.threshold_on, num.threshold_off
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def thresholds_to_levels(lanes, count, flags, num):
     """From memories and thresholds to levels [nat], and to those that the scan compares."""
     for j in range(count):
@@ -51,7 +50,7 @@ def thresholds_to_levels(lanes, count, flags, num):
     compared(lanes[SCAN_OFF:], lanes[LEVEL_OFF:], MARGIN, count, flags, num)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
     """Thresholds [nat] of the lanes live[:alive], which have just crossed, into LEVEL_ON and LEVEL_OFF."""
     theta, drawn, crossings = planes.theta, planes.drawn, planes.count
@@ -59,7 +58,7 @@ def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
         j = live[k]
         lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = num.threshold_on, num.threshold_off
         if len(flags.mismatch):
-            lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = theta[2 * pixels[j]], theta[2 * pixels[j] + 1]
+            lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = theta[pixels[j], 0], theta[pixels[j], 1]
     if len(flags.crossing_noise):
         for k in range(alive):
             j, pixel = live[k], pixels[live[k]]
@@ -78,11 +77,11 @@ def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
             )
         for k in range(alive):  # the rounded thresholds are the thresholds, now and when they are read back
             j, pixel = live[k], pixels[live[k]]
-            drawn[2 * pixel], drawn[2 * pixel + 1] = lanes[DRAWN_ON + k], lanes[DRAWN_OFF + k]
-            lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = drawn[2 * pixel], drawn[2 * pixel + 1]
+            drawn[pixel, 0], drawn[pixel, 1] = lanes[DRAWN_ON + k], lanes[DRAWN_OFF + k]
+            lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = drawn[pixel, 0], drawn[pixel, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def leave_levels(lanes, pixels, count, planes, flags, num):
     """Memories AT and thresholds to levels, in the lanes and in the state."""
     memory, fast, stride = planes.memory, planes.fast, stride_of(flags)
@@ -94,17 +93,18 @@ def leave_levels(lanes, pixels, count, planes, flags, num):
         fast[at + LOW * PITCH] = np.float32(lanes[SCAN_OFF + j])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def room(out, n, more):
     """`out`, or a copy of at least twice the length where `more` keys after n would not fit."""
     if n + more <= out.size:
         return out
     longer = np.empty(max(2 * out.size, n + more), np.uint64)
-    longer[:n] = out[:n]
+    for i in range(n):  # (a slice would compile numpy's broadcasting, and its words for errors)
+        longer[i] = out[i]
     return longer
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def key_of(when_ns, pixel, polarity, label, iv):
     """The key of an event `when_ns` after t0: its time is the nearest microsecond in (t0, t1]."""
     k = np.int64((iv.offset_ns + when_ns) * 1e-3 + 0.5)
@@ -112,7 +112,7 @@ def key_of(when_ns, pixel, polarity, label, iv):
     return np.uint64((k << np.int64(28)) | (pixel << np.int64(3)) | (polarity << np.int64(2)) | label)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally):
     """Keys of crossings at the fractions `when` of the lanes `who`, without those in refractory periods.
 
@@ -140,15 +140,18 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
     return out, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def mostly_leak(since_ns, num):
     """Whether the leak makes more than half of the way to the ON level in this time."""
     return num.leak_nat_per_ns * np.float64(since_ns) > 0.5 * num.threshold_on
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def cross(lanes, pixels, count, planes, flags, num, iv, out, n, tally):
-    """One crossing in each lane: the memory AT [nat] is taken at WHEN.  Returns (out, n)."""
-    fresh_thresholds(lanes, pixels, EVERY, count, planes, flags, num)
+@inner
+def cross(lanes, pixels, every, count, planes, flags, num, iv, out, n, tally):
+    """One crossing in each lane: the memory AT [nat] is taken at WHEN; `every` counts the lanes.
+
+    Returns (out, n).
+    """
+    fresh_thresholds(lanes, pixels, every, count, planes, flags, num)
     leave_levels(lanes, pixels, count, planes, flags, num)
-    return send(lanes[WHEN:], EVERY, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
+    return send(lanes[WHEN:], every, count, lanes, pixels, planes, flags, num, iv, out, n, tally)

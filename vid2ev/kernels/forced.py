@@ -1,14 +1,14 @@
 """Events that the light does not cause: candidates of shot noise and hot pixels within one interval.
 
-Candidates belong to cells of a fixed 1 ms clock (and, for shot noise, to aligned blocks of 1024 pixels), so an interval
-takes from each cell it touches those that lie in (t0, t1], however the light is sampled.
+Candidates belong to cells (k, k + 1] of a fixed 1 ms clock (and, for shot noise, to aligned blocks of pixels), so an
+interval takes from each cell it touches those that lie in (t0, t1], however the light is sampled.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.layout import BLOCK, INPUT, PITCH
 from vid2ev.kernels.scan import NEW
 from vid2ev.physics.elementary import log64
@@ -19,17 +19,18 @@ from vid2ev.physics.shot import CELL_NS, shot_share
 _LOCAL = np.int64(52)  # bit at which the pixel stands in the key that orders candidates
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _add(keys, chance, n, local, since_t0, share):
     if n == keys.size:
         more_keys, more_chance = np.empty(2 * n, np.int64), np.empty(2 * n, np.float64)
-        more_keys[:n], more_chance[:n] = keys, chance
+        for i in range(n):
+            more_keys[i], more_chance[i] = keys[i], chance[i]
         keys, chance = more_keys, more_chance
     keys[n], chance[n] = (np.int64(local) << _LOCAL) | since_t0, share
     return keys, chance, n + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
     """Arrivals in a cell are equally likely anywhere in (pixels of the block) x (time): a walk of exponential gaps."""
     per_block = BLOCK * num.shot_rate_hz * CELL_NS * 1e-9
@@ -40,14 +41,14 @@ def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
         local = np.int64(place * BLOCK)
         if local >= pixels:
             return keys, chance, n
-        t_ns = cell * CELL_NS + np.int64(unit(words[1]) * CELL_NS)
+        t_ns = cell * CELL_NS + 1 + np.int64(unit(words[1]) * CELL_NS)
         if (t_ns > iv.t0_ns) & (t_ns <= last):
             polarity = 1.0 if words[3] & np.uint32(1) else -1.0
             keys, chance, n = _add(keys, chance, n, local, t_ns - iv.t0_ns, polarity * unit(words[2]))
         k += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
     gap_ns, k, last = 1e9 / num.hot_rate_hz, 0, iv.t0_ns + np.int64(iv.dt_ns)
     place = 0.0
@@ -56,13 +57,13 @@ def _hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
         place -= log64(unit(words[0])) * gap_ns
         if place >= CELL_NS:
             return keys, chance, n
-        t_ns = cell * CELL_NS + np.int64(place)
+        t_ns = cell * CELL_NS + 1 + np.int64(place)
         if (t_ns > iv.t0_ns) & (t_ns <= last):
             keys, chance, n = _add(keys, chance, n, pixel - p0, t_ns - iv.t0_ns, 0.0)
         k += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def candidates(keys, chance, p0, pixels, hot, num, iv):
     """Candidates of a block by pixel and time, into buffers that grow: (keys, chance, their number).
 
@@ -70,18 +71,17 @@ def candidates(keys, chance, p0, pixels, hot, num, iv):
     left at the light must exceed.
     """
     n = 0
-    first, last = iv.t0_ns // CELL_NS, (iv.t0_ns + np.int64(iv.dt_ns)) // CELL_NS
+    first, last = iv.t0_ns // CELL_NS, (iv.t0_ns + np.int64(iv.dt_ns) - 1) // CELL_NS
     if num.shot_rate_hz > 0.0:
         for cell in range(first, last + 1):
             keys, chance, n = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
     if num.hot_rate_hz > 0.0:
-        for h in range(np.searchsorted(hot, p0), np.searchsorted(hot, p0 + pixels)):
+        for h in range(first_from(hot, p0), first_from(hot, p0 + pixels)):
             for cell in range(first, last + 1):
                 keys, chance, n = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
     if n > 64:
-        order = np.argsort(keys[:n])
-        keys[:n], chance[:n] = keys[order], chance[order]
-    for i in range(1, min(n, 65)):  # few, and mostly in order: cheaper than a call
+        keys, chance = sorted_by_pixel(keys, chance, n)
+    for i in range(1, n):  # now mostly in order
         key, share, j = keys[i], chance[i], i
         while j > 0 and keys[j - 1] > key:
             keys[j], chance[j] = keys[j - 1], chance[j - 1]
@@ -90,13 +90,42 @@ def candidates(keys, chance, p0, pixels, hot, num, iv):
     return keys, chance, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
+def sorted_by_pixel(keys, chance, n):
+    """The first n candidates counted into the order of their pixels."""
+    start = np.zeros(BLOCK + 1, np.int64)
+    for i in range(n):
+        start[(keys[i] >> _LOCAL) + 1] += 1
+    for k in range(BLOCK):
+        start[k + 1] += start[k]
+    ordered, shares = np.empty(keys.size, np.int64), np.empty(keys.size, np.float64)
+    for i in range(n):
+        k = keys[i] >> _LOCAL
+        ordered[start[k]], shares[start[k]] = keys[i], chance[i]
+        start[k] += 1
+    return ordered, shares
+
+
+@inner
+def first_from(pixels, least):
+    """Index of the first of the ascending `pixels` that is at least `least`."""
+    low, high = 0, pixels.size
+    while low < high:
+        middle = (low + high) // 2
+        if pixels[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inner
 def place_of_candidate(key, iv):
     """(pixel of the block, fraction of the interval) of a candidate."""
     return key >> _LOCAL, np.float64(key & ((np.int64(1) << _LOCAL) - 1)) / iv.dt_ns
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def keep_likely(block, scratch, keys, chance, n, flags, num, iv):
     """Drop the candidates of shot noise that the light at their instant does not ask for; returns how many are left."""
     left = 0

@@ -14,11 +14,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.crossing import (
     AT,
-    EVERY,
     HOT,
     LABEL,
     LEVEL_OFF,
@@ -67,7 +66,7 @@ class Path(NamedTuple):
     curve: Curve
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def path_of(block, scratch, i, flags, num, iv):
     """The path of pixel i of the block."""
     poles, two = len(flags.poles), len(flags.poles) == 2
@@ -96,7 +95,7 @@ def path_of(block, scratch, i, flags, num, iv):
     return Path(u0 - lag, after, du, c1, c2, a, b, light, base, drift, num.curve)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def value(path, s):
     """F(s) [nat]."""
     y = path.end if s >= 1.0 else response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
@@ -105,7 +104,7 @@ def value(path, s):
     return y + path.base + path.drift * s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def slope(path, s):
     """dF/ds [nat per interval]."""
     d = response_slope(s, path.rise, path.c1, path.c2, path.a, path.b)
@@ -115,7 +114,7 @@ def slope(path, s):
     return d + path.drift
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def knots_of(path, knots):
     """Ends of the monotone pieces of F into `knots`, ascending, the last one 1.0.
 
@@ -147,7 +146,7 @@ def knots_of(path, knots):
             break
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def reach(path, level, lo, hi, up):
     """Where F reaches a level between lo and hi, a monotone piece whose end is at or beyond it."""
     if (value(path, lo) >= level) == up:
@@ -167,7 +166,7 @@ def reach(path, level, lo, hi, up):
     return s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def next_rice(path, knots, s, k, on, off, pixel, num, iv):
     """Candidate k of the unresolved noise after s: (its s, the expected number it stands for)."""
     top, bottom = value(path, 0.0), value(path, 0.0)
@@ -180,7 +179,7 @@ def next_rice(path, knots, s, k, on, off, pixel, num, iv):
     return s + rice_gap(pixel, k, num, iv) / max(expected, 1e-300), expected
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
     """Does candidate k happen at s? 1 as ON, -1 as OFF, 0 not at all."""
     here = value(path, s)
@@ -192,16 +191,16 @@ def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
     return -1 if chance < upward + rice_expected(np.inf, here - off, num, iv) else 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, out, n, tally):
     """`cross` for one pixel: (c_on, c_off, out, n)."""
     pixels[0] = pixel
     lanes[AT], lanes[WHEN], lanes[UP], lanes[LABEL] = at, s, 1.0 if up else 0.0, label
-    out, n = cross(lanes, pixels, 1, planes, flags, num, iv, out, n, tally)
+    out, n = cross(lanes, pixels, np.zeros(1, np.int64), 1, planes, flags, num, iv, out, n, tally)
     return lanes[LEVEL_ON], lanes[LEVEL_OFF], out, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def walk_pixel(
     block, scratch, i, p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv, out, n, tally
 ):
@@ -248,7 +247,7 @@ def walk_pixel(
         s = stop
         if stop == blind_s:
             pixels[0], lanes[AT] = pixel, end
-            fresh_thresholds(lanes, pixels, EVERY, 1, planes, flags, num)
+            fresh_thresholds(lanes, pixels, np.zeros(1, np.int64), 1, planes, flags, num)
             leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
             blind_until = -1.0
@@ -277,7 +276,7 @@ def walk_pixel(
     return out, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
     """A forced candidate at s, where the signal is `end`: (c_on, c_off, out, n)."""
     t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)

@@ -8,8 +8,8 @@ each crossing are climbed in rounds, all lanes together.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
 from vid2ev.kernels.layout import CAPPED, LANE_PITCH
 
@@ -18,7 +18,7 @@ END, RUNGS, FIRST, STEP, REACHED = (FREE + k * LANE_PITCH for k in range(5))
 AFTER_LADDER = FREE + 5 * LANE_PITCH
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def count_rungs(lanes, count, num, tally):
     """RUNGS, FIRST, STEP and UP of lanes whose thresholds stay; AT moves to the last rung.  Returns the number in all.
 
@@ -48,7 +48,7 @@ def count_rungs(lanes, count, num, tally):
     return crossings
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def next_rungs(lanes, count, live, num, tally):
     """One more crossing of each lane that has one: AT moves to it.  Their lanes into `live`; returns their number."""
     cap, over = np.float64(num.max_crossings), np.int32(0)
@@ -67,7 +67,7 @@ def next_rungs(lanes, count, live, num, tally):
     return reached_lanes(lanes, REACHED, count, live)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def reached_lanes(lanes, reached, count, live):
     """Indices of the lanes whose plane `reached` is 1 into `live`; returns their number."""
     left = 0
@@ -77,7 +77,7 @@ def reached_lanes(lanes, reached, count, live):
     return left
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def keep_lanes(lanes, first, last, pixels, live, alive):
     """Move the lanes live[:alive] (ascending) to the front, in the planes from `first` to `last`."""
     for start in range(first, last, LANE_PITCH):

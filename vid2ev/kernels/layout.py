@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.log_curve import Curve
 
 BLOCK_BITS = 11  # larger, and the scratch leaves the cache; smaller, and each block starts too many streams
@@ -112,8 +112,8 @@ class Planes(NamedTuple):
     fast: np.ndarray  # float32, blocks x planes x BLOCK
     rest: np.ndarray  # float32, blocks x 2 x PITCH: what steep lags have beyond float32 (scan.refine)
     memory: np.ndarray  # float64 [n]: the level that each pixel memorised [nat]
-    theta: np.ndarray  # float32 [2 n]: its ON and OFF threshold [nat]
-    drawn: np.ndarray  # float32 [2 n]: the same with the noise of the crossing to come
+    theta: np.ndarray  # float32 [n, 2]: its ON and OFF threshold [nat]
+    drawn: np.ndarray  # float32 [n, 2]: the same with the noise of the crossing to come
     t_last: np.ndarray  # int64 [n]: its last event [ns]
     count: np.ndarray  # uint32 [n]: crossings so far
     t_reset: np.ndarray  # int64 [n]: when its level last moved [ns]
@@ -121,19 +121,19 @@ class Planes(NamedTuple):
     shade: np.ndarray  # float32 [n]: optical gain
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def stride_of(flags):
     """Length of a block in `fast` for these flags."""
     return (LAG1 + len(flags.poles) + 3 * len(flags.noise) + len(flags.light_bandwidth)) * PITCH
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def last_light(flags):
     """Start of the plane of a block that has the light of the last frame, for a pole that depends on it."""
     return (LAG1 + len(flags.poles) + 3 * len(flags.noise)) * PITCH
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def place_of(pixel, stride):
     """Where a pixel stands in the first plane of `fast`."""
     return (pixel >> BLOCK_BITS) * stride + (pixel & (BLOCK - 1))

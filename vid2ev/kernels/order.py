@@ -8,13 +8,14 @@ time, so it finds them nearly sorted.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_cache import compiled
 
 _TIME, _PIXEL = np.uint64(28), np.uint64(3)
 _PASS = np.uint64(16)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def sorted_by_time(keys, n, last_us):
     """keys[:n] stably sorted on their time, which is at most last_us."""
     source = keys
@@ -47,7 +48,7 @@ def sorted_by_time(keys, n, last_us):
     return source
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def unpack(keys, width, first_us, t, x, y, p, label):
     """Keys to the arrays of `Events`; `label` has length 0 where none are wanted."""
     per_pixel = 1.0 / width

@@ -9,8 +9,8 @@ and as many in float64 as it takes, vector code all of it.  What is not settled 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels import turns as T
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED, RUNGS, keep_lanes, reached_lanes
 from vid2ev.kernels.layout import HIGH, INPUT, LANE_PITCH, LOW, PITCH
@@ -36,7 +36,7 @@ GUESSES = 9 * LANE_PITCH
 ENOUGH = 2e-3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_responses(block, scratch, lanes, pixels, hits, count, p0, flags):
     """Input, rise, lags and levels of flagged pixels into lanes; `prepare_responses` makes the rest of them."""
     for j in range(count):
@@ -56,8 +56,8 @@ def load_responses(block, scratch, lanes, pixels, hits, count, p0, flags):
             lanes[ADDED0 + j], lanes[ADDED1 + j] = scratch[NOISE0 + i], scratch[NOISE1 + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def prepare_responses(lanes, turns, live, count, b, flags, num, iv):
+@inner
+def prepare_responses(lanes, turns, guesses, live, count, b, flags, num, iv):
     """The responses of the loaded lanes, each on its first monotone piece."""
     two, poles = len(flags.poles) == 2, len(flags.poles) > 0
     base, drift = iv.leak0, iv.leak1 - iv.leak0
@@ -83,11 +83,11 @@ def prepare_responses(lanes, turns, live, count, b, flags, num, iv):
     for j in range(count):
         lanes[S0 + j], lanes[S1 + j], lanes[NEXT + j], lanes[RUNGS + j] = 0.0, 1.0, 1.0, 0.0
     if poles:
-        split_pieces(lanes, turns, live, count, b)
+        split_pieces(lanes, turns, guesses, live, count, b)
     ends_in_nats(lanes, count, flags, num)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def ends_in_nats(lanes, count, flags, num):
     """END [nat] of each lane's piece."""
     # (light has a floor of 0: after a flash of many decades the arithmetic may leave less than nothing of it)
@@ -95,8 +95,8 @@ def ends_in_nats(lanes, count, flags, num):
         lanes[END + j] = lanes[F1 + j] if len(flags.log_input) else log_level(max(lanes[F1 + j], 0.0), num.curve)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def split_pieces(lanes, turns, live, count, b):
+@inner
+def split_pieces(lanes, turns, guesses, live, count, b):
     """Let the first piece of lanes with a turning point that matters end there."""
     for j in range(count):
         lanes[REACHED + j] = may_turn(lanes, j)
@@ -105,7 +105,7 @@ def split_pieces(lanes, turns, live, count, b):
         j = live[k]
         turns[T.RISE + k], turns[T.C1 + k], turns[T.C2 + k] = lanes[RISE + j], lanes[C1 + j], lanes[C2 + j]
         turns[T.A + k], turns[T.AT_0 + k], turns[T.AT_1 + k] = lanes[A + j], lanes[SLOPE0 + j], lanes[SLOPE1 + j]
-    T.find_turns(turns, some, b)
+    T.find_turns(turns, guesses, some, b)
     for k in range(some):
         if turns[T.KIND + k] != T.NEVER:
             j = live[k]
@@ -113,7 +113,7 @@ def split_pieces(lanes, turns, live, count, b):
             lanes[F1 + j] = lanes[Y0 + j] + turns[T.VALUE + k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def may_turn(lanes, j):
     """1.0 if a turning point inside the interval may matter to lane j, else 0.0.
 
@@ -129,7 +129,7 @@ def may_turn(lanes, j):
     return 1.0 if (bend_0 * bend_1 <= 0.0) | ((slope_0 * slope_1 <= 0.0) & near) else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def next_pieces(lanes, pixels, live, count, b, flags, num):
     """Keep the lanes whose interval goes on after the piece, and move them to the next one; returns their number."""
     for j in range(count):
@@ -145,7 +145,7 @@ def next_pieces(lanes, pixels, live, count, b, flags, num):
     return left
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def response_times(levels, when, jobs, guesses, who, count, lanes, b, flags, num):
     """Times of a batch of crossings."""
     for k in range(count):
@@ -171,7 +171,7 @@ def response_times(levels, when, jobs, guesses, who, count, lanes, b, flags, num
             when[k] = settle(jobs, when[k], k, b)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def guess(levels, jobs, guesses, count, flags, num):
     """Targets in the filter's domain, and the batch in float32 with the chords' roots as a start."""
     for k in range(count):
@@ -188,7 +188,7 @@ def guess(levels, jobs, guesses, count, flags, num):
         guesses[G_C1 + k], guesses[G_C2 + k] = jobs[JOB_C1 + k], jobs[JOB_C2 + k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def improve(guesses, count, b, flags):
     """One bracketed step of Halley's method for each guess."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
@@ -207,7 +207,7 @@ def improve(guesses, count, b, flags):
         guesses[G_LO + k], guesses[G_HI + k] = lo, hi
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def polish(jobs, when, count, b, flags):
     """One step of Halley's method in float64; LAST_STEP is what is left, in units of the faster time constant."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
@@ -226,12 +226,15 @@ def polish(jobs, when, count, b, flags):
         jobs[LAST_STEP + k] = max(abs(step), abs(f / d)) * max(1.0, max(a, b)) if inside else np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def settle(jobs, s, k, b):
     """The root of job k by Newton's method inside its piece, halving it where Newton leaves it or is slow."""
     d0, rise, c1, c2, a = jobs[D0 + k], jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
     lo, hi, up = jobs[FROM_S + k], jobs[TO_S + k], jobs[TO_Y + k] > jobs[FROM_Y + k]
     enough = 1e-9 / max(1.0, max(a, b))
+    end = d0 + (rise * hi + (c1 * expm1_64(-a * hi) + c2 * expm1_64(-b * hi)))
+    if (end < 0.0) == up:  # the end that the next interval starts with is rounded: there, and not before it
+        return hi
     for turn in range(100):
         m1, m2 = expm1_64(-a * s), expm1_64(-b * s)
         f = d0 + (rise * s + (c1 * m1 + c2 * m2))

@@ -7,9 +7,10 @@ nothing.  So the levels it compares with are drawn in by `MARGIN`, above its own
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core.extending import overload
 
+from vid2ev.kernel_cache import INNER_OPTIONS, inner
 from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH, last_light
 from vid2ev.physics.elementary import expm1_32
 from vid2ev.physics.log_curve import light_at, log_level_32
@@ -17,7 +18,6 @@ from vid2ev.physics.photoreceptor import light_weights_32
 from vid2ev.physics.photoreceptor_noise import noise_draw, rice_expected, rice_gap
 
 F = np.float32
-OPTIONS = {"nogil": True, "error_model": "numpy"}
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
 BRIGHTEST = F(1e30)
 STEEP = 2.0
@@ -30,7 +30,7 @@ REFINED = 12 * PITCH  # more than 0 where one of the last four is not
 SCRATCH = 12 * PITCH + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def read_light(scratch, light, lut, shade, p0, n, flags, tally):
     """Light of a block into scratch, shading applied."""
     # (slices: an index with an offset may be negative for all the compiler knows, and then it does not vectorise)
@@ -45,7 +45,7 @@ def take_light(scratch, light, lut, tally):
     """Codes through their table, or linear light with what is not a finite light >= 0 mended."""
 
 
-@overload(take_light, jit_options=OPTIONS)
+@overload(take_light, jit_options=INNER_OPTIONS)
 def _take_light(scratch, light, lut, tally):
     if isinstance(light.dtype, types.Integer):
 
@@ -72,7 +72,7 @@ def _take_light(scratch, light, lut, tally):
     return linear
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
     """Find the state of a block after one interval, and flag the pixels that may cross a level in it.
 
@@ -85,8 +85,8 @@ def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
     steep = advance(block, scratch, flagged, n, flags, num, iv)
     if (poles > 0) & (len(flags.log_input) == 0):
         if steep > 0 or scratch[REFINED] > F(0.0):
-            for plane in (OLD_REST1, OLD_REST2, REST1, REST2):
-                scratch[plane : plane + n] = F(0.0)
+            for i in range(OLD_REST1, REFINED):
+                scratch[i] = F(0.0)
             scratch[REFINED] = F(steep)
         if steep > 0:
             refine(block, rest, scratch, n, flags, num, iv)
@@ -96,7 +96,7 @@ def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
         flag_rice(block, scratch, flagged, p0, n, flags, num, iv)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def advance(block, scratch, flagged, n, flags, num, iv):
     """One step of the poles and the flags that follow; returns how many pixels are too steep for float32."""
     poles, steep = len(flags.poles), np.int32(0)
@@ -124,7 +124,7 @@ def advance(block, scratch, flagged, n, flags, num, iv):
     return steep
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def light_weights(clock, b, flags):
     """Weights of a step for one pixel's dt / tau1."""
     if len(flags.poles) > 1:
@@ -133,7 +133,7 @@ def light_weights(clock, b, flags):
     return x1, x1 / clock, x1, x1, x1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def reaches(block, scratch, i, flags, num, iv):
     """Whether pixel i may cross a level in the interval."""
     poles = len(flags.poles)
@@ -155,7 +155,7 @@ def reaches(block, scratch, i, flags, num, iv):
     return flag
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def turns_at(block, scratch, i, flags):
     """Whether the slope of either pole changes its sign: only then can y turn within the interval."""
     e1, new1 = block[LAG1 * PITCH + i], scratch[NEW1 + i]
@@ -164,7 +164,7 @@ def turns_at(block, scratch, i, flags):
     return e1 * new1 < F(0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def may_reach(block, scratch, i, flags, iv):
     """Whether the hull of an interval with a turning point reaches a level: y stays among inputs and first pole."""
     if len(flags.log_compare) and not len(flags.log_input):
@@ -182,7 +182,7 @@ def may_reach(block, scratch, i, flags, iv):
     return (top >= block[HIGH * PITCH + i]) | (bottom <= block[LOW * PITCH + i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def commit(block, scratch, n, flags):
     """The new state takes the place of the old."""
     poles, before = len(flags.poles), last_light(flags)
@@ -198,7 +198,7 @@ def commit(block, scratch, n, flags):
             block[before + i] = scratch[LIGHT + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def advance_noise(block, scratch, p0, n, poles, num, iv):
     """One step of the photoreceptor noise; the noise seen by the comparator before and after goes to scratch."""
     first, second = (LAG1 + poles) * PITCH, (LAG1 + poles + 1) * PITCH
@@ -216,7 +216,7 @@ def advance_noise(block, scratch, p0, n, poles, num, iv):
         scratch[NOISE1 + i] = block[second + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def flag_rice(block, scratch, flagged, p0, n, flags, num, iv):
     """Flag the pixels in which unresolved photoreceptor noise may reach a level in this interval."""
     before = (LAG1 + len(flags.poles) + 2) * PITCH
@@ -227,7 +227,7 @@ def flag_rice(block, scratch, flagged, p0, n, flags, num, iv):
         flagged[i] |= np.uint8(rice_gap(p0 + i, 0, num, iv) < 1.01 * expected)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def compared(into, levels, inward, count, flags, num):
     """Levels [nat] as the scan compares them, in nats or light, drawn in by the margin."""
     if len(flags.log_compare):
@@ -239,7 +239,7 @@ def compared(into, levels, inward, count, flags, num):
             into[j] = light_at(levels[j] + inward, num.curve) + raised
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def was_steep(block, i, flags, num):
     """Whether pixel i's lags are too large against its signal for float32, before the interval."""
     e1 = block[LAG1 * PITCH + i]
@@ -247,7 +247,7 @@ def was_steep(block, i, flags, num):
     return is_steep(block[INPUT * PITCH + i], e1, e2, num)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def gets_steep(scratch, i, flags, num):
     """The same after it."""
     e1 = scratch[NEW1 + i]
@@ -255,13 +255,13 @@ def gets_steep(scratch, i, flags, num):
     return is_steep(scratch[NEW + i], e1, e2, num)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def is_steep(light, e1, e2, num):
     """Whether half a unit in the last place of the lags is more than 1.2e-7 of what the logarithm sees."""
     return max(abs(e1), abs(e2)) > F(STEEP) * ((light - e2) + F(num.curve.floor))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def refine(block, rest, scratch, n, flags, num, iv):
     """Where lags are steep, step them in float64: `rest` holds what they have beyond float32.
 
@@ -289,7 +289,7 @@ def refine(block, rest, scratch, n, flags, num, iv):
         rest[i], rest[PITCH + i] = scratch[REST1 + i], scratch[REST2 + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def old_lag(block, scratch, pole, i, flags):
     """Pixel i's lag of a pole (1 or 2) before the interval, in float64."""
     lag = np.float64(block[(LAG1 if pole == 1 else LAG2) * PITCH + i])
@@ -298,7 +298,7 @@ def old_lag(block, scratch, pole, i, flags):
     return lag
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def new_lag(scratch, pole, i, flags):
     """Pixel i's lag of a pole (1 or 2) after the interval, in float64."""
     lag = np.float64(scratch[(NEW1 if pole == 1 else NEW2) + i])

@@ -7,19 +7,19 @@ there to the end of the interval, no level is reached again, whatever thresholds
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
-from vid2ev.kernels.layout import HIGH, LANE_COUNT, PITCH
-from vid2ev.kernels.scan import turns_at
+from vid2ev.kernels.layout import HIGH, LAG1, LANE_COUNT, PITCH
+from vid2ev.kernels.scan import CLOCK, NEW1, turns_at
 from vid2ev.physics.mismatch import FLOOR
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv):
-    """Whether candidate j is a shot, the only one of a good pixel that reaches no level and does not turn."""
+@inner
+def is_lonely(block, scratch, flagged, keys, chance, forced, j, still, flags, iv):
+    """Whether candidate j is a shot, the only one of a good pixel that reaches no level, and does not turn far away."""
     i = place_of_candidate(keys[j], iv)[0]
     if chance[j] == 0.0 or flagged[i] != 0 or not block[HIGH * PITCH + i] < np.inf:
         return False
@@ -27,22 +27,36 @@ def is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv):
         return False
     if j + 1 < forced and place_of_candidate(keys[j + 1], iv)[0] == i:
         return False
-    return len(flags.poles) == 0 or not turns_at(block, scratch, i, flags)
+    if len(flags.poles) == 0 or not turns_at(block, scratch, i, flags):
+        return True
+    if len(flags.poles) == 2 or len(flags.log_input) == 0 or len(flags.noise):
+        return False
+    # The slope of a pole is its rate times its lag, and within the interval a lag stays between its values at the ends.
+    rate = np.float64(scratch[CLOCK + i]) if len(flags.light_bandwidth) else iv.a
+    return rate * max(abs(block[LAG1 * PITCH + i]), abs(scratch[NEW1 + i])) < 0.5 * still
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, flags, num, iv):
+@inner
+def smallest_threshold(pixel, theta, flags, num):
+    """How far the signal of a pixel must go from its memory, at least, to reach a level [nat]."""
+    smallest = min(num.threshold_on, num.threshold_off)
+    if len(flags.mismatch):
+        smallest = np.float64(min(theta[pixel, 0], theta[pixel, 1]))
+    return FLOOR * smallest if len(flags.crossing_noise) else smallest
+
+
+@inner
+def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv):
     """Load the lonely shots of a block and flag the pixels of the other candidates: (candidates left, shots loaded)."""
-    # Mismatch leaves FLOOR of a threshold at least, noise at the crossing FLOOR of that.
-    still = FLOOR * FLOOR * min(num.threshold_on, num.threshold_off)
     others, left = np.empty(forced, np.int64), 0
     for j in range(forced):
         i, s = place_of_candidate(keys[j], iv)
-        lonely = shots < LANE_COUNT and is_lonely(block, scratch, flagged, keys, chance, forced, j, flags, iv)
+        still = smallest_threshold(p0 + i, planes.theta, flags, num)
+        lonely = shots < LANE_COUNT and is_lonely(block, scratch, flagged, keys, chance, forced, j, still, flags, iv)
         if lonely:
             path = path_of(block, scratch, i, flags, num, iv)
             here = value(path, s)
-            lonely = abs(value(path, 1.0) - here) < still
+            lonely = abs(value(path, 1.0) - here) < 0.5 * still
             lanes[AT + shots], lanes[WHEN + shots], pixels[shots] = here, s, p0 + i
             lanes[UP + shots], lanes[LABEL + shots] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
         if lonely:

@@ -10,14 +10,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.core.extending import overload
 
+from vid2ev.kernel_cache import INNER_OPTIONS, compiled, inner
 from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
 from vid2ev.kernels.response import GUESSES, JOBS, LANES, load_responses, next_pieces, prepare_responses, response_times
-from vid2ev.kernels.scan import OPTIONS
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
 from vid2ev.kernels.turns import TURNS
 
@@ -36,16 +35,16 @@ class Work(NamedTuple):
     turns: np.ndarray  # float64
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def new_work():
     """Scratch for LANE_COUNT lanes."""
     return Work(
         np.empty(LANES, np.float64),
         np.empty(LANE_COUNT, np.int64),
         np.empty(LANE_COUNT + 1, np.int64),
-        np.empty(LANE_COUNT, np.int64),
-        np.empty(LANE_COUNT, np.float64),
-        np.empty(LANE_COUNT, np.float64),
+        np.empty(LANE_COUNT + 2, np.int64),
+        np.empty(LANE_COUNT + 2, np.float64),
+        np.empty(LANE_COUNT + 2, np.float64),
         np.empty(JOBS, np.float64),
         np.empty(GUESSES, np.float32),
         np.empty(TURNS, np.float64),
@@ -77,21 +76,22 @@ def go_on(work, count, flags, num, iv):
     """Keep the lanes with another piece, and move them to it; returns their number."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def climb(work, count, planes, flags, num, iv, out, n, tally):
     """All events of `count` loaded lanes: (out, n)."""
     prepare(work, count, flags, num, iv)
     while count > 0:
         load_thresholds(work.lanes, work.pixels, count, planes, flags, num)
         if len(flags.labels):
-            work.lanes[LABEL : LABEL + count] = 0.0
+            for j in range(LABEL, LABEL + count):
+                work.lanes[j] = 0.0
         out, n = take_piece(work, count, planes, flags, num, iv, out, n, tally)
         leave_levels(work.lanes, work.pixels, count, planes, flags, num)
         count = go_on(work, count, flags, num, iv)
     return out, n
 
 
-@overload(load, jit_options=OPTIONS)
+@overload(load, jit_options=INNER_OPTIONS)
 def _load(block, scratch, lanes, pixels, hits, count, p0, flags):
     loader = load_lines if is_on(flags, "straight") else load_responses
 
@@ -101,7 +101,7 @@ def _load(block, scratch, lanes, pixels, hits, count, p0, flags):
     return load_them
 
 
-@overload(prepare, jit_options=OPTIONS)
+@overload(prepare, jit_options=INNER_OPTIONS)
 def _prepare(work, count, flags, num, iv):
     if is_on(flags, "straight"):
 
@@ -112,12 +112,12 @@ def _prepare(work, count, flags, num, iv):
 
     def responses(work, count, flags, num, iv):
         b = iv.b if len(flags.poles) == 2 else 0.0
-        prepare_responses(work.lanes, work.turns, work.live, count, b, flags, num, iv)
+        prepare_responses(work.lanes, work.turns, work.guesses, work.live, count, b, flags, num, iv)
 
     return responses
 
 
-@overload(find_times, jit_options=OPTIONS)
+@overload(find_times, jit_options=INNER_OPTIONS)
 def _find_times(work, count, flags, num, iv):
     if is_on(flags, "straight"):
 
@@ -133,7 +133,7 @@ def _find_times(work, count, flags, num, iv):
     return responses
 
 
-@overload(go_on, jit_options=OPTIONS)
+@overload(go_on, jit_options=INNER_OPTIONS)
 def _go_on(work, count, flags, num, iv):
     if is_on(flags, "straight"):
         return lambda work, count, flags, num, iv: 0
@@ -145,7 +145,7 @@ def _go_on(work, count, flags, num, iv):
     return responses
 
 
-@overload(take_piece, jit_options=OPTIONS)
+@overload(take_piece, jit_options=INNER_OPTIONS)
 def _take_piece(work, count, planes, flags, num, iv, out, n, tally):
     if is_on(flags, "crossing_noise"):
         return _drawn_levels
@@ -170,16 +170,21 @@ def _steady_levels(work, count, planes, flags, num, iv, out, n, tally):
     return out, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def fill_batch(lanes, who, levels, j, rung, count, num):
-    """Crossings from a rung of lane j on, as many as fit: (lane and rung that come next, how many)."""
+    """Crossings from a rung of lane j on, as many as fit: (lane and rung that come next, how many).
+
+    Most lanes have one or two: two are always written, and counted if there are any.
+    """
     waiting = 0
     while j < count:
         rungs, first, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
         some = min(rungs, rung + LANE_COUNT - waiting)
-        for k in range(rung, some):
-            who[waiting], levels[waiting] = j, first + k * step
-            waiting += 1
+        who[waiting], levels[waiting] = j, first + rung * step
+        who[waiting + 1], levels[waiting + 1] = j, first + (rung + 1) * step
+        for k in range(2, some - rung):
+            who[waiting + k], levels[waiting + k] = j, first + (rung + k) * step
+        waiting += some - rung
         if some == num.max_crossings + 1:
             levels[waiting - 1] = lanes[AT + j]
         if some < rungs:
@@ -203,7 +208,7 @@ def _drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
         fresh_thresholds(work.lanes, work.pixels, work.live, alive, planes, flags, num)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def add_to_batch(lanes, who, levels, live, alive, waiting):
     """The crossings that the lanes live[:alive] have just made."""
     for k in range(alive):

@@ -6,8 +6,8 @@ That is ESIM's model (no filter, or `timing = "linear"`), and `timing = "frame"`
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
 from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
@@ -17,7 +17,7 @@ from vid2ev.physics.log_curve import log_level
 START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * LANE_PITCH for k in range(4))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_lines(block, scratch, lanes, pixels, hits, count, p0, flags):
     """The comparator's input before and after the interval, light or nats, of flagged pixels into lanes."""
     poles = len(flags.poles)
@@ -36,7 +36,7 @@ def load_lines(block, scratch, lanes, pixels, hits, count, p0, flags):
             lanes[ADDED0 + j], lanes[ADDED1 + j] = scratch[NOISE0 + i], scratch[NOISE1 + i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def prepare_lines(lanes, count, flags, num, iv):
     """The loaded lines in nats, leak and noise included."""
     if len(flags.log_input) == 0:
@@ -50,14 +50,14 @@ def prepare_lines(lanes, count, flags, num, iv):
         lanes[RUNGS + j] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def to_nats(plane, count, num):
     """A plane of light to nats."""
     for j in range(count):
         plane[j] = log_level(max(plane[j], 0.0), num.curve)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def line_times(levels, when, who, count, lanes, flags):
     """Times of a batch of crossings."""
     for k in range(count):
@@ -67,7 +67,7 @@ def line_times(levels, when, who, count, lanes, flags):
         when[k] = 1.0 if len(flags.frame_time) else (min(here, 1.0) if here > 0.0 else 0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def send_lines(lanes, pixels, count, crossings, flags, num, iv, out, n):
     """Keys of all crossings of lanes that have only to be counted, without a batch between: (out, n).
 
@@ -94,7 +94,7 @@ def send_lines(lanes, pixels, count, crossings, flags, num, iv, out, n):
     return out, n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def rung_times(lanes, j, flags, iv):
     """Time of lane j's first rung, and from one to the next [ns since t0]."""
     if len(flags.frame_time):

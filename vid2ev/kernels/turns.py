@@ -1,25 +1,28 @@
 """Turning points of many responses at a time: the vector form of `physics.photoreceptor.turning_points`.
 
-Lanes that may turn are gathered, the first zero of the slope is found by four bracketed steps of Halley's method, and
-the few that are not settled then, or turn twice, are finished one by one.
+Lanes that may turn are gathered, the first zero of the slope is found by four bracketed steps of Halley's method in
+float32 and one in float64, and the few that are not settled then, or turn twice, are finished one by one.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import inner
 from vid2ev.kernels.layout import LANE_PITCH
-from vid2ev.physics.elementary import exp64, log64
+from vid2ev.physics.elementary import exp64, expm1_32, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
 
+F = np.float32
 RISE, C1, C2, A, AT_0, AT_1, BEND, LO, HI, ROOT, STEP, KIND, VALUE = (k * LANE_PITCH for k in range(13))
 TURNS = 13 * LANE_PITCH
+# Planes of float32 guesses.
+G_RISE, G_K1, G_K2, G_A, G_UP, G_ROOT, G_LO, G_HI = (k * LANE_PITCH for k in range(8))
 NEVER, ONCE, TWICE = 0.0, 1.0, 2.0
 ENOUGH = 1e-3  # last step, in units of the faster time constant: what is left is of third order in it
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def bracket_turns(turns, count, b):
     """Where the first turning point of each lane lies, [LO, HI], and how many there are (KIND)."""
     for k in range(count):
@@ -40,32 +43,48 @@ def bracket_turns(turns, count, b):
         turns[KIND + k] = ONCE if opposite else (TWICE if before else NEVER)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def start_turns(turns, count):
-    """Start in the middle of each bracket."""
+@inner
+def start_turns(turns, guesses, count, b):
+    """The lanes in float32, each starting in the middle of its bracket."""
     for k in range(count):
-        turns[ROOT + k] = 0.5 * (turns[LO + k] + turns[HI + k])
+        lo, hi, a = turns[LO + k], turns[HI + k], turns[A + k]
+        guesses[G_LO + k], guesses[G_HI + k], guesses[G_ROOT + k] = lo, hi, 0.5 * (lo + hi)
+        guesses[G_K1 + k], guesses[G_K2 + k], guesses[G_A + k] = a * turns[C1 + k], b * turns[C2 + k], a
+        guesses[G_RISE + k], guesses[G_UP + k] = turns[RISE + k], 1.0 if turns[AT_0 + k] > 0.0 else -1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def step_turns(turns, count, b):
-    """One bracketed step towards the first turning point of each lane."""
+@inner
+def improve_turns(guesses, count, b):
+    """One bracketed step of Halley's method towards the first turning point of each lane."""
+    for k in range(count):
+        a, s = guesses[G_A + k], guesses[G_ROOT + k]
+        p1 = guesses[G_K1 + k] * (F(1.0) + expm1_32(-a * s))
+        p2 = guesses[G_K2 + k] * (F(1.0) + expm1_32(-b * s))
+        f, d, dd = guesses[G_RISE + k] - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
+        same = f * guesses[G_UP + k] > F(0.0)
+        lo = s if same else guesses[G_LO + k]
+        hi = guesses[G_HI + k] if same else s
+        there = s - (f * d) / (d * d - F(0.5) * f * dd)
+        guesses[G_ROOT + k] = there if (there >= lo) & (there <= hi) else F(0.5) * (lo + hi)
+        guesses[G_LO + k], guesses[G_HI + k] = lo, hi
+
+
+@inner
+def polish_turns(turns, count, b):
+    """One step in float64; STEP is what is left, in units of the faster time constant."""
     for k in range(count):
         rise, a, s = turns[RISE + k], turns[A + k], turns[ROOT + k]
         p1, p2 = a * turns[C1 + k] * exp64(-a * s), b * turns[C2 + k] * exp64(-b * s)
         f, d, dd = rise - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
-        same = (f > 0.0) == (turns[AT_0 + k] > 0.0)
-        lo, hi = s if same else turns[LO + k], turns[HI + k] if same else s
         move = -(f * d) / (d * d - 0.5 * f * dd)
         there = s + move
-        good = (there >= lo) & (there <= hi)
+        good = (there >= turns[LO + k]) & (there <= turns[HI + k])
         # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-        turns[ROOT + k] = there if good else 0.5 * (lo + hi)
+        turns[ROOT + k] = there if good else s
         turns[STEP + k] = max(abs(move), abs(f / d)) * max(1.0, max(a, b)) if good else np.inf
-        turns[LO + k], turns[HI + k] = lo, hi
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def second_turn(turns, k, b):
     """Lane k's turning point after the inflection, if it turns twice; 1.0 otherwise."""
     if turns[KIND + k] != TWICE:
@@ -74,15 +93,18 @@ def second_turn(turns, k, b):
     return slope_zero(turns[BEND + k], 1.0, -turns[AT_0 + k], turns[RISE + k], c1, c2, a, b)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def find_turns(turns, count, b):
+@inner
+def find_turns(turns, guesses, count, b):
     """ROOT is the first turning point of each lane (meaningless where KIND is NEVER), VALUE the response there, less
     y0.
     """
     bracket_turns(turns, count, b)
-    start_turns(turns, count)
+    start_turns(turns, guesses, count, b)
     for _ in range(4):
-        step_turns(turns, count, b)
+        improve_turns(guesses, count, np.float32(b))
+    for k in range(count):
+        turns[ROOT + k] = guesses[G_ROOT + k]
+    polish_turns(turns, count, b)
     for k in range(count):
         if turns[KIND + k] != NEVER and not turns[STEP + k] < ENOUGH:
             rise, c1, c2, a = turns[RISE + k], turns[C1 + k], turns[C2 + k], turns[A + k]

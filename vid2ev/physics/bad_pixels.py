@@ -13,9 +13,9 @@ emitted").
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.random import HOT_MAP, philox, unit
 
 
@@ -27,7 +27,7 @@ class BadPixels(BaseModel, frozen=True, extra="forbid"):
     cold_probability: float = Field(0.0, ge=0, le=1, description="share of the other pixels that never fire")
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def bad_pixel_map(n, seed, camera, hot_probability, cold_probability):
     """uint8 [n]: 0 a good pixel, 1 a hot one, 2 a cold one."""
     kind = np.zeros(n, np.uint8)

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.random import PHASE, philox, unit
 
 
@@ -39,7 +39,7 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def initial_phase(seed, camera, pixel):
     """Fraction of the ON threshold that lies between the first signal and the first ON level, in (0, 1)."""
     word, _, _, _ = philox(seed, PHASE + 256 * camera, pixel, 0)

@@ -10,9 +10,9 @@ Source: the paper, section II.A: time-variant Gaussian noise, drawn "at each pot
 
 from __future__ import annotations
 
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.mismatch import clipped
 from vid2ev.physics.random import CROSSING, normal_pair, philox
 
@@ -25,7 +25,7 @@ class CrossingNoise(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def noisy_thresholds(on, off, sigma, seed, camera, pixel, count):
     """ON and OFF threshold [nat] for the pixel's crossing number `count`."""
     words = philox(seed, CROSSING + 256 * camera, pixel, count)

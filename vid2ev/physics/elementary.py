@@ -13,8 +13,10 @@ exponentials by the Taylor series on |r| <= ln 2 / 2.  Measured errors: `log32` 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core.extending import intrinsic
+
+from vid2ev.kernel_cache import compiled
 
 
 def _bitcast(source, target):
@@ -69,7 +71,7 @@ _L0, _L1, _L2, _L3, _L4, _L5, _L6, _L7, _L8 = _L
 _HALF, _ONE = F(0.5), F(1.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def log32(x):
     """Natural logarithm of a positive normal float32."""
     bits = _bits32(x)
@@ -84,7 +86,7 @@ def log32(x):
     return fma(_LN2_HI_32, k, f + fma(-_HALF, z, y))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def log64(x):
     """Natural logarithm of a positive normal float64."""
     bits = _bits64(x)
@@ -102,7 +104,7 @@ def log64(x):
     return fma(k, _LN2_HI_64, f - (half - fma(s, half + even + odd, k * _LN2_LO_64)))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _exp_parts(x):
     """(p, 2**k) with exp(x) = 2**k (1 + p); x is clamped to [-700, 700]."""
     x = min(max(x, -700.0), 700.0)
@@ -120,21 +122,21 @@ def _exp_parts(x):
     return fma(r * r, fma(r, p, 0.5), r), scale
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def expm1_64(x):
     """exp(x) - 1, relative error 3e-16; x is clamped to [-700, 700]."""
     p, scale = _exp_parts(x)
     return fma(p, scale, scale - 1.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def exp64(x):
     """exp(x), relative error 3e-16; 0 below -700, clamped above 700."""
     p, scale = _exp_parts(x)
     return fma(p, scale, scale) if x >= -700.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def expm1_32(x):
     """exp(x) - 1 for float32, relative error 1.5e-7; x is clamped to [-87, 87]."""
     x = min(max(x, F(-87.0)), F(87.0))

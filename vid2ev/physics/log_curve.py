@@ -16,9 +16,9 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.elementary import exp64, log32, log64
 
 F = np.float32
@@ -61,25 +61,25 @@ def curve_of(name: str, dark_level: float) -> Curve:
     return Curve(0.0, KNEE, log_knee, math.log(20.0) / KNEE, math.log(1.0 / 255.0), KNEE / math.log(20.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def log_level(light, curve):
     """Comparator level [nat] of a light (float64, >= 0)."""
     return light * curve.slope + curve.black if light < curve.knee else log64(max(light, curve.knee) + curve.dark)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def light_at(level, curve):
     """The light whose level this is: the inverse of `log_level`; below the curve's range it goes on below zero."""
     return (level - curve.black) / curve.slope if level < curve.log_knee else exp64(level) - curve.dark
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def log_slope(light, curve):
     """Derivative of `log_level` [nat per unit of light]."""
     return curve.slope if light < curve.knee else 1.0 / (light + curve.dark)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def log_level_32(light, curve):
     """`log_level` in float32, for the scan."""
     knee = F(curve.knee)

@@ -13,9 +13,9 @@ contrast.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean
@@ -29,18 +29,18 @@ class Mismatch(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def clipped(mean, sigma, z):
     """mean + sigma z, z clipped symmetrically so that the result is at least FLOOR of the mean; sigma > 0."""
     limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
     return mean + sigma * min(max(z, -limit), limit)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
-    """Thresholds of pixels first, first + 1, ... into theta float32 [2 n] (ON and OFF in turn)."""
-    for i in range(theta.size // 2):
+    """Thresholds of pixels first, first + 1, ... into theta float32 [n, 2] (ON, OFF)."""
+    for i in range(len(theta)):
         words = philox(seed, MISMATCH + 256 * camera, first + i, 0)
         on, off = normal_pair(words[0], words[1])
-        theta[2 * i] = np.float32(clipped(mean_on, sigma, on))
-        theta[2 * i + 1] = np.float32(clipped(mean_off, sigma, off))
+        theta[i, 0] = np.float32(clipped(mean_on, sigma, on))
+        theta[i, 1] = np.float32(clipped(mean_off, sigma, off))

@@ -27,9 +27,9 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
 
 F = np.float32
@@ -101,7 +101,7 @@ def step_weights(dt: float, tau1: float, tau2: float) -> Weights:
     return Weights(x1, w1, -math.expm1(-a2), g, w2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def light_weights_32(a1, a2):
     """`step_weights` in float32 for a first pole that differs from pixel to pixel; a = dt/tau > 0."""
     slow, fast = min(a1, a2), max(a1, a2)
@@ -113,7 +113,7 @@ def light_weights_32(a1, a2):
     return x1, x1 / a1, x2, a2 * difference, w2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def response_terms(du, e1, e2, a, b, two):
     """(c1, c2) of the response above; with one pole (`two` False) e1 is its lag, a its rate, and c2 is 0."""
     if not two:
@@ -122,19 +122,19 @@ def response_terms(du, e1, e2, a, b, two):
     return (du / a - e1) * k, e1 * k - e2 - du * (a / (b * (b - a)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def response(s, y0, du, c1, c2, a, b):
     """y(s): the filtered signal at a fraction s of the interval."""
     return y0 + fma(c2, expm1_64(-b * s), fma(c1, expm1_64(-a * s), du * s))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def response_slope(s, du, c1, c2, a, b):
     """dy/ds at a fraction s of the interval."""
     return du - a * c1 * exp64(-a * s) - b * c2 * exp64(-b * s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
     """Where the slope changes sign in [lo, hi]: bracketed Newton steps, to 1e-8 of the faster time constant."""
     enough = 1e-8 / max(1.0, max(a, b))
@@ -154,7 +154,7 @@ def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
     return s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def turning_points(at_0, at_1, du, c1, c2, a, b):
     """The interior extrema of y, in order, each 1.0 where there is none; at_0, at_1 are the slopes at the ends.
 
@@ -180,7 +180,7 @@ def turning_points(at_0, at_1, du, c1, c2, a, b):
     return 1.0, 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def separate_rates(a, b):
     """`separate` for rates: a, moved away from b where the two are closer than 2e-7 of b."""
     return b * (1.0 + _APART) if (b > 0.0) & (abs(a - b) < _APART * b) else a

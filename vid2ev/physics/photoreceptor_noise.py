@@ -21,9 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from pydantic import BaseModel, Field
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
@@ -68,7 +68,7 @@ def noise_step(dt: float, tau1: float, tau2: float, rms: float, fresh: bool) -> 
     return NoiseStep(keep1, mix, keep2, s11, s21, math.sqrt(max(q22 - s21 * s21, 0.0)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def noise_draw(n1, n2, pixel, num, iv):
     """The pair after one interval (float32)."""
     words = philox(num.seed, PHOTORECEPTOR + 256 * num.camera, pixel, iv.step)
@@ -79,7 +79,7 @@ def noise_draw(n1, n2, pixel, num, iv):
     return first, second
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def rice_expected(to_on, to_off, num, iv):
     """Up-crossings of the ON level and down-crossings of the OFF level in one interval, at these distances [nat]."""
     on, off = max(to_on, 0.0) / num.noise_rms, max(to_off, 0.0) / num.noise_rms
@@ -87,7 +87,7 @@ def rice_expected(to_on, to_off, num, iv):
     return per_interval * (exp64(-0.5 * on * on) + exp64(-0.5 * off * off))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def rice_gap(pixel, k, num, iv):
     """The exponential number that stands for the wait of candidate k of a pixel in this interval."""
     words = philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 16) + k)

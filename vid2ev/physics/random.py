@@ -10,8 +10,8 @@ effect + 256 * camera).  Nothing is carried from one draw to the next, so chunks
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import compiled
 from vid2ev.physics.elementary import fma, log64
 
 PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE = range(8)
@@ -22,7 +22,7 @@ _32 = np.uint64(32)
 _TO_UNIT = 2.0**-32
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _round(c0, c1, c2, c3, k0, k1):
     first, second = np.uint64(c0) * _M0, np.uint64(c2) * _M1
     return (
@@ -33,7 +33,7 @@ def _round(c0, c1, c2, c3, k0, k1):
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def philox(seed, stream, pixel, tick):
     """Four uint32 words for a seed (uint64), a stream (effect + 256 * camera), a pixel and a tick (int64)."""
     c0, c3 = np.uint32(pixel), np.uint32(stream)
@@ -45,13 +45,13 @@ def philox(seed, stream, pixel, tick):
     return c0, c1, c2, c3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def unit(word):
     """A uint32 word as a float64 in (0, 1), symmetric about 1/2."""
     return (np.float64(word) + 0.5) * _TO_UNIT
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def normal_pair(first, second):
     """Two independent standard normal numbers from two words (Box and Muller 1958); |z| < 6.8."""
     radius = np.sqrt(-2.0 * log64(unit(first)))

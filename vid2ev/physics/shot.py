@@ -3,7 +3,7 @@
     rate(light) = shot_rate_hz (1 - (1 - f) light)   for light up to 1,   f = shot_light_factor = 0.25
 
 ON and OFF together, half each; each resets the memory to the signal.  They are a Poisson process: candidates come at
-`shot_rate_hz` in each aligned group of 1024 pixels and each cell of a fixed 1 ms clock, and each is kept with the
+`shot_rate_hz` in each aligned block of 2048 pixels and each cell of a fixed 1 ms clock, and each is kept with the
 probability that the light at its instant asks for, so neither frames nor tiles change anything.
 
 Source: v2e (Hu, Liu, Delbruck 2021), rate falling to a quarter at full scale, there at most one event per frame.
@@ -11,8 +11,9 @@ Source: v2e (Hu, Liu, Delbruck 2021), rate falling to a quarter at full scale, t
 
 from __future__ import annotations
 
-from numba import njit
 from pydantic import BaseModel, Field
+
+from vid2ev.kernel_cache import compiled
 
 CELL_NS = 1_000_000
 
@@ -24,7 +25,7 @@ class Shot(BaseModel, frozen=True, extra="forbid"):
     shot_light_factor: float = Field(0.25, ge=0, le=1, description="the rate at light 1, relative to the dark")
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def shot_share(light, factor):
     """The share of the dark rate that is left at a light."""
     return 1.0 - (1.0 - factor) * min(max(light, 0.0), 1.0)

@@ -74,27 +74,39 @@ def planes_of(spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int
     """State of the pixels, yet without light, and the map of bad pixels (uint8: 1 hot, 2 cold)."""
     pixels = width * height
     blocks = -(-pixels // BLOCK)
-    theta = np.empty(2 * pixels if flags.mismatch else 0, np.float32)
-    if flags.mismatch:
-        fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
     if spec.hot_probability > 0 or spec.cold_probability > 0:
         bad = bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
     else:
         bad = np.zeros(pixels, np.uint8)
-    remembers_events = flags.refractory or num.hot_rate_hz > 0
+    remembers_events = bool(flags.refractory) or num.hot_rate_hz > 0
+    fields = records_of(pixels, flags, remembers_events)
+    if flags.mismatch:
+        fill_thresholds(fields["theta"], num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
     planes = Planes(
         fast=np.empty(blocks * stride_of(flags), np.float32),
         rest=np.zeros(2 * PITCH * blocks if flags.poles and not flags.log_input else 0, np.float32),
-        memory=np.empty(pixels, np.float64),
-        theta=theta,
-        drawn=np.empty(2 * pixels if flags.crossing_noise else 0, np.float32),
-        t_last=np.zeros(pixels if remembers_events else 1, np.int64),
-        count=np.zeros(pixels if flags.crossing_noise else 1, np.uint32),
-        t_reset=np.zeros(pixels if flags.labels and flags.leak else 1, np.int64),
+        **fields,
         hot=np.flatnonzero(bad == 1).astype(np.int32),
         shade=shading_map(spec.shading, width, height).ravel() if flags.shading else np.empty(0, np.float32),
     )
     return planes, bad
+
+
+def records_of(pixels: int, flags: Flags, remembers_events: bool) -> dict[str, np.ndarray]:
+    """What the slow path keeps of each pixel, as views of records: one line of memory for each that it takes."""
+    fields: dict[str, tuple[type, tuple[int, ...], object]] = {
+        "memory": (np.float64, (), True),
+        "theta": (np.float32, (2,), flags.mismatch),
+        "drawn": (np.float32, (2,), flags.crossing_noise),
+        "t_last": (np.int64, (), remembers_events),
+        "t_reset": (np.int64, (), flags.labels and flags.leak),
+        "count": (np.uint32, (), flags.crossing_noise),
+    }
+    used = [(name, kind, shape) for name, (kind, shape, wanted) in fields.items() if wanted]
+    records = np.zeros(pixels, np.dtype(used, align=True))
+    return {
+        name: records[name] if wanted else np.zeros((1, *shape), kind) for name, (kind, shape, wanted) in fields.items()
+    }
 
 
 def interval_of(
