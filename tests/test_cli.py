@@ -330,6 +330,24 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
 
 
 @posix
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_control_c_counts_even_where_python_loses_the_exception() -> None:
+    from vid2ev.commands.convert import _heard
+
+    class Callback:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+
+    with _heard() as check:
+        check()
+        callback = Callback()
+        del callback
+        with pytest.raises(KeyboardInterrupt):
+            check()
+
+
+@posix
 def test_a_terminal_shows_progress_and_a_file_does_not() -> None:
     import pty
     import termios

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -127,7 +129,7 @@ def convert(
         click.echo(_plan(video, directory, overwrite, resume, dict(options)))
     if dry_run:
         return
-    with _kept(directory), _bar(quiet) as report:
+    with _kept(directory), _heard() as check, _bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, overwrite=overwrite, resume=resume, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
@@ -168,7 +170,31 @@ def _kept(directory: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _bar(quiet: bool) -> Iterator[Callable[[Recipe, Progress], None]]:
+def _heard() -> Iterator[Callable[[], None]]:
+    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew."""
+    asked = False
+
+    def note(*_: Any) -> None:
+        nonlocal asked
+        asked = True
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Progress], None]]:
     """A progress bar on a terminal: frames, time left, events per second, and speed against real time."""
     from tqdm import tqdm
 
@@ -176,6 +202,7 @@ def _bar(quiet: bool) -> Iterator[Callable[[Recipe, Progress], None]]:
 
     def report(recipe: Recipe, done: Progress) -> None:
         nonlocal bar
+        check()
         if bar is None:
             total, first = recipe.source.frames_expected, done.frames - 1
             bar = tqdm(total=total, initial=first, bar_format=BAR, leave=False, disable=quiet or None)
