@@ -330,7 +330,6 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
 
 
 @posix
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_control_c_counts_even_where_python_loses_the_exception() -> None:
     from vid2ev.commands.convert import _heard
 

@@ -183,14 +183,20 @@ def _heard() -> Iterator[Callable[[], None]]:
         if asked:
             raise KeyboardInterrupt
 
+    def tell(lost: Any) -> None:
+        if lost.exc_type is not KeyboardInterrupt:  # that one is not lost
+            tell_before(lost)
+
     if threading.current_thread() is not threading.main_thread():
         yield check
         return
-    before = signal.signal(signal.SIGINT, note)
+    before, tell_before = signal.signal(signal.SIGINT, note), sys.unraisablehook
+    sys.unraisablehook = tell
     try:
         yield check
     finally:
         signal.signal(signal.SIGINT, before)
+        sys.unraisablehook = tell_before
 
 
 @contextmanager

@@ -20,19 +20,20 @@ _LOCAL = np.int64(52)  # bit at which the pixel stands in the key that orders ca
 
 
 @inner
-def _add(keys, chance, n, local, since_t0, share):
-    if n == keys.size:
-        more_keys, more_chance = np.empty(2 * n, np.int64), np.empty(2 * n, np.float64)
-        for i in range(n):
-            more_keys[i], more_chance[i] = keys[i], chance[i]
-        keys, chance = more_keys, more_chance
-    keys[n], chance[n] = (np.int64(local) << _LOCAL) | since_t0, share
-    return keys, chance, n + 1
+def longer(keys, chance, n):
+    """Copies of the buffers, twice as long, with their first n entries."""
+    more_keys, more_chance = np.empty(2 * keys.size, np.int64), np.empty(2 * keys.size, np.float64)
+    for i in range(n):
+        more_keys[i], more_chance[i] = keys[i], chance[i]
+    return more_keys, more_chance
 
 
 @inner
 def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
-    """Arrivals in a cell are equally likely anywhere in (pixels of the block) x (time): a walk of exponential gaps."""
+    """Add the shots of a cell; returns how many candidates there are then, or -1 if the buffers are too short.
+
+    Arrivals in a cell are equally likely anywhere in (pixels of the block) x (time): a walk of exponential gaps.
+    """
     per_block = BLOCK * num.shot_rate_hz * CELL_NS * 1e-9
     place, k, last = 0.0, 0, iv.t0_ns + np.int64(iv.dt_ns)
     while True:
@@ -40,26 +41,31 @@ def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
         place -= log64(unit(words[0])) / per_block
         local = np.int64(place * BLOCK)
         if local >= pixels:
-            return keys, chance, n
+            return n
+        if n == keys.size:
+            return -1
         t_ns = cell * CELL_NS + 1 + np.int64(unit(words[1]) * CELL_NS)
-        if (t_ns > iv.t0_ns) & (t_ns <= last):
-            polarity = 1.0 if words[3] & np.uint32(1) else -1.0
-            keys, chance, n = _add(keys, chance, n, local, t_ns - iv.t0_ns, polarity * unit(words[2]))
+        keys[n] = (local << _LOCAL) | (t_ns - iv.t0_ns)
+        chance[n] = (1.0 if words[3] & np.uint32(1) else -1.0) * unit(words[2])
+        n += np.int64((t_ns > iv.t0_ns) & (t_ns <= last))
         k += 1
 
 
 @inner
 def _hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
+    """Add the events of a hot pixel in a cell; returns as `_shot_of_cell` does."""
     gap_ns, k, last = 1e9 / num.hot_rate_hz, 0, iv.t0_ns + np.int64(iv.dt_ns)
     place = 0.0
     while True:
         words = philox(num.seed, HOT + 256 * num.camera, pixel, (cell << 17) + k)
         place -= log64(unit(words[0])) * gap_ns
         if place >= CELL_NS:
-            return keys, chance, n
+            return n
+        if n == keys.size:
+            return -1
         t_ns = cell * CELL_NS + 1 + np.int64(place)
-        if (t_ns > iv.t0_ns) & (t_ns <= last):
-            keys, chance, n = _add(keys, chance, n, pixel - p0, t_ns - iv.t0_ns, 0.0)
+        keys[n], chance[n] = ((pixel - p0) << _LOCAL) | (t_ns - iv.t0_ns), 0.0
+        n += np.int64((t_ns > iv.t0_ns) & (t_ns <= last))
         k += 1
 
 
@@ -70,15 +76,23 @@ def candidates(keys, chance, p0, pixels, hot, num, iv):
     `chance` is 0 for a hot pixel's event, else polarity (its sign) and the number in (0, 1) that the share of the rate
     left at the light must exceed.
     """
-    n = 0
+    n = np.int64(0)
     first, last = iv.t0_ns // CELL_NS, (iv.t0_ns + np.int64(iv.dt_ns) - 1) // CELL_NS
     if num.shot_rate_hz > 0.0:
         for cell in range(first, last + 1):
-            keys, chance, n = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
+            more = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
+            while more < 0:
+                keys, chance = longer(keys, chance, n)
+                more = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
+            n = more
     if num.hot_rate_hz > 0.0:
         for h in range(first_from(hot, p0), first_from(hot, p0 + pixels)):
             for cell in range(first, last + 1):
-                keys, chance, n = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
+                more = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
+                while more < 0:
+                    keys, chance = longer(keys, chance, n)
+                    more = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
+                n = more
     if n > 64:
         keys, chance = sorted_by_pixel(keys, chance, n)
     for i in range(1, n):  # now mostly in order
