@@ -35,7 +35,7 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
         4096,
         ge=1,
         le=1_000_000,
-        description="crossings solved per pixel and monotone stretch of an interval; what is beyond is one step, and counted",
+        description="crossings solved per pixel and monotone stretch of an interval; the rest is one step, and counted",
     )
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,10 +10,11 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
 from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, PIXEL_LIMIT, SWALLOWED, TALLIES
-from vid2ev.kernels.order import sorted_by_time, unpack
+from vid2ev.kernels.order import order_keys, unpack
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.tiles import Tiles
 from vid2ev.sources.transfer import code_table
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -24,6 +23,7 @@ __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 LEAK_REBASE_NAT = 0.5
+WORTH_THREADS = 1 << 15  # events that take longer to put in order than threads take to wake
 STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
 
 
@@ -80,11 +80,8 @@ class Dvs:
         self._leak_since_ns = 0
         self._step = 0
         self._fresh_noise = True
-        blocks = -(-width * height // BLOCK)
-        cuts = [blocks * k // min(threads, blocks) for k in range(min(threads, blocks) + 1)]
-        self._tiles = list(pairwise(cuts))
-        self._buffers = [np.empty(4096, np.uint64) for _ in self._tiles]
-        self._pool = ThreadPoolExecutor(len(self._tiles)) if len(self._tiles) > 1 else None
+        self._tiles = Tiles(-(-width * height // BLOCK), threads)
+        self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
         self._tables: dict[Any, np.ndarray] = {}
 
     # ------------------------------------------------------------------------------------------------- light in
@@ -199,11 +196,6 @@ class Dvs:
             return np.array([1.0 / ((1 << bits) - 1)], np.float32)  # one entry: a product is faster than a look-up
         return code_table(self.transfer, bits)
 
-    def _each_tile(self, work: Any) -> list:
-        if self._pool is None:
-            return [work(0, *self._tiles[0])]
-        return list(self._pool.map(lambda k: work(k, *self._tiles[k]), range(len(self._tiles))))
-
     def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
@@ -211,13 +203,13 @@ class Dvs:
                 self._flags, self._numbers, self._tallies[k],
             )  # fmt: skip
 
-        self._each_tile(settle)
+        self._tiles.each_blocks(settle)
         self._t_ns = self._leak_since_ns = t_ns
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
         if self._frames is not None:
             self._frames.origin_us = t_ns // 1000
 
-    def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> np.ndarray:
+    def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> list[np.ndarray]:
         def walk(k: int, first: int, last: int) -> np.ndarray:
             self._buffers[k], n = walk_tile(
                 first, last, self._bad.size, flat, table, self._planes, self._flags, self._numbers, interval,
@@ -225,22 +217,19 @@ class Dvs:
             )  # fmt: skip
             return self._buffers[k][:n]
 
-        keys = self._each_tile(walk)
-        return keys[0] if len(keys) == 1 else np.concatenate(keys)
+        return self._tiles.each_blocks(walk)
 
-    def _events(self, keys: np.ndarray, interval: Any) -> Events:
-        if len(keys) == 0:
+    def _events(self, parts: list[np.ndarray], interval: Any) -> Events:
+        ends = np.cumsum([0, *map(len, parts)])
+        n, count = int(ends[-1]), len(parts)
+        if n == 0:
             return Events.empty(self.labels)
-        n = len(keys)
-        t, x, y, p = (
-            np.empty(n, np.int64),
-            np.empty(n, np.uint16),
-            np.empty(n, np.uint16),
-            np.empty(n, np.uint8),
-        )
+        keys = np.empty(n, np.uint64)
+        t, x, y, p = np.empty(n, np.int64), np.empty(n, np.uint16), np.empty(n, np.uint16), np.empty(n, np.uint8)
         label = np.empty(n if self.labels else 0, np.uint8)
-        ordered = sorted_by_time(keys, n, interval.last_us)
-        unpack(ordered, self.size[0], interval.first_us, t, x, y, p, label)
+        each = self._tiles.each if n > WORTH_THREADS else lambda work: [work(k) for k in range(count)]
+        each(lambda k: order_keys(parts[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
+        each(lambda k: unpack(keys, ends, k, count, self.size[0], interval.first_us, t, x, y, p, label))
         return Events(t, x, y, p, label if self.labels else None)
 
     def _counted(self, events: Events) -> Events:
