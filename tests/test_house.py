@@ -25,6 +25,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 FLOORS = {
     "errors": 0,
     "kernel_cache": 0,
+    "kernel_compiler": 0,
     "stream": 1,
     "sources": 2,
     "upsample": 2,

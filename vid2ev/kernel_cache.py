@@ -15,20 +15,12 @@ import contextlib
 import hashlib
 import uuid
 from pathlib import Path
-from typing import Any
 
-from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
 _COMPILED = ("physics", "kernels")
 _MARK = uuid.uuid4().hex[:8]
-
-# What kernels have in common; `inner` ones can only be called by kernels, which saves a third of the time to compile.
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
-compiled = njit(cache=True, **OPTIONS)
-inner = njit(cache=True, **INNER_OPTIONS)
 
 
 def mark_our_kernels() -> None:
@@ -39,7 +31,7 @@ def mark_our_kernels() -> None:
 def drop_stale_kernels() -> None:
     """Delete the cached kernels if the sources are not those that they were compiled from; never fails."""
     folders = [_HERE / name for name in _COMPILED]
-    sources = sorted(path for folder in folders for path in folder.glob("*.py"))
+    sources = sorted([*_HERE.glob("kernel_*.py"), *(path for folder in folders for path in folder.glob("*.py"))])
     dates = [(str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in sources]
     stamp = hashlib.sha256(repr(dates).encode()).hexdigest()
     stamp_file = _HERE / _COMPILED[0] / "__pycache__" / "kernels.stamp"

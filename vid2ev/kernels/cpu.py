@@ -1,21 +1,17 @@
-"""The walk on a CPU: blocks of pixels; scan, gather what is flagged, solve.
-
-Which slow path a walk needs is known from the types of its flags, so `overload` picks it, and numba compiles no other.
-"""
+"""The walk on a CPU: blocks of pixels; scan, gather what is flagged, solve."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba.core.extending import overload
 
-from vid2ev.kernel_cache import INNER_OPTIONS, compiled, inner
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import KNOTS, walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LANE_COUNT, LOW, PITCH, last_light, place_of, stride_of
 from vid2ev.kernels.scan import NEW, SCRATCH, commit, read_light, scan
 from vid2ev.kernels.shots import aim
-from vid2ev.kernels.slow import climb, is_on, load, new_work
+from vid2ev.kernels.slow import climb, load, new_work
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
 
@@ -61,7 +57,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(LANE_COUNT, np.int64)
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
     knots = np.empty(KNOTS, np.float64)
-    n, used, shots = np.int64(0), np.int64(0), np.int64(0)
+    n, used, shots, forced = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
@@ -69,19 +65,21 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
-        if shots > LANE_COUNT // 2:
-            out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
-            shots = np.int64(0)
-        keys, chance, forced, shots = take_forced(
-            block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
-        )
+        if len(flags.forced):
+            if shots > LANE_COUNT // 2:
+                out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
+                shots = np.int64(0)
+            keys, chance, forced, shots = take_forced(
+                block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
+            )
         for i in range(size, BLOCK):
             flagged[i] = 0
         count = hits_of(flagged, hits)
-        count, out, n = take_general(
-            block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num, iv,
-            out, n, tally,
-        )  # fmt: skip
+        if len(flags.forced) + len(flags.noise) + len(flags.no_closed_form):
+            count, out, n = take_general(
+                block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num,
+                iv, out, n, tally,
+            )  # fmt: skip
         first = np.int64(0)
         while first < count:
             if used == LANE_COUNT:
@@ -92,119 +90,77 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             first, used = first + some, used + some
         commit(block, scratch, size, flags)
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
-    return fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
+    if len(flags.forced):
+        out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
+    return out, n
 
 
+@inner
 def take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
     """Load the shots of a block, flag the pixels of other forced events: (keys, chance, candidates left, shots)."""
+    keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+    forced = keep_likely(block, scratch, keys, chance, forced, flags, num, iv)
+    if all_general(flags, iv):
+        for j in range(forced):
+            flagged[place_of_candidate(keys[j], iv)[0]] = 1
+    else:
+        forced, shots = aim(
+            block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv
+        )
+    return keys, chance, forced, shots
 
 
+@inner
+def all_general(flags, iv):
+    """Whether all flagged pixels take the general path in this interval."""
+    if len(flags.no_closed_form):
+        return True
+    return len(flags.noise) > 0 and not iv.noise_resolved
+
+
+@inner
 def fire(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
     """Send the loaded shots: (out, n)."""
+    for k in range(shots):
+        every[k] = k
+    return cross(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally)
 
 
-@overload(fire, jit_options=INNER_OPTIONS)
-def _fire(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
-    if not is_on(flags, "forced"):
-        return lambda lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally: (out, n)
-
-    def some(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
-        for k in range(shots):
-            every[k] = k
-        return cross(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally)
-
-    return some
-
-
+@inner
 def take_general(
     block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
 ):
     """Walk the flagged pixels that need the general path; the others stay in `hits`: (how many, out, n)."""
-
-
-def always_general(flags):
-    """Whether no flagged pixel has a closed form, by the numba type of the flags."""
-    # A drift after a low-pass that acts on the light has none, nor has a memory that jumps to the signal.
-    curved = not is_on(flags, "straight") and not is_on(flags, "log_input")
-    return is_on(flags, "track") or (curved and (is_on(flags, "leak") or is_on(flags, "noise")))
-
-
-@overload(take_forced, jit_options=INNER_OPTIONS)
-def _take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
-    always = always_general(flags)
-    if not is_on(flags, "forced"):
-
-        def none(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
-            return keys, chance, 0, shots
-
-        return none
-
-    def some(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
-        keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
-        forced = keep_likely(block, scratch, keys, chance, forced, flags, num, iv)
-        if always or (len(flags.noise) > 0 and not iv.noise_resolved):
-            for j in range(forced):
-                flagged[place_of_candidate(keys[j], iv)[0]] = 1
-        else:
-            forced, shots = aim(
-                block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv
+    left, j, every = np.int64(0), 0, all_general(flags, iv)
+    for k in range(count):
+        i = np.int64(hits[k])
+        while j < forced and place_of_candidate(keys[j], iv)[0] < i:
+            j += 1
+        if every or (j < forced and place_of_candidate(keys[j], iv)[0] == i):
+            out, n = walk_pixel(
+                block,
+                scratch,
+                i,
+                p0,
+                lanes,
+                pixels,
+                keys,
+                chance,
+                forced,
+                knots,
+                j,
+                planes,
+                flags,
+                num,
+                iv,
+                out,
+                n,
+                tally,
             )
-        return keys, chance, forced, shots
-
-    return some
-
-
-@overload(take_general, jit_options=INNER_OPTIONS)
-def _take_general(
-    block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
-):
-    always = always_general(flags)
-    if not (always or is_on(flags, "forced") or is_on(flags, "noise")):
-
-        def nothing(
-            block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out,
-            n, tally,
-        ):  # fmt: skip
-            return count, out, n
-
-        return nothing
-
-    def some(
-        block,
-        scratch,
-        hits,
-        count,
-        p0,
-        lanes,
-        pixels,
-        keys,
-        chance,
-        forced,
-        knots,
-        planes,
-        flags,
-        num,
-        iv,
-        out,
-        n,
-        tally,
-    ):
-        left, j = np.int64(0), 0
-        every = always or (len(flags.noise) > 0 and not iv.noise_resolved)
-        for k in range(count):
-            while j < forced and place_of_candidate(keys[j], iv)[0] < hits[k]:
-                j += 1
-            if every or (j < forced and place_of_candidate(keys[j], iv)[0] == hits[k]):
-                out, n = walk_pixel(
-                    block, scratch, hits[k], p0, lanes, pixels, keys, chance, forced, knots, j, planes, flags, num, iv,
-                    out, n, tally,
-                )  # fmt: skip
-            else:
-                hits[left] = hits[k]
-                left += 1
-        return left, out, n
-
-    return some
+        else:
+            hits[left] = i
+            left += 1
+    return left, out, n
 
 
 @compiled

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_cache import inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import (
     AT,
     HOT,

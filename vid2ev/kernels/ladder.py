@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
 from vid2ev.kernels.layout import CAPPED, LANE_PITCH
 

@@ -5,7 +5,7 @@ pixel), so that the compiler sees that planes do not overlap and a block's work 
 the slow path touches is plain planes.  The slow path takes pixels out into **lanes**, planes of its own.
 
 A **flag** is a tuple: empty when the effect is off, of length one when it is on.  Its type differs, so numba compiles a
-walk for each combination in use, and an effect that is off leaves no instruction behind.
+walk for each combination in use, and what `if len(flags.effect):` switches off is not even looked at.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.log_curve import Curve
 
 BLOCK_BITS = 11  # larger, and the scratch leaves the cache; smaller, and each block starts too many streams
@@ -54,6 +54,8 @@ class Flags(NamedTuple):
     noise: tuple  # photoreceptor noise
     forced: tuple  # shot noise or hot pixels
     labels: tuple
+    uncounted: tuple  # crossings have to be looked at one by one, in order of time
+    no_closed_form: tuple  # a flagged pixel always takes the general path
 
 
 class Numbers(NamedTuple):

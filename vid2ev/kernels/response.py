@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels import turns as T
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED, RUNGS, keep_lanes, reached_lanes
 from vid2ev.kernels.layout import HIGH, INPUT, LANE_PITCH, LOW, PITCH
@@ -40,7 +40,7 @@ ENOUGH = 2e-3
 def load_responses(block, scratch, lanes, pixels, hits, count, p0, flags):
     """Input, rise, lags and levels of flagged pixels into lanes; `prepare_responses` makes the rest of them."""
     for j in range(count):
-        i = hits[j]
+        i = np.int64(hits[j])
         pixels[j] = p0 + i
         old, new = np.float64(block[INPUT * PITCH + i]), np.float64(scratch[NEW + i])
         lanes[Y0 + j], lanes[RISE + j], lanes[LAST + j] = old, new - old, new

@@ -1,8 +1,7 @@
 """The slow path: events of the pixels that the scan flagged, some blocks' worth at a time.
 
 Monotone piece by monotone piece: which levels are reached (`ladder`), when (`straight` or `response`), and what that
-leaves behind and sends (`crossing`).  Which of them a walk needs is known from the types of its flags, so `overload`
-picks it, and numba compiles no other.
+leaves behind and sends (`crossing`).
 """
 
 from __future__ import annotations
@@ -10,9 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.core.extending import overload
 
-from vid2ev.kernel_cache import INNER_OPTIONS, compiled, inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
@@ -35,7 +33,7 @@ class Work(NamedTuple):
     turns: np.ndarray  # float64
 
 
-@compiled
+@inner
 def new_work():
     """Scratch for LANE_COUNT lanes."""
     return Work(
@@ -51,35 +49,24 @@ def new_work():
     )
 
 
-def is_on(flags, name):
-    """Whether a flag is on, from the numba type of the flags."""
-    return len(flags.types[flags.fields.index(name)]) > 0
-
-
+@inner
 def load(block, scratch, lanes, pixels, hits, count, p0, flags):
     """Load the flagged pixels of a block into lanes."""
-
-
-def prepare(work, count, flags, num, iv):
-    """Make the signals of the loaded lanes, each on its first monotone piece."""
-
-
-def take_piece(work, count, planes, flags, num, iv, out, n, tally):
-    """Events of each lane's piece, the memories in AT: (out, n)."""
-
-
-def find_times(work, count, flags, num, iv):
-    """The times `when` of a batch of crossings."""
-
-
-def go_on(work, count, flags, num, iv):
-    """Keep the lanes with another piece, and move them to it; returns their number."""
+    if len(flags.straight):
+        load_lines(block, scratch, lanes, pixels, hits, count, p0, flags)
+    else:
+        load_responses(block, scratch, lanes, pixels, hits, count, p0, flags)
 
 
 @inner
 def climb(work, count, planes, flags, num, iv, out, n, tally):
     """All events of `count` loaded lanes: (out, n)."""
-    prepare(work, count, flags, num, iv)
+    if len(flags.straight):
+        prepare_lines(work.lanes, count, flags, num, iv)
+    else:
+        prepare_responses(
+            work.lanes, work.turns, work.guesses, work.live, count, slower_rate(flags, iv), flags, num, iv
+        )
     while count > 0:
         load_thresholds(work.lanes, work.pixels, count, planes, flags, num)
         if len(flags.labels):
@@ -87,87 +74,49 @@ def climb(work, count, planes, flags, num, iv, out, n, tally):
                 work.lanes[j] = 0.0
         out, n = take_piece(work, count, planes, flags, num, iv, out, n, tally)
         leave_levels(work.lanes, work.pixels, count, planes, flags, num)
-        count = go_on(work, count, flags, num, iv)
+        if len(flags.straight):
+            break
+        count = next_pieces(work.lanes, work.pixels, work.live, count, slower_rate(flags, iv), flags, num)
     return out, n
 
 
-@overload(load, jit_options=INNER_OPTIONS)
-def _load(block, scratch, lanes, pixels, hits, count, p0, flags):
-    loader = load_lines if is_on(flags, "straight") else load_responses
-
-    def load_them(block, scratch, lanes, pixels, hits, count, p0, flags):
-        loader(block, scratch, lanes, pixels, hits, count, p0, flags)
-
-    return load_them
+@inner
+def slower_rate(flags, iv):
+    """The rate of the second pole."""
+    return iv.b if len(flags.poles) == 2 else 0.0
 
 
-@overload(prepare, jit_options=INNER_OPTIONS)
-def _prepare(work, count, flags, num, iv):
-    if is_on(flags, "straight"):
-
-        def lines(work, count, flags, num, iv):
-            prepare_lines(work.lanes, count, flags, num, iv)
-
-        return lines
-
-    def responses(work, count, flags, num, iv):
-        b = iv.b if len(flags.poles) == 2 else 0.0
-        prepare_responses(work.lanes, work.turns, work.guesses, work.live, count, b, flags, num, iv)
-
-    return responses
+@inner
+def take_piece(work, count, planes, flags, num, iv, out, n, tally):
+    """Events of each lane's piece, the memories in AT: (out, n)."""
+    if len(flags.crossing_noise):
+        return drawn_levels(work, count, planes, flags, num, iv, out, n, tally)
+    if len(flags.uncounted):
+        return steady_levels(work, count, planes, flags, num, iv, out, n, tally)
+    crossings = count_rungs(work.lanes, count, num, tally)
+    return send_lines(work.lanes, work.pixels, count, crossings, flags, num, iv, out, n)
 
 
-@overload(find_times, jit_options=INNER_OPTIONS)
-def _find_times(work, count, flags, num, iv):
-    if is_on(flags, "straight"):
-
-        def lines(work, count, flags, num, iv):
-            line_times(work.levels, work.when, work.who, count, work.lanes, flags)
-
-        return lines
-
-    def responses(work, count, flags, num, iv):
-        b = iv.b if len(flags.poles) == 2 else 0.0
-        response_times(work.levels, work.when, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num)
-
-    return responses
-
-
-@overload(go_on, jit_options=INNER_OPTIONS)
-def _go_on(work, count, flags, num, iv):
-    if is_on(flags, "straight"):
-        return lambda work, count, flags, num, iv: 0
-
-    def responses(work, count, flags, num, iv):
-        b = iv.b if len(flags.poles) == 2 else 0.0
-        return next_pieces(work.lanes, work.pixels, work.live, count, b, flags, num)
-
-    return responses
-
-
-@overload(take_piece, jit_options=INNER_OPTIONS)
-def _take_piece(work, count, planes, flags, num, iv, out, n, tally):
-    if is_on(flags, "crossing_noise"):
-        return _drawn_levels
-    in_turn = is_on(flags, "refractory") or (is_on(flags, "labels") and is_on(flags, "leak"))
-    if in_turn or not is_on(flags, "straight"):
-        return _steady_levels
-
-    def counted(work, count, planes, flags, num, iv, out, n, tally):
-        crossings = count_rungs(work.lanes, count, num, tally)
-        return send_lines(work.lanes, work.pixels, count, crossings, flags, num, iv, out, n)
-
-    return counted
-
-
-def _steady_levels(work, count, planes, flags, num, iv, out, n, tally):
+@inner
+def steady_levels(work, count, planes, flags, num, iv, out, n, tally):
+    """Events of each lane's piece if its thresholds stay."""
     count_rungs(work.lanes, count, num, tally)
     j, rung = 0, 0
     while j < count:
         j, rung, waiting = fill_batch(work.lanes, work.who, work.levels, j, rung, count, num)
-        find_times(work, waiting, flags, num, iv)
-        out, n = send(work.when, work.who, waiting, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+        out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
     return out, n
+
+
+@inner
+def send_batch(work, count, planes, flags, num, iv, out, n, tally):
+    """Find the times of a batch of crossings, and send them: (out, n)."""
+    if len(flags.straight):
+        line_times(work.levels, work.when, work.who, count, work.lanes, flags)
+    else:
+        b = slower_rate(flags, iv)
+        response_times(work.levels, work.when, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num)
+    return send(work.when, work.who, count, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
 
 
 @inner
@@ -193,13 +142,14 @@ def fill_batch(lanes, who, levels, j, rung, count, num):
     return j, 0, waiting
 
 
-def _drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
+@inner
+def drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
+    """Events of each lane's piece if its thresholds are drawn anew at each crossing."""
     waiting = 0
     while True:
         alive = next_rungs(work.lanes, count, work.live, num, tally)
         if waiting + alive > LANE_COUNT or alive == 0:
-            find_times(work, waiting, flags, num, iv)
-            out, n = send(work.when, work.who, waiting, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+            out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
             waiting = 0
         if alive == 0:
             return out, n

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
 from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
@@ -22,7 +22,7 @@ def load_lines(block, scratch, lanes, pixels, hits, count, p0, flags):
     """The comparator's input before and after the interval, light or nats, of flagged pixels into lanes."""
     poles = len(flags.poles)
     for j in range(count):
-        i = hits[j]
+        i = np.int64(hits[j])
         pixels[j] = p0 + i
         before, after = np.float64(block[INPUT * PITCH + i]), np.float64(scratch[NEW + i])
         if poles == 1:

@@ -17,7 +17,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.random import PHASE, philox, unit
 
 

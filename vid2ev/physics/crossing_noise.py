@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.mismatch import clipped
 from vid2ev.physics.random import CROSSING, normal_pair, philox
 

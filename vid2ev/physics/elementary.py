@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 from numba.core.extending import intrinsic
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 
 
 def _bitcast(source, target):

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean

@@ -29,7 +29,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
 
 F = np.float32

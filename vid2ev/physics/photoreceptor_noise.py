@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_cache import compiled
+from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit

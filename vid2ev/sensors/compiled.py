@@ -26,23 +26,28 @@ def flags_of(spec: DvsSpec, labels: bool) -> Flags:
 
     poles = len(spec.pole_taus_us)
     log_input = spec.filter == "after" and poles > 0
-    leak, noise = spec.leak_rate_hz > 0, spec.photoreceptor_noise > 0
+    straight = spec.timing != "response" or (spec.filter == "after" and poles == 0)
+    leak, noise, refractory = spec.leak_rate_hz > 0, spec.photoreceptor_noise > 0, spec.refractory_us > 0
+    track = refractory and spec.refractory == "track"
     return Flags(
         poles=(0,) * poles,
         log_input=flag(log_input),
         log_compare=flag(log_input or noise or (leak and spec.log_curve != "offset")),
-        straight=flag(spec.timing != "response" or (spec.filter == "after" and poles == 0)),
+        straight=flag(straight),
         frame_time=flag(spec.timing == "frame"),
         light_bandwidth=flag(spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0),
         shading=flag(spec.shading),
         leak=flag(leak),
         mismatch=flag(spec.mismatch > 0),
         crossing_noise=flag(spec.crossing_noise > 0),
-        refractory=flag(spec.refractory_us > 0),
-        track=flag(spec.refractory_us > 0 and spec.refractory == "track"),
+        refractory=flag(refractory),
+        track=flag(track),
         noise=flag(noise),
         forced=flag(spec.shot_rate_hz > 0 or (spec.hot_probability > 0 and spec.hot_rate_hz > 0)),
         labels=flag(labels),
+        uncounted=flag(not straight or refractory or (labels and leak)),
+        # A drift after a low-pass that acts on the light has none, nor has a memory that jumps to the signal.
+        no_closed_form=flag(track or (not straight and not log_input and (leak or noise))),
     )
 
 

@@ -1,0 +1,145 @@
+"""How kernels are compiled: no more than a walk calls for, and each part once.
+
+**Flags.** A kernel gets its flags as a named tuple of tuples, empty where an effect is off, so their types say which
+effects are on.  numba prunes branches that are constant before it infers types, but does not know that
+`len(flags.noise)` is a constant.  `FlagsAreConstants` tells it, so what is off is not even looked at.
+
+**Inner functions.** numba optimises each function and makes machine code of it, and again wherever it is called.  What
+only kernels call is here made ready to be inlined, and no more.
+
+**Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import _dynfunc, njit  # type: ignore[attr-defined]
+from numba.core import ir, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
+from numba.core.ir_utils import get_definition, guard
+from numba.core.typed_passes import NativeLowering
+from numba.core.untyped_passes import RewriteSemanticConstants
+
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
+
+
+def compiled(function: Callable) -> Any:
+    """A kernel: compiled and cached, for Python and other kernels to call."""
+    return _of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function))
+
+
+def inner(function: Callable) -> Any:
+    """A part of kernels, which only they can call."""
+    return _of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))
+
+
+def _of_plain_types(dispatcher: Any) -> Any:
+    template_of = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda args, kws: template_of([types.unliteral(arg) for arg in args], kws)
+    return dispatcher
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class FlagsAreConstants(FunctionPass):
+    """Lengths of the fields of named tuples, and what is computed from them and other constants, as constants."""
+
+    _name = "flags_are_constants"
+
+    def __init__(self) -> None:
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        func_ir, changed = state.func_ir, False
+        left = [stmt for block in func_ir.blocks.values() for stmt in block.find_insts(ir.Assign)]
+        while folded := [stmt for stmt in left if _fold(stmt, func_ir, state.args)]:
+            left, changed = [stmt for stmt in left if stmt not in folded], True
+        return changed
+
+
+class InnerLibrary(JITCodeLibrary):
+    """The code of an inner function: optimised only as far as loops vectorise, and without machine code."""
+
+    def _optimize_final_module(self) -> None:
+        # (without it, what is inlined into a loop late keeps that loop from being vectorised)
+        passes, builder = self._codegen._module_pass_manager(loop_vectorize=True, slp_vectorize=False, cost="cheap")
+        passes.run(self._final_module, builder)
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class CallableByKernels(LoweringPass):
+    """What numba does with lowered code in the end, but without an address: for inner functions."""
+
+    _name = "callable_by_kernels"
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        if not state.flags.no_compile:
+            return False
+        lowered, libraries = state["cr"], (state.library,)
+        fndesc = lowered.fndesc
+        key = _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "", 0, lowered.env, libraries)
+        state.targetctx.insert_user_function(key, fndesc, libraries)
+        state["cr"] = lowered._replace(cfunc=key)
+        return True
+
+
+class KernelCompiler(CompilerBase):
+    """numba's own compiler with these changes."""
+
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, args: Any, result: Any, flags: Any, names: Any):
+        super().__init__(typingctx, targetctx, library, args, result, flags, names)
+        if flags.no_cpython_wrapper:
+            flags.no_compile = True
+            self.state.library = InnerLibrary(targetctx.codegen(), "inner")
+
+    def define_pipelines(self) -> list:
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(FlagsAreConstants, RewriteSemanticConstants)
+        passes.add_pass_after(CallableByKernels, NativeLowering)
+        passes.finalize()
+        return [passes]
+
+
+def _fold(stmt: Any, func_ir: Any, argument_types: tuple) -> bool:
+    """Make the value of an assignment a constant where it is one."""
+    value, constant = stmt.value, None
+    if not isinstance(value, ir.Expr):
+        return False
+    if value.op == "call":
+        constant = _flag_length(value, func_ir, argument_types)
+    elif value.op == "binop":
+        sides = [guard(get_definition, func_ir, side) for side in (value.lhs, value.rhs)]
+        if all(isinstance(side, ir.Const) for side in sides):
+            constant = value.fn(*(side.value for side in sides))
+    if constant is None:
+        return False
+    definitions = func_ir._definitions[stmt.target.name]
+    stmt.value = ir.Const(constant, stmt.loc)
+    definitions[definitions.index(value)] = stmt.value
+    return True
+
+
+def _flag_length(call: Any, func_ir: Any, argument_types: tuple) -> int | None:
+    """n for `len(argument.field)`, where the field is a tuple of length n."""
+    function, field = guard(get_definition, func_ir, call.func), None
+    if isinstance(function, ir.Global) and function.value is len:
+        field = guard(get_definition, func_ir, call.args[0])
+    if not (isinstance(field, ir.Expr) and field.op == "getattr"):
+        return None
+    argument = guard(get_definition, func_ir, field.value)
+    whole: Any = argument_types[argument.index] if isinstance(argument, ir.Arg) else None
+    if not isinstance(whole, (types.NamedTuple, types.NamedUniTuple)) or field.attr not in whole.fields:
+        return None
+    part = whole.types[whole.fields.index(field.attr)]
+    return len(part) if isinstance(part, types.BaseTuple) else None
