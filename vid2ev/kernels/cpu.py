@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernels.crossing import AT, FREE, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
+from vid2ev.kernels.crossing import AT, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
-from vid2ev.kernels.general import KNOTS, walk_pixel
+from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LANE_COUNT, LOW, PITCH, last_light, place_of, stride_of
-from vid2ev.kernels.scan import NEW, SCRATCH, commit, read_light, scan
+from vid2ev.kernels.scan import NEW, commit, read_light, scan
 from vid2ev.kernels.shots import aim
-from vid2ev.kernels.slow import climb, load, new_work
+from vid2ev.kernels.slow import climb, load
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
 
@@ -45,18 +45,14 @@ def hits_of(flagged, hits):
 
 
 @compiled
-def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, iv, out, tally):
+def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, iv, work, out, tally):
     """Advance blocks first_block ... last_block - 1 by one interval; returns (keys, their number).
 
     Flagged pixels are gathered over as many blocks as fill the lanes, so that the vector code has something to do.
     """
     stride = stride_of(flags)
-    work, scratch = new_work(), np.zeros(SCRATCH, np.float32)
-    flagged, hits = np.zeros(BLOCK, np.uint8), np.empty(BLOCK + 1, np.int32)
-    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
-    shot_lanes, shot_pixels = np.empty(FREE, np.float64), np.empty(LANE_COUNT, np.int64)
+    scratch, flagged, hits = work.scratch, work.flagged, work.hits
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
-    knots = np.empty(KNOTS, np.float64)
     n, used, shots, forced = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
     for index in range(first_block, last_block):
         p0 = index * BLOCK
@@ -67,19 +63,18 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
         if len(flags.forced):
             if shots > LANE_COUNT // 2:
-                out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
+                out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
                 shots = np.int64(0)
             keys, chance, forced, shots = take_forced(
-                block, scratch, flagged, keys, chance, p0, size, shot_lanes, shot_pixels, shots, planes, flags, num, iv
+                block, work, keys, chance, p0, size, shots, planes, flags, num, iv
             )
         for i in range(size, BLOCK):
             flagged[i] = 0
         count = hits_of(flagged, hits)
         if len(flags.forced) + len(flags.noise) + len(flags.no_closed_form):
             count, out, n = take_general(
-                block, scratch, hits, count, p0, one_lane, one_pixel, keys, chance, forced, knots, planes, flags, num,
-                iv, out, n, tally,
-            )  # fmt: skip
+                block, work, count, p0, keys, chance, forced, planes, flags, num, iv, out, n, tally
+            )
         first = np.int64(0)
         while first < count:
             if used == LANE_COUNT:
@@ -91,22 +86,23 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
         commit(block, scratch, size, flags)
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
     if len(flags.forced):
-        out, n = fire(shot_lanes, shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
+        out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
     return out, n
 
 
 @inner
-def take_forced(block, scratch, flagged, keys, chance, p0, size, lanes, pixels, shots, planes, flags, num, iv):
+def take_forced(block, work, keys, chance, p0, size, shots, planes, flags, num, iv):
     """Load the shots of a block, flag the pixels of other forced events: (keys, chance, candidates left, shots)."""
     keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
-    forced = keep_likely(block, scratch, keys, chance, forced, flags, num, iv)
+    forced = keep_likely(block, work.scratch, keys, chance, forced, flags, num, iv)
     if all_general(flags, iv):
         for j in range(forced):
-            flagged[place_of_candidate(keys[j], iv)[0]] = 1
+            work.flagged[place_of_candidate(keys[j], iv)[0]] = 1
     else:
         forced, shots = aim(
-            block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv
-        )
+            block, work.scratch, work.flagged, keys, chance, forced, p0, work.shot_lanes, work.shot_pixels, shots,
+            planes, flags, num, iv,
+        )  # fmt: skip
     return keys, chance, forced, shots
 
 
@@ -119,44 +115,26 @@ def all_general(flags, iv):
 
 
 @inner
-def fire(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally):
+def fire(work, shots, planes, flags, num, iv, out, n, tally):
     """Send the loaded shots: (out, n)."""
     for k in range(shots):
-        every[k] = k
-    return cross(lanes, pixels, every, shots, planes, flags, num, iv, out, n, tally)
+        work.live[k] = k
+    return cross(work.shot_lanes, work.shot_pixels, work.live, shots, planes, flags, num, iv, out, n, tally)
 
 
 @inner
-def take_general(
-    block, scratch, hits, count, p0, lanes, pixels, keys, chance, forced, knots, planes, flags, num, iv, out, n, tally
-):
+def take_general(block, work, count, p0, keys, chance, forced, planes, flags, num, iv, out, n, tally):
     """Walk the flagged pixels that need the general path; the others stay in `hits`: (how many, out, n)."""
-    left, j, every = np.int64(0), 0, all_general(flags, iv)
+    hits, left, j, every = work.hits, np.int64(0), 0, all_general(flags, iv)
     for k in range(count):
         i = np.int64(hits[k])
         while j < forced and place_of_candidate(keys[j], iv)[0] < i:
             j += 1
         if every or (j < forced and place_of_candidate(keys[j], iv)[0] == i):
             out, n = walk_pixel(
-                block,
-                scratch,
-                i,
-                p0,
-                lanes,
-                pixels,
-                keys,
-                chance,
-                forced,
-                knots,
-                j,
-                planes,
-                flags,
-                num,
-                iv,
-                out,
-                n,
-                tally,
-            )
+                block, work.scratch, i, p0, work.one_lane, work.one_pixel, keys, chance, forced, work.knots, j, planes,
+                flags, num, iv, out, n, tally,
+            )  # fmt: skip
         else:
             hits[left] = i
             left += 1
@@ -164,13 +142,12 @@ def take_general(
 
 
 @compiled
-def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, tally):
+def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, work, tally):
     """The state after a long time in this light: no lags, levels about the signal."""
     poles = len(flags.poles)
     stride = stride_of(flags)
-    scratch = np.zeros(SCRATCH, np.float32)
-    one_lane, one_pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
-    first_lane = np.zeros(1, np.int64)
+    scratch, one_lane, one_pixel, first_lane = work.scratch, work.one_lane, work.one_pixel, work.live
+    first_lane[0] = 0
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
@@ -210,10 +187,10 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
 
 
 @compiled
-def shift_levels(pixels, by, planes, flags, num):
+def shift_levels(pixels, by, planes, flags, num, work):
     """Lower all memories by `by` nats: what the leak has risen since its reference is taken into them."""
     stride = stride_of(flags)
-    lanes, pixel = np.empty(FREE, np.float64), np.empty(1, np.int64)
+    lanes, pixel = work.one_lane, work.one_pixel
     for p in range(pixels):
         pixel[0] = p
         at = place_of(p, stride)

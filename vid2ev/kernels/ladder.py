@@ -64,16 +64,24 @@ def next_rungs(lanes, count, live, num, tally):
         lanes[UP + j] = (1.0 if up else 0.0) if reached else lanes[UP + j]
         over = np.int32(over + np.int32(capped))
     tally[CAPPED] += over
-    return reached_lanes(lanes, REACHED, count, live)
+    return reached_lanes(lanes, count, live)
 
 
 @inner
-def reached_lanes(lanes, reached, count, live):
-    """Indices of the lanes whose plane `reached` is 1 into `live`; returns their number."""
+def lanes_with_more(lanes, count, live, rungs):
+    """The lanes with more than so many RUNGS into `live`; returns their number."""
+    for j in range(count):
+        lanes[REACHED + j] = 1.0 if lanes[RUNGS + j] > rungs else 0.0
+    return reached_lanes(lanes, count, live)
+
+
+@inner
+def reached_lanes(lanes, count, live):
+    """Indices of the lanes that are REACHED into `live`; returns their number."""
     left = 0
     for j in range(count):
         live[left] = j
-        left += np.int64(lanes[reached + j])
+        left += np.int64(lanes[REACHED + j])
     return left
 
 

@@ -21,13 +21,13 @@ from vid2ev.physics.photoreceptor import response, response_terms, separate_rate
 
 F = np.float32
 # Planes of the lanes: the response, the piece, the end of the next piece and of the interval, the levels that the scan
-# compares; slopes and curvatures at both ends.
+# compares; slopes and curvatures at both ends; noise added; 1.0 where the slope keeps its sign by its bounds.
 Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, UPPER, LOWER = (AFTER_LADDER + k * LANE_PITCH for k in range(13))
-SLOPE0, SLOPE1, BEND0, BEND1, ADDED0, ADDED1 = (LOWER + (1 + k) * LANE_PITCH for k in range(6))
-LANES = ADDED1 + LANE_PITCH
-# Planes of a batch: y0 less the target, the rest of the response, the piece, the last step.
-D0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, TO_S, FROM_Y, TO_Y, LAST_STEP = (k * LANE_PITCH for k in range(10))
-JOBS = LAST_STEP + LANE_PITCH
+SLOPE0, SLOPE1, BEND0, BEND1, ADDED0, ADDED1, STEADY = (LOWER + (1 + k) * LANE_PITCH for k in range(7))
+LANES = STEADY + LANE_PITCH
+# A job is a response and its piece: planes of a batch, or those of the lanes from Y0 on.
+JOB_Y0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, FROM_Y, TO_S, TO_Y = (k * LANE_PITCH for k in range(9))
+JOBS = 9 * LANE_PITCH
 # Planes of a batch in float32.
 G_D0, G_RISE, G_C1, G_C2, G_A, G_S, G_LO, G_HI, G_UP = (k * LANE_PITCH for k in range(9))
 GUESSES = 9 * LANE_PITCH
@@ -80,6 +80,9 @@ def prepare_responses(lanes, turns, guesses, live, count, b, flags, num, iv):
         k1, k2 = a * c1, b * c2
         lanes[SLOPE0 + j], lanes[SLOPE1 + j] = rise - k1 - k2, rise - k1 * end1 - k2 * end2
         lanes[BEND0 + j], lanes[BEND1 + j] = a * k1 + b * k2, a * k1 * end1 + b * k2 * end2
+        least = rise - max(k1, k1 * end1) - max(k2, k2 * end2)
+        most = rise - min(k1, k1 * end1) - min(k2, k2 * end2)
+        lanes[STEADY + j] = 1.0 if (least > 0.0) | (most < 0.0) else 0.0
     for j in range(count):
         lanes[S0 + j], lanes[S1 + j], lanes[NEXT + j], lanes[RUNGS + j] = 0.0, 1.0, 1.0, 0.0
     if poles:
@@ -100,7 +103,7 @@ def split_pieces(lanes, turns, guesses, live, count, b):
     """Let the first piece of lanes with a turning point that matters end there."""
     for j in range(count):
         lanes[REACHED + j] = may_turn(lanes, j)
-    some = reached_lanes(lanes, REACHED, count, live)
+    some = reached_lanes(lanes, count, live)
     for k in range(some):
         j = live[k]
         turns[T.RISE + k], turns[T.C1 + k], turns[T.C2 + k] = lanes[RISE + j], lanes[C1 + j], lanes[C2 + j]
@@ -117,16 +120,19 @@ def split_pieces(lanes, turns, guesses, live, count, b):
 def may_turn(lanes, j):
     """1.0 if a turning point inside the interval may matter to lane j, else 0.0.
 
-    There is none where neither slope nor curvature changes its sign.  Where only the slope does, the turning point lies
-    beyond the ends by less than the smaller of the two slopes (times the interval, which is 1): without a level that
-    near, the signal is as good as monotone.
+    The slope has at most one extreme, where the curvature changes its sign.  So where its sign is the same at both ends
+    there is a turning point only if the slope goes towards zero first, and only if its bounds allow one.  Where the
+    signs differ, but the curvature keeps its own, the turning point lies beyond the ends by less than the smaller of
+    the two slopes (times the interval, which is 1): without a level that near, the signal is as good as monotone.
     """
     slope_0, slope_1, bend_0, bend_1 = lanes[SLOPE0 + j], lanes[SLOPE1 + j], lanes[BEND0 + j], lanes[BEND1 + j]
     start, end, beyond = lanes[F0 + j], lanes[F1 + j], min(abs(slope_0), abs(slope_1))
     above = max(start, end) + beyond >= lanes[UPPER + j]
     below = min(start, end) - beyond <= lanes[LOWER + j]
-    near = above if bend_0 < 0.0 else below
-    return 1.0 if (bend_0 * bend_1 <= 0.0) | ((slope_0 * slope_1 <= 0.0) & near) else 0.0
+    opposite, bends = slope_0 * slope_1 <= 0.0, bend_0 * bend_1 <= 0.0
+    near = bends | (above if bend_0 < 0.0 else below)
+    dips = bends & (slope_0 * bend_0 <= 0.0) & (lanes[STEADY + j] == 0.0)
+    return 1.0 if (opposite & near) | dips else 0.0
 
 
 @inner
@@ -134,7 +140,7 @@ def next_pieces(lanes, pixels, live, count, b, flags, num):
     """Keep the lanes whose interval goes on after the piece, and move them to the next one; returns their number."""
     for j in range(count):
         lanes[REACHED + j] = 1.0 if lanes[S1 + j] < 1.0 else 0.0
-    left = reached_lanes(lanes, REACHED, count, live)
+    left = reached_lanes(lanes, count, live)
     keep_lanes(lanes, END, LANES, pixels, live, left)
     for j in range(left):
         lanes[S0 + j], lanes[F0 + j] = lanes[S1 + j], lanes[F1 + j]
@@ -146,41 +152,81 @@ def next_pieces(lanes, pixels, live, count, b, flags, num):
 
 
 @inner
-def response_times(levels, when, jobs, guesses, who, count, lanes, b, flags, num):
-    """Times of a batch of crossings."""
+def gather_jobs(jobs, who, count, lanes):
+    """The responses of a batch of crossings out of the lanes."""
     for k in range(count):
         j = who[k]
-        jobs[D0 + k], jobs[JOB_RISE + k] = lanes[Y0 + j], lanes[RISE + j]
+        jobs[JOB_Y0 + k], jobs[JOB_RISE + k] = lanes[Y0 + j], lanes[RISE + j]
         jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k] = lanes[C1 + j], lanes[C2 + j], lanes[A + j]
         jobs[FROM_S + k], jobs[TO_S + k] = lanes[S0 + j], lanes[S1 + j]
         jobs[FROM_Y + k], jobs[TO_Y + k] = lanes[F0 + j], lanes[F1 + j]
-    guess(levels, jobs, guesses, count, flags, num)
+
+
+@inner
+def to_signals(levels, count, flags, num):
+    """Levels [nat] to levels of what the filter gives."""
+    if len(flags.log_input) == 0:
+        for k in range(count):
+            levels[k] = light_at(levels[k], num.curve)
+
+
+@inner
+def batch_times(levels, when, steps, jobs, guesses, who, count, lanes, b, flags, num):
+    """Times `when` of a batch of crossings at `levels` [nat] of the lanes `who`."""
+    to_signals(levels, count, flags, num)
+    for k in range(count):
+        j = who[k]
+        jobs[JOB_Y0 + k], jobs[JOB_RISE + k] = lanes[Y0 + j], lanes[RISE + j]
+        jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k] = lanes[C1 + j], lanes[C2 + j], lanes[A + j]
+        jobs[FROM_S + k], jobs[TO_S + k] = lanes[S0 + j], lanes[S1 + j]
+        jobs[FROM_Y + k], jobs[TO_Y + k] = lanes[F0 + j], lanes[F1 + j]
+    approach(levels, when, steps, jobs, guesses, count, b, flags)
+    for k in range(count):
+        if not steps[k] < ENOUGH:
+            when[k] = settle(levels[k], jobs, when[k], k, b)
+
+
+@inner
+def lane_times(levels, when, steps, guesses, live, alive, count, lanes, b, flags, num):
+    """Times `when` of one crossing at `levels` [nat] of each of the lanes live[:alive], those that are REACHED.
+
+    Most lanes have one, so their responses are not copied to a batch; the few others are solved in vain, half-way.
+    """
+    to_signals(levels, count, flags, num)
+    for j in range(count):
+        levels[j] = levels[j] if lanes[REACHED + j] > 0.0 else 0.5 * (lanes[F0 + j] + lanes[F1 + j])
+    jobs = lanes[Y0:]
+    approach(levels, when, steps, jobs, guesses, count, b, flags)
+    for k in range(alive):
+        j = live[k]
+        when[k] = when[j] if steps[j] < ENOUGH else settle(levels[j], jobs, when[j], j, b)
+
+
+@inner
+def approach(levels, when, steps, jobs, guesses, count, b, flags):
+    """Times `when` at which the jobs are at `levels`, and how far off they may be."""
+    guess(levels, jobs, guesses, count)
     for _ in range(4):
         improve(guesses, count, F(b), flags)
     for k in range(count):
         when[k] = guesses[G_S + k]
     for _ in range(3):
-        polish(jobs, when, count, b, flags)
+        polish(levels, jobs, when, steps, count, b, flags)
         rough = np.int32(0)
         for k in range(count):
-            rough = np.int32(rough + np.int32(0 if jobs[LAST_STEP + k] < ENOUGH else 1))
+            rough = np.int32(rough + np.int32(0 if steps[k] < ENOUGH else 1))
         if 16 * rough <= count:
             break
-    for k in range(count):
-        if not jobs[LAST_STEP + k] < ENOUGH:
-            when[k] = settle(jobs, when[k], k, b)
 
 
 @inner
-def guess(levels, jobs, guesses, count, flags, num):
-    """Targets in the filter's domain, and the batch in float32 with the chords' roots as a start."""
+def guess(levels, jobs, guesses, count):
+    """The jobs in float32, with the chords' roots as a start."""
     for k in range(count):
-        target = levels[k] if len(flags.log_input) else light_at(levels[k], num.curve)
         lo, hi, start, stop = jobs[FROM_S + k], jobs[TO_S + k], jobs[FROM_Y + k], jobs[TO_Y + k]
-        share = (target - start) / (stop - start)
-        s = lo + (hi - lo) * min(max(share, 0.0), 1.0)
-        jobs[D0 + k] -= target
-        guesses[G_D0 + k], guesses[G_S + k] = jobs[D0 + k], s
+        share = (levels[k] - start) / (stop - start)
+        guesses[G_D0 + k] = jobs[JOB_Y0 + k] - levels[k]
+        guesses[G_S + k] = lo + (hi - lo) * min(max(share, 0.0), 1.0)
         guesses[G_LO + k], guesses[G_HI + k] = lo, hi
         guesses[G_UP + k] = F(1.0) if stop > start else F(-1.0)
     for k in range(count):
@@ -208,14 +254,14 @@ def improve(guesses, count, b, flags):
 
 
 @inner
-def polish(jobs, when, count, b, flags):
-    """One step of Halley's method in float64; LAST_STEP is what is left, in units of the faster time constant."""
+def polish(levels, jobs, when, steps, count, b, flags):
+    """One step of Halley's method in float64; `steps` is what is left, in units of the faster time constant."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
     for k in range(count):
         s, rise, c1, c2, a = when[k], jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
         m1 = expm1_64(-a * s) if poles else 0.0
         m2 = expm1_64(-b * s) if two else 0.0
-        f = jobs[D0 + k] + (rise * s + (c1 * m1 + c2 * m2))
+        f = (jobs[JOB_Y0 + k] - levels[k]) + (rise * s + (c1 * m1 + c2 * m2))
         k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
         d = rise - k1 - k2
         step = -(f * d) / (d * d - 0.5 * f * (a * k1 + b * k2))
@@ -223,13 +269,14 @@ def polish(jobs, when, count, b, flags):
         inside = (there >= jobs[FROM_S + k]) & (there <= jobs[TO_S + k])
         when[k] = there if inside else s
         # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-        jobs[LAST_STEP + k] = max(abs(step), abs(f / d)) * max(1.0, max(a, b)) if inside else np.inf
+        steps[k] = max(abs(step), abs(f / d)) * max(1.0, max(a, b)) if inside else np.inf
 
 
 @inner
-def settle(jobs, s, k, b):
-    """The root of job k by Newton's method inside its piece, halving it where Newton leaves it or is slow."""
-    d0, rise, c1, c2, a = jobs[D0 + k], jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
+def settle(level, jobs, s, k, b):
+    """The root of job k at a level by Newton's method inside its piece, or halving that where Newton's is slow."""
+    rise, c1, c2, a = jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
+    d0 = jobs[JOB_Y0 + k] - level
     lo, hi, up = jobs[FROM_S + k], jobs[TO_S + k], jobs[TO_Y + k] > jobs[FROM_Y + k]
     enough = 1e-9 / max(1.0, max(a, b))
     end = d0 + (rise * hi + (c1 * expm1_64(-a * hi) + c2 * expm1_64(-b * hi)))

@@ -6,47 +6,20 @@ leaves behind and sends (`crossing`).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
-from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, next_rungs
+from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, lanes_with_more, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
-from vid2ev.kernels.response import GUESSES, JOBS, LANES, load_responses, next_pieces, prepare_responses, response_times
+from vid2ev.kernels.response import (
+    batch_times,
+    lane_times,
+    load_responses,
+    next_pieces,
+    prepare_responses,
+)
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
-from vid2ev.kernels.turns import TURNS
-
-
-class Work(NamedTuple):
-    """Scratch: lanes and the pixels in them, a batch of crossings (lane, level, time), and what finding times needs."""
-
-    lanes: np.ndarray  # float64
-    pixels: np.ndarray  # int64
-    live: np.ndarray  # int64
-    who: np.ndarray  # int64
-    levels: np.ndarray  # float64 [nat]
-    when: np.ndarray  # float64, fraction of the interval
-    jobs: np.ndarray  # float64
-    guesses: np.ndarray  # float32
-    turns: np.ndarray  # float64
-
-
-@inner
-def new_work():
-    """Scratch for LANE_COUNT lanes."""
-    return Work(
-        np.empty(LANES, np.float64),
-        np.empty(LANE_COUNT, np.int64),
-        np.empty(LANE_COUNT + 1, np.int64),
-        np.empty(LANE_COUNT + 2, np.int64),
-        np.empty(LANE_COUNT + 2, np.float64),
-        np.empty(LANE_COUNT + 2, np.float64),
-        np.empty(JOBS, np.float64),
-        np.empty(GUESSES, np.float32),
-        np.empty(TURNS, np.float64),
-    )
 
 
 @inner
@@ -94,67 +67,90 @@ def take_piece(work, count, planes, flags, num, iv, out, n, tally):
     if len(flags.uncounted):
         return steady_levels(work, count, planes, flags, num, iv, out, n, tally)
     crossings = count_rungs(work.lanes, count, num, tally)
-    return send_lines(work.lanes, work.pixels, count, crossings, flags, num, iv, out, n)
+    return send_lines(work.lanes, work.pixels, work.stamps, count, crossings, flags, num, iv, out, n)
 
 
 @inner
 def steady_levels(work, count, planes, flags, num, iv, out, n, tally):
     """Events of each lane's piece if its thresholds stay."""
     count_rungs(work.lanes, count, num, tally)
-    j, rung = 0, 0
-    while j < count:
-        j, rung, waiting = fill_batch(work.lanes, work.who, work.levels, j, rung, count, num)
+    first = 0
+    if len(flags.straight) == 0:
+        alive = lanes_with_more(work.lanes, count, work.live, 0.0)
+        out, n = send_in_place(work, FIRST, alive, count, planes, flags, num, iv, out, n, tally)
+        first = 1
+    alive = lanes_with_more(work.lanes, count, work.live, np.float64(first))
+    i, rung = 0, first
+    while i < alive:
+        i, rung, waiting = fill_batch(work.lanes, work.live, alive, work.who, work.levels, i, rung, first, num)
         out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
     return out, n
 
 
 @inner
+def send_in_place(work, level, alive, count, planes, flags, num, iv, out, n, tally):
+    """Send one crossing of each of the REACHED lanes live[:alive], at what the plane `level` says: (out, n)."""
+    for j in range(count):
+        work.levels[j] = work.lanes[level + j]
+    b = slower_rate(flags, iv)
+    lane_times(work.levels, work.when, work.steps, work.guesses, work.live, alive, count, work.lanes, b, flags, num)
+    return send(work.when, work.live, alive, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+
+
+@inner
 def send_batch(work, count, planes, flags, num, iv, out, n, tally):
-    """Find the times of a batch of crossings, and send them: (out, n)."""
+    """Send a batch of crossings `who` at `levels`: (out, n)."""
     if len(flags.straight):
         line_times(work.levels, work.when, work.who, count, work.lanes, flags)
     else:
         b = slower_rate(flags, iv)
-        response_times(work.levels, work.when, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num)
+        batch_times(
+            work.levels, work.when, work.steps, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num
+        )
     return send(work.when, work.who, count, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
 
 
 @inner
-def fill_batch(lanes, who, levels, j, rung, count, num):
-    """Crossings from a rung of lane j on, as many as fit: (lane and rung that come next, how many).
+def fill_batch(lanes, live, alive, who, levels, i, rung, first, num):
+    """Crossings from a rung of lane live[i] on, as many as fit: (lane and rung that come next, how many).
 
-    Most lanes have one or two: two are always written, and counted if there are any.
+    Most lanes have one or two from rung `first` on: two are always written, and counted if there are any.
     """
     waiting = 0
-    while j < count:
-        rungs, first, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
+    while i < alive:
+        j = live[i]
+        rungs, level, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
         some = min(rungs, rung + LANE_COUNT - waiting)
-        who[waiting], levels[waiting] = j, first + rung * step
-        who[waiting + 1], levels[waiting + 1] = j, first + (rung + 1) * step
+        who[waiting], levels[waiting] = j, level + rung * step
+        who[waiting + 1], levels[waiting + 1] = j, level + (rung + 1) * step
         for k in range(2, some - rung):
-            who[waiting + k], levels[waiting + k] = j, first + (rung + k) * step
+            who[waiting + k], levels[waiting + k] = j, level + (rung + k) * step
         waiting += some - rung
         if some == num.max_crossings + 1:
             levels[waiting - 1] = lanes[AT + j]
         if some < rungs:
-            return j, some, waiting
-        j, rung = j + 1, 0
-    return j, 0, waiting
+            return i, some, waiting
+        i, rung = i + 1, first
+    return i, first, waiting
 
 
 @inner
 def drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
     """Events of each lane's piece if its thresholds are drawn anew at each crossing."""
-    waiting = 0
+    waiting, climbed = 0, len(flags.straight) > 0
     while True:
         alive = next_rungs(work.lanes, count, work.live, num, tally)
-        if waiting + alive > LANE_COUNT or alive == 0:
-            out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
-            waiting = 0
+        if not climbed:
+            out, n = send_in_place(work, AT, alive, count, planes, flags, num, iv, out, n, tally)
+        else:
+            if waiting + alive > LANE_COUNT or alive == 0:
+                out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
+                waiting = 0
+            add_to_batch(work.lanes, work.who, work.levels, work.live, alive, waiting)
+            waiting += alive
         if alive == 0:
             return out, n
-        add_to_batch(work.lanes, work.who, work.levels, work.live, alive, waiting)
-        waiting += alive
+        climbed = True
         fresh_thresholds(work.lanes, work.pixels, work.live, alive, planes, flags, num)
 
 

@@ -68,13 +68,12 @@ def line_times(levels, when, who, count, lanes, flags):
 
 
 @inner
-def send_lines(lanes, pixels, count, crossings, flags, num, iv, out, n):
+def send_lines(lanes, pixels, stamps, count, crossings, flags, num, iv, out, n):
     """Keys of all crossings of lanes that have only to be counted, without a batch between: (out, n).
 
     Most lanes have one or two, so two are made for each, in vector code, and counted if there are any.
     """
     out = room(out, n, crossings + 2)
-    stamps = np.empty(2 * LANE_PITCH, np.uint64)
     for j in range(count):
         first, rung = rung_times(lanes, j, flags, iv)
         polarity = np.int64(lanes[UP + j])

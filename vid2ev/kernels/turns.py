@@ -10,7 +10,7 @@ import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import LANE_PITCH
-from vid2ev.physics.elementary import exp64, expm1_32, log64
+from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
 
 F = np.float32
@@ -71,16 +71,19 @@ def improve_turns(guesses, count, b):
 
 @inner
 def polish_turns(turns, count, b):
-    """One step in float64; STEP is what is left, in units of the faster time constant."""
+    """One step in float64, and the VALUE there; STEP is what is left, in units of the faster time constant."""
     for k in range(count):
-        rise, a, s = turns[RISE + k], turns[A + k], turns[ROOT + k]
-        p1, p2 = a * turns[C1 + k] * exp64(-a * s), b * turns[C2 + k] * exp64(-b * s)
+        rise, c1, c2, a, s = turns[RISE + k], turns[C1 + k], turns[C2 + k], turns[A + k], turns[ROOT + k]
+        m1, m2 = expm1_64(-a * s), expm1_64(-b * s)
+        p1, p2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
         f, d, dd = rise - p1 - p2, a * p1 + b * p2, -(a * a * p1 + b * b * p2)
         move = -(f * d) / (d * d - 0.5 * f * dd)
         there = s + move
         good = (there >= turns[LO + k]) & (there <= turns[HI + k])
-        # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
         turns[ROOT + k] = there if good else s
+        # (a Taylor polynomial: with a step of ENOUGH what is left out is 1e-13 of the exponentials)
+        turns[VALUE + k] = rise * s + (c1 * m1 + c2 * m2) + move * (f + move * (0.5 * d + move * dd / 6.0))
+        # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
         turns[STEP + k] = max(abs(move), abs(f / d)) * max(1.0, max(a, b)) if good else np.inf
 
 
@@ -95,9 +98,7 @@ def second_turn(turns, k, b):
 
 @inner
 def find_turns(turns, guesses, count, b):
-    """ROOT is the first turning point of each lane (meaningless where KIND is NEVER), VALUE the response there, less
-    y0.
-    """
+    """ROOT is the first turning point of each lane, VALUE the response there less y0; not where KIND is NEVER."""
     bracket_turns(turns, count, b)
     start_turns(turns, guesses, count, b)
     for _ in range(4):
@@ -109,7 +110,4 @@ def find_turns(turns, guesses, count, b):
         if turns[KIND + k] != NEVER and not turns[STEP + k] < ENOUGH:
             rise, c1, c2, a = turns[RISE + k], turns[C1 + k], turns[C2 + k], turns[A + k]
             turns[ROOT + k] = slope_zero(turns[LO + k], turns[HI + k], turns[AT_0 + k], rise, c1, c2, a, b)
-    for k in range(count):
-        turns[VALUE + k] = response(
-            turns[ROOT + k], 0.0, turns[RISE + k], turns[C1 + k], turns[C2 + k], turns[A + k], b
-        )
+            turns[VALUE + k] = response(turns[ROOT + k], 0.0, rise, c1, c2, a, b)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, OFF, ON, PITCH, Flags, Interval, Numbers, Planes, stride_of
+from vid2ev.kernels.work import aligned
 from vid2ev.physics.bad_pixels import bad_pixel_map
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.mismatch import fill_thresholds
@@ -88,7 +89,7 @@ def planes_of(spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int
     if flags.mismatch:
         fill_thresholds(fields["theta"], num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
     planes = Planes(
-        fast=np.empty(blocks * stride_of(flags), np.float32),
+        fast=aligned(blocks * stride_of(flags), np.float32),
         rest=np.zeros(2 * PITCH * blocks if flags.poles and not flags.log_input else 0, np.float32),
         **fields,
         hot=np.flatnonzero(bad == 1).astype(np.int32),
@@ -108,7 +109,8 @@ def records_of(pixels: int, flags: Flags, remembers_events: bool) -> dict[str, n
         "count": (np.uint32, (), flags.crossing_noise),
     }
     used = [(name, kind, shape) for name, (kind, shape, wanted) in fields.items() if wanted]
-    records = np.zeros(pixels, np.dtype(used, align=True))
+    record = np.dtype(used, align=True)
+    records = aligned(pixels * record.itemsize, np.uint8).view(record)
     return {
         name: records[name] if wanted else np.zeros((1, *shape), kind) for name, (kind, shape, wanted) in fields.items()
     }

@@ -11,6 +11,7 @@ from vid2ev.errors import UsageError
 from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
 from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, PIXEL_LIMIT, SWALLOWED, TALLIES
 from vid2ev.kernels.order import order_keys, unpack
+from vid2ev.kernels.work import new_work
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.spec import DvsSpec
@@ -81,6 +82,7 @@ class Dvs:
         self._step = 0
         self._fresh_noise = True
         self._tiles = Tiles(-(-width * height // BLOCK), threads)
+        self._work = [new_work() for _ in range(self._tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
         self._tables: dict[Any, np.ndarray] = {}
 
@@ -200,7 +202,7 @@ class Dvs:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
                 first, last, self._bad.size, flat, table, t_ns, self._bad, self.spec.random_phase, self._planes,
-                self._flags, self._numbers, self._tallies[k],
+                self._flags, self._numbers, self._work[k], self._tallies[k],
             )  # fmt: skip
 
         self._tiles.each_blocks(settle)
@@ -213,7 +215,7 @@ class Dvs:
         def walk(k: int, first: int, last: int) -> np.ndarray:
             self._buffers[k], n = walk_tile(
                 first, last, self._bad.size, flat, table, self._planes, self._flags, self._numbers, interval,
-                self._buffers[k], self._tallies[k],
+                self._work[k], self._buffers[k], self._tallies[k],
             )  # fmt: skip
             return self._buffers[k][:n]
 
@@ -243,5 +245,5 @@ class Dvs:
         rate = self._numbers.leak_nat_per_ns
         if rate * (t_ns - self._leak_since_ns) > LEAK_REBASE_NAT and self._t_ns > self._leak_since_ns:
             risen = rate * (self._t_ns - self._leak_since_ns)
-            shift_levels(self._bad.size, risen, self._planes, self._flags, self._numbers)
+            shift_levels(self._bad.size, risen, self._planes, self._flags, self._numbers, self._work[0])
             self._leak_since_ns = self._t_ns
