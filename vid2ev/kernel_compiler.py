@@ -12,6 +12,7 @@ only kernels call is here made ready to be inlined, and no more.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -102,6 +103,16 @@ class KernelCompiler(CompilerBase):
         if flags.no_cpython_wrapper:
             flags.no_compile = True
             self.state.library = InnerLibrary(targetctx.codegen(), "inner")
+
+    def compile_extra(self, function: Callable) -> Any:
+        # (what a compilation makes is kept: looking for garbage in it takes a tenth of the time)
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(function)
+        finally:
+            if collects:
+                gc.enable()
 
     def define_pipelines(self) -> list:
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
