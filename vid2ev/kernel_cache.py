@@ -1,4 +1,4 @@
-"""How kernels are compiled and kept: dropped when any of their sources has changed, never mixed up by two processes.
+"""Compiled kernels on disk are dropped when any of their sources has changed, and two processes never mix theirs up.
 
 numba keeps compiled code beside the file of the cached function and looks only at that file's date; the laws that a
 kernel calls are in other files.  So the dates of all of them are stamped into one file, and a new stamp empties the

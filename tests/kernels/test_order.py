@@ -1,13 +1,10 @@
 """Putting events in order: whatever the parts are, the answer is that of a plain stable sort."""
 
-from itertools import pairwise
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.kernels.order import order_keys, unpack
-from vid2ev.sensors.tiles import balanced
 
 WIDTH = 53
 
@@ -42,23 +39,3 @@ def test_ordered_by_time_row_column(sizes, last_us, crowded, seed):
     assert np.array_equal(y * np.int64(WIDTH) + x, pixel)
     assert np.array_equal(p, want >> 2 & 1)
     assert np.array_equal(label, want & 3)
-
-
-@given(
-    sizes=st.lists(st.integers(1, 1000), min_size=1, max_size=9),
-    seconds=st.lists(st.floats(0, 1e3), min_size=9, max_size=9),
-)
-def test_cuts_keep_every_block_in_one_tile(sizes, seconds):
-    cuts = [int(cut) for cut in np.cumsum([0, *sizes])]
-    fresh = balanced(cuts, seconds[: len(sizes)])
-    assert len(fresh) == len(cuts) and fresh[0] == 0 and fresh[-1] == cuts[-1]
-    assert all(first < last for first, last in pairwise(fresh))
-
-
-def test_cuts_settle_where_tiles_take_as_long():
-    cost = np.linspace(1, 7, 1000)  # of a block
-    cuts = [0, 250, 500, 750, 1000]
-    for _ in range(12):
-        cuts = balanced(cuts, [float(cost[first:last].sum()) for first, last in pairwise(cuts)])
-    seconds = [cost[first:last].sum() for first, last in pairwise(cuts)]
-    assert max(seconds) < 1.05 * min(seconds)

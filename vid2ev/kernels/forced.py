@@ -10,6 +10,7 @@ import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import BLOCK, INPUT, PITCH
+from vid2ev.kernels.order import first_from
 from vid2ev.kernels.scan import NEW
 from vid2ev.physics.elementary import log64
 from vid2ev.physics.log_curve import light_at
@@ -118,19 +119,6 @@ def sorted_by_pixel(keys, chance, n):
         ordered[start[k]], shares[start[k]] = keys[i], chance[i]
         start[k] += 1
     return ordered, shares
-
-
-@inner
-def first_from(pixels, least):
-    """Index of the first of the ascending `pixels` that is at least `least`."""
-    low, high = 0, pixels.size
-    while low < high:
-        middle = (low + high) // 2
-        if pixels[middle] < least:
-            low = middle + 1
-        else:
-            high = middle
-    return low
 
 
 @inner

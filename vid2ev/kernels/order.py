@@ -87,15 +87,21 @@ def share_of(keys, ends, share, shares):
     if 0 < share < shares:
         time = keys[ends[longest] + (ends[longest + 1] - ends[longest]) * share // shares] >> _TIME
         for k in range(begins.size):
-            low, high = ends[k], ends[k + 1]
-            while low < high:
-                middle = (low + high) >> 1
-                if keys[middle] >> _TIME < time:
-                    low = middle + 1
-                else:
-                    high = middle
-            begins[k] = low
+            begins[k] = ends[k] + first_from(keys[ends[k] : ends[k + 1]], time << _TIME)
     return begins
+
+
+@inner
+def first_from(numbers, least):
+    """Index of the first of the ascending `numbers` that is at least `least`."""
+    low, high = 0, numbers.size
+    while low < high:
+        middle = (low + high) // 2
+        if numbers[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @inner

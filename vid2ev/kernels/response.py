@@ -26,8 +26,10 @@ Y0, RISE, C1, C2, A, S0, F0, S1, F1, NEXT, LAST, UPPER, LOWER = (AFTER_LADDER + 
 SLOPE0, SLOPE1, BEND0, BEND1, ADDED0, ADDED1, STEADY = (LOWER + (1 + k) * LANE_PITCH for k in range(7))
 LANES = STEADY + LANE_PITCH
 # A job is a response and its piece: planes of a batch, or those of the lanes from Y0 on.
-JOB_Y0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, FROM_Y, TO_S, TO_Y = (k * LANE_PITCH for k in range(9))
-JOBS = 9 * LANE_PITCH
+JOB_Y0, JOB_RISE, JOB_C1, JOB_C2, JOB_A, FROM_S, FROM_Y, TO_S, TO_Y = (
+    plane - Y0 for plane in (Y0, RISE, C1, C2, A, S0, F0, S1, F1)
+)
+JOBS = NEXT - Y0
 # Planes of a batch in float32.
 G_D0, G_RISE, G_C1, G_C2, G_A, G_S, G_LO, G_HI, G_UP = (k * LANE_PITCH for k in range(9))
 GUESSES = 9 * LANE_PITCH
@@ -174,12 +176,7 @@ def to_signals(levels, count, flags, num):
 def batch_times(levels, when, steps, jobs, guesses, who, count, lanes, b, flags, num):
     """Times `when` of a batch of crossings at `levels` [nat] of the lanes `who`."""
     to_signals(levels, count, flags, num)
-    for k in range(count):
-        j = who[k]
-        jobs[JOB_Y0 + k], jobs[JOB_RISE + k] = lanes[Y0 + j], lanes[RISE + j]
-        jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k] = lanes[C1 + j], lanes[C2 + j], lanes[A + j]
-        jobs[FROM_S + k], jobs[TO_S + k] = lanes[S0 + j], lanes[S1 + j]
-        jobs[FROM_Y + k], jobs[TO_Y + k] = lanes[F0 + j], lanes[F1 + j]
+    gather_jobs(jobs, who, count, lanes)
     approach(levels, when, steps, jobs, guesses, count, b, flags)
     for k in range(count):
         if not steps[k] < ENOUGH:

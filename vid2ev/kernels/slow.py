@@ -12,13 +12,7 @@ from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, lanes_with_more, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
-from vid2ev.kernels.response import (
-    batch_times,
-    lane_times,
-    load_responses,
-    next_pieces,
-    prepare_responses,
-)
+from vid2ev.kernels.response import batch_times, lane_times, load_responses, next_pieces, prepare_responses
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
 
 

@@ -26,9 +26,9 @@ _TO_UNIT = 2.0**-32
 def _round(c0, c1, c2, c3, k0, k1):
     first, second = np.uint64(c0) * _M0, np.uint64(c2) * _M1
     return (
-        np.uint32(np.uint32(second >> _32) ^ c1 ^ k0),
+        np.uint32((second >> _32) ^ c1 ^ k0),
         np.uint32(second),
-        np.uint32(np.uint32(first >> _32) ^ c3 ^ k1),
+        np.uint32((first >> _32) ^ c3 ^ k1),
         np.uint32(first),
     )
 

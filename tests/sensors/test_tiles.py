@@ -1,0 +1,29 @@
+"""Cutting blocks into tiles: nothing is lost, and all tiles come to take as long."""
+
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vid2ev.sensors.tiles import balanced
+
+
+@given(
+    sizes=st.lists(st.integers(1, 1000), min_size=1, max_size=9),
+    seconds=st.lists(st.floats(0, 1e3), min_size=9, max_size=9),
+)
+def test_cuts_keep_every_block_in_one_tile(sizes, seconds):
+    cuts = [int(cut) for cut in np.cumsum([0, *sizes])]
+    fresh = balanced(cuts, seconds[: len(sizes)])
+    assert len(fresh) == len(cuts) and fresh[0] == 0 and fresh[-1] == cuts[-1]
+    assert all(first < last for first, last in pairwise(fresh))
+
+
+def test_cuts_settle_where_tiles_take_as_long():
+    cost = np.linspace(1, 7, 1000)  # of a block
+    cuts = [0, 250, 500, 750, 1000]
+    for _ in range(12):
+        cuts = balanced(cuts, [float(cost[first:last].sum()) for first, last in pairwise(cuts)])
+    seconds = [cost[first:last].sum() for first, last in pairwise(cuts)]
+    assert max(seconds) < 1.05 * min(seconds)
