@@ -31,6 +31,7 @@ FLOORS = {
     "upsample": 2,
     "physics": 2,
     "formats": 2,
+    "recording": 2,
     "kernels": 3,
     "sensors": 4,
     "recipe": 5,

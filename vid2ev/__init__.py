@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from vid2ev.errors import DataError as DataError
     from vid2ev.errors import UsageError as UsageError
     from vid2ev.errors import Vid2evError as Vid2evError
-    from vid2ev.formats.hdf5 import read_events as read_events
+    from vid2ev.formats import read_events as read_events
     from vid2ev.recipe import events_of as events_of
     from vid2ev.sensors.dvs import Dvs as Dvs
     from vid2ev.sensors.presets import load_sensor as load_sensor
@@ -40,7 +40,7 @@ _HOME = {
     "load_sensor": "vid2ev.sensors.presets",
     "open_source": "vid2ev.sources",
     "preset_names": "vid2ev.sensors.presets",
-    "read_events": "vid2ev.formats.hdf5",
+    "read_events": "vid2ev.formats",
 }
 
 __all__ = ["__version__", *_HOME]

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.folder import Folder, begun_job
-from vid2ev.formats.hdf5 import BLOCK, write_events
-from vid2ev.formats.manifest import machine, write_manifest
-from vid2ev.formats.preview import Preview
+from vid2ev.formats.event_file import BLOCK, Recording
+from vid2ev.formats.hdf5 import write_events
 from vid2ev.recipe import Recipe
+from vid2ev.recording.folder import Folder, begun_job
+from vid2ev.recording.manifest import machine, write_manifest
+from vid2ev.recording.preview import Preview
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
@@ -187,14 +188,15 @@ def _checkpoint(folder: Folder, dvs: Dvs, film: Preview, done: Progress) -> None
 def _write(folder: Folder, film: Preview, recipe: Recipe, done: Progress, manifest: dict[str, Any]) -> None:
     """The files of the recording, in their place at once."""
     whole = folder.whole
-    write_events(
-        whole / "events.h5",
-        folder.events(BLOCK),
-        count=done.events,
-        size=recipe.source.size,
-        t_offset_us=done.offset_us,
-        duration_us=done.duration_us,
+    recording = Recording(
+        recipe.source.size,
+        done.offset_us,
+        done.duration_us,
+        done.events,
+        lambda: folder.events(BLOCK),
+        recipe.labels,
     )
+    write_events(whole / "events.h5", recording)
     film.join(whole / "preview.mp4")
     write_manifest(whole / "manifest.json", manifest)
     folder.publish()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from vid2ev.errors import UsageError
-from vid2ev.formats.manifest import identity, versions
+from vid2ev.recording.manifest import identity, versions
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec

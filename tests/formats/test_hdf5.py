@@ -15,7 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import DataError
-from vid2ev.formats.hdf5 import BLOCK, describe_events, read_events, write_events
+from vid2ev.formats import describe_events, read_events
+from vid2ev.formats.event_file import BLOCK, Recording
+from vid2ev.formats.hdf5 import write_events
 from vid2ev.stream.events import Events
 
 SIZE = (320, 240)
@@ -31,9 +33,9 @@ def events_at(t: np.ndarray, labelled: bool = False, seed: int = 0) -> Events:
 
 def write(path: Path, events: Events, t_offset_us: int = 0, duration_us: int | None = None) -> None:
     last = int(events.t[-1]) - t_offset_us if len(events) else 0
-    blocks = (events.select(np.arange(at, min(at + BLOCK, len(events)))) for at in range(0, max(len(events), 1), BLOCK))
-    duration_us = max(last, duration_us or 0)
-    write_events(path, blocks, count=len(events), size=SIZE, t_offset_us=t_offset_us, duration_us=duration_us)
+    blocks = [events.select(np.arange(at, min(at + BLOCK, len(events)))) for at in range(0, max(len(events), 1), BLOCK)]
+    duration_us, labelled = max(last, duration_us or 0), events.label is not None
+    write_events(path, Recording(SIZE, t_offset_us, duration_us, len(events), lambda: iter(blocks), labelled))
 
 
 def assert_same(one: Events, other: Events) -> None:
@@ -142,9 +144,9 @@ def test_what_is_no_event_file_is_refused(tmp_path: Path) -> None:
     assert "no such file" in refused(tmp_path / "missing.h5")
     assert "no such file" in refused(tmp_path)
     (tmp_path / "text.h5").write_text("t x y p\n")
-    assert "not an HDF5 file" in refused(tmp_path / "text.h5")
+    assert "no event file" in refused(tmp_path / "text.h5")
     (tmp_path / "empty.h5").touch()
-    assert "not an HDF5 file" in refused(tmp_path / "empty.h5")
+    assert "no event file" in refused(tmp_path / "empty.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["events/t"] = np.arange(3)
     assert "DSEC" in refused(tmp_path / "other.h5")
@@ -178,6 +180,7 @@ def test_a_full_disk_is_an_error_and_not_a_crash(tmp_path: Path) -> None:
 import resource, sys
 from pathlib import Path
 import numpy as np
+from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
 from vid2ev.stream.events import Events
 random = np.random.default_rng(0)
@@ -188,7 +191,7 @@ events = Events(t, x, x, (x & 1).astype(np.uint8))
 for limit in (0, 1, 100, 2048, 5000, 100_000, 1_000_000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     try:
-        write_events(Path(sys.argv[1]), [events], count=n, size=(300, 300), t_offset_us=0, duration_us=10**7)
+        write_events(Path(sys.argv[1]), Recording((300, 300), 0, 10**7, n, lambda: iter([events])))
     except OSError as error:
         print(error.errno)
 """

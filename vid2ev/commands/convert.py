@@ -139,8 +139,8 @@ def convert(
 def _plan(video: str, directory: Path, overwrite: bool, resume: bool, options: dict[str, Any]) -> str:
     """What a conversion would do; raises what it would raise before its first frame."""
     from vid2ev.commands import summary
-    from vid2ev.formats.folder import check_free
     from vid2ev.recipe import Recipe
+    from vid2ev.recording.folder import check_free
 
     threads, preview, seed = options.pop("threads"), options.pop("preview"), options.pop("seed")
     recipe = Recipe.of(video, seed=seed or 0, **options)
@@ -154,7 +154,7 @@ def _plan(video: str, directory: Path, overwrite: bool, resume: bool, options: d
 @contextmanager
 def _kept(directory: Path) -> Iterator[None]:
     """What goes wrong within says so if it can be resumed."""
-    from vid2ev.formats.folder import partial_of
+    from vid2ev.recording.folder import partial_of
 
     try:
         yield

@@ -17,10 +17,11 @@ def info(file: str, as_json: bool) -> None:
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
     from vid2ev.commands import summary
+    from vid2ev.formats import describe_events, recognise
 
     path = Path(file)
     if (path / "manifest.json").is_file():
-        from vid2ev.formats.manifest import read_manifest
+        from vid2ev.recording.manifest import read_manifest
 
         found = read_manifest(path)
         facts = [
@@ -29,9 +30,7 @@ def info(file: str, as_json: bool) -> None:
             *summary.file_facts(path),
             *summary.speed_facts(found),
         ]
-    elif path.suffix in (".h5", ".hdf5"):
-        from vid2ev.formats.hdf5 import describe_events
-
+    elif path.is_file() and recognise(path):
         found = describe_events(path)
         facts = summary.event_facts(found)
     else:

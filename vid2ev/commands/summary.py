@@ -85,8 +85,12 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     if count:
         found.append(("time", f"{first} ... {last} us ({spread:.6f} s), counted from {facts['start_us']} us"))
-    stored = f"{facts['bytes'] / count:.2f} bytes per event, " if count else ""
-    return [*found, ("stored", f"{stored}t as {facts['time_type']}{', with labels' * facts['labels']}")]
+    if facts["times_going_back"]:
+        found.append(("order", f"times go back at {facts['times_going_back']:,} places"))
+    stored = [facts["format"], *(f"{key.replace('_', ' ')} {value}" for key, value in facts["stored"].items())]
+    stored += [f"{facts['bytes'] / count:.2f} bytes per event"] if count else []
+    stored += [f"with {name}" for name in ("labels", "frames") if facts[name]]
+    return [*found, ("stored", ", ".join(stored)), *(("warning", text) for text in facts["warnings"])]
 
 
 def _parts(upsampling: Mapping[str, Any], auto: str) -> str:

@@ -1,1 +1,161 @@
-"""Where it goes: event files, the preview, the manifest, and the folder that holds them or nothing."""
+"""Where events go and come from: the event files of the field, one module each.
+
+Writing is one call, `write(path, recording)`: all that a file may need to know of its events before the first one is in
+the `Recording`.  Reading is `open_events(path)`: the content says which format it is, never the name.
+
+A new format is a module with a `FORMAT` and a line in `FORMATS`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording
+from vid2ev.stream.events import Events
+
+__all__ = [
+    "FORMATS",
+    "check_holds",
+    "describe_events",
+    "format_named",
+    "open_events",
+    "read_events",
+    "recognise",
+    "survey",
+]
+
+# By name, in the order in which content is looked at: what can be mistaken for nothing else comes first.
+FORMATS = {
+    "hdf5": "vid2ev.formats.hdf5",
+}
+
+
+def format_named(name: str) -> Format:
+    """The format of a name.  Raises UsageError."""
+    if name not in FORMATS:
+        raise UsageError(f"format '{name}': expected one of {', '.join(FORMATS)}")
+    return importlib.import_module(FORMATS[name]).FORMAT
+
+
+def open_events(path: str | Path) -> EventFile:
+    """The event file at a path, or the one in a recording's folder, whatever it is called; raises DataError."""
+    return _opened(path)[1]
+
+
+def read_events(
+    path: str | Path, start_us: int | None = None, stop_us: int | None = None, *, block: int = BLOCK
+) -> Iterator[Events]:
+    """The events of a file or recording folder with start_us <= t < stop_us, at most `block` at a time.
+
+    Times are absolute, on the clock of the source.  Raises DataError for a file that is not there, no event file, or
+    damaged.
+    """
+    yield from open_events(path).events(start_us, stop_us, block)
+
+
+def describe_events(path: str | Path) -> dict[str, Any]:
+    """What is in an event file: format, counts, times [us], size [pixels] where it is stated.  Raises as `read_events`
+    does."""
+    kind, file = _opened(path)
+    count = on = backwards = 0
+    first = last = None
+    for events in file.events():
+        if not len(events):
+            continue
+        backwards += int(np.count_nonzero(events.t[1:] < events.t[:-1])) + (last is not None and events.t[0] < last)
+        count, on = count + len(events), on + int(np.count_nonzero(events.p))
+        first = int(events.t[0]) if first is None else first
+        last = int(events.t[-1])
+    return {
+        "kind": "events",
+        "format": kind.name,
+        "path": str(path),
+        "size": list(file.size) if file.size else None,
+        "events": count,
+        "on": on,
+        "off": count - on,
+        "start_us": file.start_us,
+        "first_us": first,
+        "last_us": last,
+        "times_going_back": backwards,
+        "labels": file.labelled,
+        "frames": file.has_frames,
+        "bytes": file.path.stat().st_size,
+        "stored": file.describe(),
+        "warnings": file.warnings,
+    }
+
+
+def survey(file: EventFile) -> Recording:
+    """An event file as a recording to be written anew; reads all of it once.
+
+    Where the file does not state its size, that is the smallest that holds all events.  Raises DataError for events
+    outside of the size stated, or whose times go back.
+    """
+    count, last_us, start_us, width, height = 0, file.start_us, file.start_us, 0, 0
+    for events in file.events():
+        if not len(events):
+            continue
+        if events.t[0] < (last_us if count else start_us) or np.any(events.t[1:] < events.t[:-1]):
+            at = "before the start of the file" if not count and events.t[0] < start_us else f"after event {count}"
+            raise DataError(f"{file.path}: times go back {at}; expected events in order of time")
+        width, height = max(width, int(events.x.max()) + 1), max(height, int(events.y.max()) + 1)
+        count, last_us = count + len(events), int(events.t[-1])
+    size = file.size or (max(width, 1), max(height, 1))
+    if width > size[0] or height > size[1]:
+        raise DataError(
+            f"{file.path}: an event at column {width - 1} or row {height - 1} of a {size[0]}x{size[1]} sensor;"
+            " the file is damaged"
+        )
+    frames = file.frames if file.has_frames else None
+    return Recording(size, start_us, last_us - start_us, count, file.events, file.labelled, frames)
+
+
+def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:
+    """Raise UsageError, which names a format that can, unless a format can hold pixels and times as these."""
+    limits = kind.largest
+    if limits and (size[0] > limits[0] or size[1] > limits[1]):
+        what, most = f"{size[0]}x{size[1]} pixels", f"{limits[0]}x{limits[1]}"
+    elif kind.longest_us is not None and duration_us is not None and duration_us > kind.longest_us:
+        what, most = f"{duration_us / 6e7:.4g} minutes", f"{kind.longest_us / 6e7:.4g} minutes"
+    else:
+        return
+    raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format hdf5")
+
+
+def recognise(path: str | Path) -> Format | None:
+    """The format of a file, by its content; None if that is no event file.  Raises DataError if it cannot be read."""
+    path = Path(path)
+    try:
+        with open(path, "rb") as file:
+            head = file.read(HEAD)
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file; give an event file, or a folder that `vid2ev convert` wrote") from error
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror}; give an event file") from error
+    kinds = (format_named(name) for name in FORMATS)
+    return next((kind for kind in kinds if kind.open and kind.recognises(head, path)), None)
+
+
+def _opened(path: str | Path) -> tuple[Format, EventFile]:
+    path = Path(path)
+    path = _within(path) if path.is_dir() else path
+    kind = recognise(path)
+    if kind is None or kind.open is None:
+        raise DataError(f"{path} is no event file of a known format; expected one of {', '.join(FORMATS)}")
+    return kind, kind.open(path)
+
+
+def _within(folder: Path) -> Path:
+    """The event file of a recording's folder: the first of `FORMATS` that is there."""
+    for name in FORMATS:
+        path = folder / f"events{format_named(name).suffix}"
+        if path.exists():
+            return path
+    return folder / "events.h5"

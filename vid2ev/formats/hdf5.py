@@ -20,7 +20,7 @@ Filter: Blosc with LZ4 and bit-shuffling, about 3 bytes per event; Zstandard sav
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
 from vid2ev.stream.events import Events
 
 if TYPE_CHECKING:
@@ -35,30 +36,80 @@ if TYPE_CHECKING:
 
 VERSION = 1
 CHUNK = 1 << 16  # events per compressed chunk
-BLOCK = 1 << 20  # events written or read at a time
+MAGIC = b"\x89HDF\r\n\x1a\n"
 MS_US = 1000
 
 
-def write_events(
-    path: Path, blocks: Iterable[Events], *, count: int, size: tuple[int, int], t_offset_us: int, duration_us: int
-) -> None:
-    """Write `count` events of a recording of `size` (width, height) that lasts `duration_us`.
+class Hdf5Events:
+    """The events of an HDF5 file in the layout of DSEC.
 
-    `blocks` are the events in order of time, `BLOCK` of them each but for the last, with labels or without.
-    Raises OSError where the disk cannot take them, ValueError for times before `t_offset_us` or out of order.
+    Raises DataError for a file that is not there, not an event file in that layout, or damaged.
     """
+
+    has_frames = False
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.warnings: list[str] = []
+        with self._opened() as file:
+            self.start_us = int(file["t_offset"][()]) if "t_offset" in file else 0
+            self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
+            self.labelled = "label" in file["events"]
+            self._time_type = str(file["events/t"].dtype)
+
+    def describe(self) -> dict[str, Any]:
+        """How times are stored."""
+        return {"time_type": self._time_type}
+
+    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
+        """The events with start_us <= t < stop_us; only what is asked for is read."""
+        with self._opened() as file:
+            columns = file["events"]
+            first = 0 if start_us is None else _position(file, start_us - self.start_us)
+            last = len(columns["t"]) if stop_us is None else _position(file, stop_us - self.start_us)
+            for at in range(first, last, block):
+                part = slice(at, min(at + block, last))
+                t = columns["t"][part].astype(np.int64) + self.start_us
+                label = columns["label"][part] if self.labelled else None
+                x, y, p = (columns[name][part] for name in "xyp")
+                yield Events(t, x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8), label)
+
+    def frames(self) -> Iterator[Picture]:
+        """None."""
+        return iter(())
+
+    @contextmanager
+    def _opened(self) -> Iterator[h5py.File]:
+        """The file, open; every way in which it is not one becomes a DataError."""
+        import h5py
+        import hdf5plugin  # noqa: F401  (registers the filters)
+
+        try:
+            with h5py.File(self.path, "r") as file:
+                _check(file, self.path)
+                yield file
+        except DataError:
+            raise
+        except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+            raise DataError(
+                f"{self.path} cannot be read as events: it is cut short or damaged; make it again or get another copy"
+            ) from error
+
+
+def write_events(path: Path, recording: Recording) -> None:
+    """Write a recording.  Raises OSError where the disk cannot take it, ValueError for times out of order."""
     import h5py
 
+    offset_us, duration_us = recording.start_us, recording.duration_us
     with _WholeFile(path) as raw, h5py.File(raw, "w") as file:
-        file.attrs.update(width=np.uint16(size[0]), height=np.uint16(size[1]), version=np.uint16(VERSION))
-        file["t_offset"] = np.int64(t_offset_us)
-        time = np.uint32 if duration_us < 1 << 32 else np.uint64
-        columns: dict[str, h5py.Dataset] = {}
+        width, height = recording.size
+        file.attrs.update(width=np.uint16(width), height=np.uint16(height), version=np.uint16(VERSION))
+        file["t_offset"] = np.int64(offset_us)
+        columns = _columns(file, recording.count, np.uint32 if duration_us < 1 << 32 else np.uint64, recording.labelled)
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
         indexed = start = last_us = 0
-        for block in blocks:
-            columns = columns or _columns(file, count, time, block.label is not None)
-            t = block.t - t_offset_us
+        for block in recording.blocks():
+            t = block.t - offset_us
             if len(t) and (t[0] < last_us or np.any(t[1:] < t[:-1])):
                 raise ValueError(f"events out of order of time after event {start}")
             last_us = int(t[-1]) if len(t) else last_us
@@ -67,54 +118,9 @@ def write_events(
             indexed = _index(index, indexed, last_us // MS_US + 1, t, start)
             start += len(t)
             raw.check()
-        if start != count:
-            raise ValueError(f"{start} events, {count} announced")
-        columns = columns or _columns(file, 0, time, False)
-        _index(index, indexed, len(index), np.empty(0, np.int64), count)
-
-
-def read_events(
-    path: str | Path, start_us: int | None = None, stop_us: int | None = None, *, block: int = BLOCK
-) -> Iterator[Events]:
-    """The events of a file or recording folder with start_us <= t < stop_us, at most `block` at a time.
-
-    Times are absolute, on the clock of the source.  Raises DataError for a file that is not there, not an event file in
-    the layout of DSEC, or damaged.
-    """
-    with _opened(path) as file:
-        columns = file["events"]
-        offset_us = int(file["t_offset"][()]) if "t_offset" in file else 0
-        total = len(columns["t"])
-        first = 0 if start_us is None else _position(file, start_us - offset_us)
-        last = total if stop_us is None else _position(file, stop_us - offset_us)
-        for at in range(first, last, block):
-            part = slice(at, min(at + block, last))
-            t = columns["t"][part].astype(np.int64) + offset_us
-            label = columns["label"][part] if "label" in columns else None
-            x, y, p = (columns[name][part] for name in "xyp")
-            yield Events(t, x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8), label)
-
-
-def describe_events(path: str | Path) -> dict[str, Any]:
-    """What is in an event file: counts, times [us], size [pixels] where it is stated.  Raises as `read_events` does."""
-    with _opened(path) as file:
-        t = file["events/t"]
-        offset_us = int(file["t_offset"][()]) if "t_offset" in file else 0
-        on = sum(int(np.count_nonzero(file["events/p"][at : at + BLOCK])) for at in range(0, len(t), BLOCK))
-        return {
-            "kind": "events",
-            "path": str(path),
-            "size": [int(file.attrs[key]) for key in ("width", "height")] if "width" in file.attrs else None,
-            "events": len(t),
-            "on": on,
-            "off": len(t) - on,
-            "start_us": offset_us,
-            "first_us": int(t[0]) + offset_us if len(t) else None,
-            "last_us": int(t[-1]) + offset_us if len(t) else None,
-            "labels": "label" in file["events"],
-            "time_type": str(t.dtype),
-            "bytes": Path(file.filename).stat().st_size,
-        }
+        if start != recording.count:
+            raise ValueError(f"{start} events, {recording.count} announced")
+        _index(index, indexed, len(index), np.empty(0, np.int64), start)
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:
@@ -148,26 +154,6 @@ def _position(file: h5py.File, t_us: int) -> int:
         middle = (low + high) // 2
         low, high = (middle + 1, high) if t[middle] < t_us else (low, middle)
     return low + int(np.searchsorted(t[low:high].astype(np.int64), t_us))
-
-
-@contextmanager
-def _opened(path: str | Path) -> Iterator[h5py.File]:
-    """An event file, open; every way in which it is not one becomes a DataError."""
-    import h5py
-    import hdf5plugin  # noqa: F401  (registers the filters)
-
-    path = Path(path) / "events.h5" if Path(path).is_dir() else Path(path)
-    if not path.is_file():
-        raise DataError(f"{path}: no such file; give an event file, or a folder that `vid2ev convert` wrote")
-    try:
-        with h5py.File(path, "r") as file:
-            _check(file, path)
-            yield file
-    except DataError:
-        raise
-    except (OSError, RuntimeError, KeyError) as error:
-        reason = "it is cut short or damaged" if h5py.is_hdf5(path) else "it is not an HDF5 file"
-        raise DataError(f"{path} cannot be read as events: {reason}; make it again or get another copy") from error
 
 
 def _check(file: h5py.File, path: Path) -> None:
@@ -216,3 +202,15 @@ class _WholeFile(io.FileIO):
     def close(self) -> None:
         super().close()
         self.check()
+
+
+FORMAT = Format(
+    "hdf5",
+    "HDF5 in the layout of DSEC",
+    ".h5",
+    recognises=lambda head, path: head.startswith(MAGIC),
+    open=Hdf5Events,
+    write=write_events,
+    largest=(1 << 16, 1 << 16),
+    keeps=frozenset({"labels", "size", "start"}),
+)

@@ -11,8 +11,8 @@ import av
 import numpy as np
 import pytest
 
-from vid2ev.formats.panels import COLOURS, GRAYS, NEUTRAL
-from vid2ev.formats.preview import RATE, Preview
+from vid2ev.recording.panels import COLOURS, GRAYS, NEUTRAL
+from vid2ev.recording.preview import RATE, Preview
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 

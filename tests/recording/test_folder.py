@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.folder import Folder, begun_job, check_free, partial_of
-from vid2ev.formats.manifest import write_manifest
+from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
+from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
 
 JOB = {"versions": {"vid2ev": "0"}, "sensor": {"threshold_on": 0.15}, "seed": 3}

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.formats.disk import sync
-from vid2ev.formats.panels import COLOURS, count, paint, reduced
+from vid2ev.recording.disk import sync
+from vid2ev.recording.panels import COLOURS, count, paint, reduced
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 

@@ -28,8 +28,8 @@ from typing import Any, Self
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.disk import lock, sync, whole_file
-from vid2ev.formats.manifest import difference, read_manifest
+from vid2ev.recording.disk import lock, sync, whole_file
+from vid2ev.recording.manifest import difference, read_manifest
 from vid2ev.stream.events import Events
 
 COLUMNS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}
