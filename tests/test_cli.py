@@ -102,7 +102,12 @@ def test_options_reach_the_recording() -> None:
     manifest = json.loads(Path("a/b/out/manifest.json").read_text())
     parameters = manifest["sensor"]["parameters"]
     assert (parameters["threshold_on"], parameters["threshold_off"], manifest["seed"]) == (0.3, 0.25, 9)
-    assert manifest["upsampling"] == {"method": "linear", "subframes": 3, "max_subframes": 8}
+    assert manifest["upsampling"] == {
+        "method": "linear",
+        "subframes": 3,
+        "max_subframes": 8,
+        "cuts": "restart",
+    }
     assert manifest["labels"] is True and manifest["run"]["threads"] == 2
     assert manifest["counts"]["frames"] == 11  # 0.2 s at 50 Hz instead of 100
     assert not Path("a/b/out/preview.mp4").exists()

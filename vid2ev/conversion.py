@@ -42,6 +42,7 @@ class Progress:
     start_ns: int = 0  # the first frame
     end_ns: int = 0  # the last frame
     last_us: int = 0  # the last event
+    cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots
     seconds: float = 0.0  # of work, in all runs
     finished: bool = False
     warnings: list[str] = field(default_factory=list)
@@ -51,6 +52,7 @@ class Progress:
         self.frames += frame.original
         self.subframes += not frame.original
         self.end_ns = frame.t_ns
+        self.cuts_us += [frame.t_ns // 1000] * frame.cut
         self.count(events)
 
     def count(self, events: Events) -> None:
@@ -145,7 +147,7 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
             dvs.step(first[0].light, first[0].t_ns)
             done.frames, done.start_ns, done.end_ns = 1, first[0].t_ns, first[0].t_ns
         for frame, limited in light:
-            events = dvs.step(frame.light, frame.t_ns)
+            events = dvs.see(frame)
             with folder.writing():
                 folder.append(events)
                 film.add(frame, events)
@@ -209,6 +211,7 @@ def _outcome(done: Progress, dvs: Dvs) -> dict[str, Any]:
         "start_us": done.offset_us,
         "duration_us": done.duration_us,
         "counts": counts | {"events": done.events} | dvs.counts,
+        "cuts_us": done.cuts_us,
         "warnings": done.warnings + _remarks(done, dvs),
     }
 
@@ -219,6 +222,10 @@ def _remarks(done: Progress, dvs: Dvs) -> list[str]:
     remarks = []
     if done.frames == 1:
         remarks.append("one frame only: nothing changes, so there are no events")
+    if done.cuts_us:
+        remarks.append(
+            f"{len(done.cuts_us)} cuts: the sensor started afresh after each; --cuts keep takes them for steps of light"
+        )
     if done.limited:
         remarks.append(
             f"{done.limited} of {done.frames - 1} intervals asked for more sub-frames than --max-subframes allows"

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -19,9 +19,14 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import Source, open_source
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-from vid2ev.upsample import Upsampler, make_upsampler
+from vid2ev.upsample import Interval, Upsampler, make_upsampler
+from vid2ev.upsample.cuts import CutDetector
+from vid2ev.upsample.none import NoUpsampling
 
-AHEAD = 4  # frames made in advance, while the sensor works
+FRAMES_AHEAD = 4  # made in advance, while the sensor works
+INTERVALS_AHEAD = 2  # whose motion is known in advance
+
+CUTS = ("restart", "keep")
 
 T = TypeVar("T")
 
@@ -37,6 +42,7 @@ class Recipe:
     max_subframes  the most that "auto" may take
     seed           of the sensor, 0 ... 2**64 - 1
     labels         give each event its cause
+    cuts           "restart": the sensor starts afresh after a cut, and "keep": it sees a step of light
     """
 
     video: str
@@ -48,6 +54,7 @@ class Recipe:
     max_subframes: int = 64
     seed: int = 0
     labels: bool = False
+    cuts: Literal["restart", "keep"] = "restart"
 
     @classmethod
     def of(
@@ -78,6 +85,8 @@ class Recipe:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
         recipe = cls(str(video), open_source(video, transfer=transfer, fps=fps), spec, name, **rest)
         recipe.upsampler()  # (refuses what cannot be)
+        if recipe.cuts not in CUTS:
+            raise UsageError(f"cuts '{recipe.cuts}': expected one of {', '.join(CUTS)}")
         return recipe
 
     def upsampler(self) -> Upsampler:
@@ -91,15 +100,31 @@ class Recipe:
 
     def light(self, start: int = 0) -> Generator[tuple[Frame, int]]:
         """Source frame `start`, and all frames after it, those in between too; with each the number of source intervals
-        so far that hit `max_subframes`.  A thread of its own makes them, a little in advance."""
-        return _ahead(self._light(start), AHEAD)
+        so far that hit `max_subframes`.  Two threads make them, a little in advance: one looks for motion, the other
+        carries light along it."""
+        return _ahead(self._light(start), FRAMES_AHEAD)
 
     def _light(self, start: int) -> Generator[tuple[Frame, int]]:
-        upsampler = self.upsampler()
+        limited = 0
+        with closing(_ahead(self._intervals(start), INTERVALS_AHEAD)) as intervals:
+            for interval in intervals:
+                limited += interval.limited
+                for frame in interval:
+                    yield frame, limited
+
+    def _intervals(self, start: int) -> Generator[Interval]:
+        """The frame `start` by itself, and each interval after it."""
+        upsampler, straight = self.upsampler(), NoUpsampling()
+        cuts = CutDetector(min(self.spec.threshold_on, self.spec.threshold_off))
         before: Frame | None = None
-        for frame in self.source.frames(start):
-            for newer in [frame] if before is None else upsampler.between(before, frame):
-                yield newer, upsampler.limited
+        # (whether there is a cut after frame `start` depends on the frame before it, too)
+        for index, frame in enumerate(self.source.frames(max(start - 1, 0)), max(start - 1, 0)):
+            cut = before is not None and cuts.begins_shot(before, frame) and self.cuts == "restart"
+            if index == start:
+                yield Interval(iter([frame]))
+            elif before is not None and index > start:
+                method = straight if cuts.unrelated else upsampler
+                yield method.between(before, replace(frame, cut=cut))
             before = frame
 
     def describe(self) -> dict[str, Any]:
@@ -116,6 +141,7 @@ class Recipe:
                         "method": self.upsample,
                         "subframes": self.subframes,
                         "max_subframes": self.max_subframes,
+                        "cuts": self.cuts,
                     },
                     "sensor": {
                         "name": self.sensor,

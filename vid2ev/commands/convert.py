@@ -73,6 +73,10 @@ class Auto(click.ParamType):
     help="The most that auto may take.",
 )
 @click.option(
+    "--cuts", type=click.Choice(["restart", "keep"]), default="restart", show_default=True,
+    help="After a cut the sensor starts afresh, or sees a step of light.",
+)  # fmt: skip
+@click.option(
     "--transfer",
     default="auto",
     show_default=True,

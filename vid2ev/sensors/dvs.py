@@ -95,16 +95,10 @@ class Dvs:
         what is above 1e30 as 1e30), uint8 or uint16 are codes of `transfer`.  The first frame settles the sensor and
         has no events. Raises UsageError for another shape or type, or a time that is not after the last one.
         """
-        flat, table = self._light(light)
-        t_ns = int(t_ns)
         if self._t_ns is None:
-            self._settle(flat, table, t_ns)
-            return Events.empty(self.labels)
-        if not self._t_ns < t_ns < self._t_ns + LONGEST_INTERVAL_NS:
-            raise UsageError(
-                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours;"
-                " sort the frames and drop repeated times"
-            )
+            return self.restart(light, t_ns)
+        flat, table = self._light(light)
+        t_ns = self._later(t_ns)
         self._rebase_leak(t_ns)
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
@@ -117,10 +111,30 @@ class Dvs:
             events = self._frames.push(events, t_ns // 1000)
         return self._counted(events)
 
+    def restart(self, light: np.ndarray, t_ns: int) -> Events:
+        """Settle in a frame of light at t_ns [int, ns], as after a cut: the light before it is forgotten.
+
+        There are no events in (previous frame, this frame]; only fixed-rate mode may return some, held back from
+        before.  Noise goes on: what is drawn by count or by time is drawn on.  Raises UsageError as `step` does.
+        """
+        flat, table = self._light(light)
+        if self._t_ns is None and self._frames is not None:
+            self._frames.origin_us = int(t_ns) // 1000
+        t_ns = self._later(t_ns)
+        self._settle(flat, table, t_ns)
+        released = Events.empty(self.labels)
+        if self._frames is not None:
+            released = self._frames.push(released, t_ns // 1000)
+        return self._counted(released)
+
+    def see(self, frame: Frame) -> Events:
+        """`step` to a frame, or `restart` where it begins a new shot."""
+        return (self.restart if frame.cut else self.step)(frame.light, frame.t_ns)
+
     def run(self, frames: Iterable[Frame]) -> Iterator[Events]:
-        """`step` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""
+        """`see` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""
         for frame in frames:
-            yield self.step(frame.light, frame.t_ns)
+            yield self.see(frame)
         yield self.flush()
 
     def flush(self) -> Events:
@@ -173,6 +187,16 @@ class Dvs:
 
     # ------------------------------------------------------------------------------------------------- inside
 
+    def _later(self, t_ns: int) -> int:
+        """The time of a frame, which must be after the last one."""
+        t_ns = int(t_ns)
+        if self._t_ns is not None and not self._t_ns < t_ns < self._t_ns + LONGEST_INTERVAL_NS:
+            raise UsageError(
+                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours;"
+                " sort the frames and drop repeated times"
+            )
+        return t_ns
+
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         light = np.asarray(light)
         width, height = self.size
@@ -207,9 +231,8 @@ class Dvs:
 
         self._tiles.each_blocks(settle)
         self._t_ns = self._leak_since_ns = t_ns
+        self._fresh_noise = True
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
-        if self._frames is not None:
-            self._frames.origin_us = t_ns // 1000
 
     def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> list[np.ndarray]:
         def walk(k: int, first: int, last: int) -> np.ndarray:

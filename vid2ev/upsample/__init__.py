@@ -6,28 +6,39 @@ A new method is a class that satisfies `Upsampler`, in a module of its own, and 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from vid2ev.errors import UsageError
 from vid2ev.stream.frames import Frame
 
-__all__ = ["METHODS", "Upsampler", "make_upsampler"]
+__all__ = ["METHODS", "Interval", "Upsampler", "make_upsampler"]
 
 METHODS = ("none", "linear", "flow")
 Subframes = int | Literal["auto"]
 
 
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """The frames after one frame of the source up to and including the next, in order of time, once."""
+
+    frames: Iterator[Frame]
+    limited: bool = False  # it asked for more than max_subframes
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.frames
+
+
 class Upsampler(Protocol):
     """Fills the intervals between frames."""
 
-    limited: int  # intervals so far that asked for more than max_subframes
-
-    def between(self, a: Frame, b: Frame) -> Iterator[Frame]:
-        """The frames after a up to and including b, in order of time.
+    def between(self, a: Frame, b: Frame) -> Interval:
+        """The frames after a up to and including b.
 
         The last one is b, the very same object; it is the only one with `original`.  What comes out depends
         on a and b alone, so that a recording can be taken up in the middle.  a and b have one shape, and a
-        comes before b.
+        comes before b.  Motion is estimated at once, frames are made when they are asked for: two threads can share
+        the work.
         """
 
 

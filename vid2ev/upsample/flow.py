@@ -22,23 +22,20 @@ import cv2
 import numpy as np
 
 from vid2ev.stream.frames import Frame
+from vid2ev.upsample import Interval
+from vid2ev.upsample.proxies import agreement, finite, proxies
 from vid2ev.upsample.subframes import instants, steps_for
-from vid2ev.upsample.warp import AFTER, BEFORE, agree, carry, settle, splat
+from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
 
 F = np.float32
 SHRINK = 2
 SMALLEST = 12 * SHRINK  # px: DIS refuses less than 12
-FLOOR = 0.01  # light below which the proxy is linear rather than logarithmic
-FULL_RANGE_NAT = float(np.log1p(1 / FLOOR))  # the least that 255 codes of the proxy span: black to white
 UNSURE = F(1e-3)  # weight of a pixel on which the flows do not agree, beside 1 for one on which they do
 ENOUGH = F(0.05)  # sum of weights from which a frame counts as seeing a place
 BLUR_PX = 1.0  # of the sums of `splat`: closes the gaps between pixels thrown apart
 AROUND = 9  # pixels whose change is averaged
 FAST_PERCENTILE = 95.0
 FEWEST = 16  # pixels that change; fewer are noise
-# A cut: most of the picture changes, and the flows agree hardly anywhere in it (unrelated pictures on 0.01 to 0.03 of
-# it, fast motion on 0.4 and more)
-CUT_CHANGED, CUT_SURE = 0.5, 0.2
 
 
 class Motion(NamedTuple):
@@ -52,56 +49,38 @@ class Motion(NamedTuple):
 
 
 class FlowUpsampling:
-    """Frames in between by optical flow; a still, unchanging or unrelated pair of frames gets none.
+    """Frames in between by optical flow; a still or unchanging pair of frames gets none.
 
     subframes      steps per interval, or "auto"
-    max_subframes  the most that "auto" takes; intervals that ask for more are counted in `limited`
+    max_subframes  the most that "auto" takes
     threshold      contrast threshold [nat]: motion is measured where log light changes by half of it or more
     """
 
     def __init__(self, subframes: int | Literal["auto"], max_subframes: int, threshold: float):
         self.subframes, self.max_subframes, self.threshold = subframes, max_subframes, threshold
-        self.limited = 0
         self._dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_FAST)  # type: ignore[attr-defined]
         self._dis.setFinestScale(0)
         self._dis.setPatchStride(5)
         self._dis.setVariationalRefinementIterations(1)
 
-    def between(self, a: Frame, b: Frame) -> Iterator[Frame]:
+    def between(self, a: Frame, b: Frame) -> Interval:
         """The frames after a up to and including b."""
-        if self.subframes != 1 and b.t_ns - a.t_ns > 1:
-            yield from self._carried(a, b)
-        yield b
-
-    def _carried(self, a: Frame, b: Frame) -> Iterator[Frame]:
+        if self.subframes == 1 or b.t_ns - a.t_ns <= 1:
+            return Interval(iter([b]))
         motion = self._motion(a.light, b.light)
-        steps = self._steps(motion, b.t_ns - a.t_ns) if self.subframes == "auto" else self.subframes
-        if steps == 1:
-            return
-        before, after = with_margin(a.light), with_margin(b.light)
-        moving = np.empty((3, *a.light.shape), np.float32)
-        for t_ns in instants(a.t_ns, b.t_ns, steps):
-            time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
-            light = np.empty(a.light.shape, np.float32)
-            motion_at(motion, time, moving)
-            carry(before, after, moving, time, light)
-            yield Frame(light, t_ns, original=False)
-
-    def _steps(self, motion: Motion, interval_ns: int) -> int:
-        steps = steps_for(motion.shift_px, interval_ns * 1e-9)
-        self.limited += steps > self.max_subframes
-        return min(steps, self.max_subframes)
+        asked = steps_for(motion.shift_px, (b.t_ns - a.t_ns) * 1e-9)
+        steps = min(asked, self.max_subframes) if self.subframes == "auto" else self.subframes
+        limited = self.subframes == "auto" and asked > self.max_subframes
+        return Interval(carried(a, b, motion, steps) if steps > 1 else iter([b]), limited)
 
     def _motion(self, before: np.ndarray, after: np.ndarray) -> Motion:
         """Motion between two images of light [H, W]."""
-        proxy_before, proxy_after, nat_per_code = proxies(before, after)
+        proxy_before, proxy_after, nat_per_code = proxies(before, after, SHRINK)
         if min(proxy_before.shape) * SHRINK < SMALLEST:
             return no_motion(proxy_before.shape)
         forward = self._dis.calc(proxy_before, proxy_after, None)
         backward = self._dis.calc(proxy_after, proxy_before, None)
         changed = cv2.absdiff(proxy_before, proxy_after) * nat_per_code > self.threshold / 2
-        if changed.mean() > CUT_CHANGED and agreement(forward, backward)[changed].mean() < CUT_SURE:
-            return no_motion(proxy_before.shape)
         least_codes = self.threshold / 8 / nat_per_code
         forward = convincing(forward, proxy_before, proxy_after, least_codes)
         backward = convincing(backward, proxy_after, proxy_before, least_codes)
@@ -112,15 +91,17 @@ class FlowUpsampling:
         return Motion(forward, backward, sure_before, sure_after, shift_px)
 
 
-def proxies(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Both images in 8 bits for matching, shrunken and about logarithmic, and the nats that a code stands for."""
-    height, width = before.shape
-    size = (max(1, width // SHRINK), max(1, height // SHRINK))
-    small = [cv2.resize(finite(light), size, interpolation=cv2.INTER_AREA) for light in (before, after)]
-    logs = [np.log1p(np.maximum(light, 0) * F(1 / FLOOR)) for light in small]
-    nat_per_code = max(FULL_RANGE_NAT, *(float(log.max()) for log in logs)) / 255
-    first, second = (cv2.convertScaleAbs(log, alpha=1 / nat_per_code) for log in logs)
-    return first, second, nat_per_code
+def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
+    """The frames after a up to and including b, in even steps of time."""
+    before, after = with_margin(a.light), with_margin(b.light)
+    moving = np.empty((3, *a.light.shape), np.float32)
+    for t_ns in instants(a.t_ns, b.t_ns, steps):
+        time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
+        light = np.empty(a.light.shape, np.float32)
+        motion_at(motion, time, moving)
+        carry(before, after, moving, time, light)
+        yield Frame(light, t_ns, original=False)
+    yield b
 
 
 def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes: float) -> np.ndarray:
@@ -135,13 +116,6 @@ def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes
     )
     gain = cv2.subtract(cv2.absdiff(start, end), cv2.absdiff(start, there), dtype=cv2.CV_32F)
     return flow * (cv2.blur(gain, (AROUND, AROUND)) > least_codes)[..., None]
-
-
-def agreement(flow: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """How well `back` undoes `flow` at each pixel, 0 ... 1 [h, w]."""
-    sure = np.empty(flow.shape[:2], np.float32)
-    agree(flow, back, sure)
-    return sure
 
 
 def motion_at(motion: Motion, time: np.float32, out: np.ndarray) -> None:
@@ -162,11 +136,6 @@ def no_motion(shape: tuple[int, ...]) -> Motion:
     """Nothing moves: frames in between are cross-fades."""
     still, sure = np.zeros((*shape, 2), np.float32), np.ones(shape, np.float32)
     return Motion(still, still, sure, sure, 0.0)
-
-
-def finite(light: np.ndarray) -> np.ndarray:
-    """The light with NaN and infinity as 0, so that bad pixels spoil no others; the same array if there are none."""
-    return light if cv2.checkRange(light)[0] else np.where(np.isfinite(light), light, F(0))
 
 
 def with_margin(light: np.ndarray) -> np.ndarray:

@@ -7,19 +7,21 @@ from collections.abc import Iterator
 import numpy as np
 
 from vid2ev.stream.frames import Frame
+from vid2ev.upsample import Interval
 from vid2ev.upsample.subframes import instants
 
 
 class LinearUpsampling:
     """A fixed number of steps per interval, each pixel on its own."""
 
-    limited = 0
-
     def __init__(self, subframes: int):
         self.subframes = subframes
 
-    def between(self, a: Frame, b: Frame) -> Iterator[Frame]:
+    def between(self, a: Frame, b: Frame) -> Interval:
         """The frames after a up to and including b."""
+        return Interval(self._faded(a, b))
+
+    def _faded(self, a: Frame, b: Frame) -> Iterator[Frame]:
         for t_ns in instants(a.t_ns, b.t_ns, self.subframes):
             share = np.float32((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
             with np.errstate(invalid="ignore"):  # (what is not finite is the sensor's to mend and to count)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from vid2ev.stream.frames import Frame
+from vid2ev.upsample import Interval
 
 
 class NoUpsampling:
     """Passes frames on."""
 
-    limited = 0
-
-    def between(self, a: Frame, b: Frame) -> Iterator[Frame]:
+    def between(self, a: Frame, b: Frame) -> Interval:
         """b."""
-        yield b
+        return Interval(iter([b]))
