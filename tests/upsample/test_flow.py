@@ -15,8 +15,9 @@ from skimage import data
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.flow import FlowUpsampling
+from vid2ev.upsample.proxies import agreement
 from vid2ev.upsample.subframes import steps_for
-from vid2ev.upsample.warp import AFTER, BEFORE, agree, carry, settle, splat
+from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
 
 F = np.float32
 INTERVAL_NS = 33_333_333
@@ -228,8 +229,7 @@ def test_wild_motion_stays_inside() -> None:
 def test_even_motion_is_thrown_to_even_motion(across: float, down: float, time: float) -> None:
     flow = np.empty((12, 14, 2), F)
     flow[..., 0], flow[..., 1] = across, down
-    sure = np.empty((12, 14), F)
-    agree(flow, -flow, sure)
+    sure = agreement(flow, -flow)
     inside = np.pad(np.ones((6, 8), bool), 3)
     np.testing.assert_allclose(sure[inside], 1, atol=1e-6)
     field, motion = np.zeros((14, 16, 4), F), np.empty((3, 12, 14), F)
@@ -242,10 +242,8 @@ def test_even_motion_is_thrown_to_even_motion(across: float, down: float, time: 
 
 def test_flows_that_contradict_each_other_are_unsure() -> None:
     flow = np.full((10, 10, 2), 2, F)
-    sure = np.empty((10, 10), F)
-    agree(flow, flow, sure)
-    assert sure.max() < 0.01
-    agree(flow, -flow, sure)
+    assert agreement(flow, flow).max() < 0.01
+    sure = agreement(flow, -flow)
     assert sure[:8, :8].min() > 0.99 and sure[8:].max() == 0 and sure[:, 8:].max() == 0  # (leads outside)
 
 

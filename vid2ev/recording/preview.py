@@ -27,7 +27,7 @@ from vid2ev.stream.frames import Frame
 
 RATE = 30  # frames per second
 SIDE = 640
-ENCODER = {"preset": "superfast", "crf": "24"}
+ENCODER = {"preset": "ultrafast", "crf": "25"}  # 60 % of the time of "superfast", 24, in a third more bytes
 BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
 MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins while the file is still loading
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vid2ev.upsample.warp import agree
+from vid2ev.upsample.warp import miss
 
 F = np.float32
 FLOOR = 0.01  # light below which a proxy is linear rather than logarithmic
@@ -33,10 +33,10 @@ def codes(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def agreement(flow: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """How well `back` undoes `flow` at each pixel, 0 ... 1 [h, w]."""
-    sure = np.empty(flow.shape[:2], np.float32)
-    agree(flow, back, sure)
-    return sure
+    """How well `back` undoes `flow` at each pixel: exp(-missed) of `warp.miss`, 0 ... 1 [h, w]."""
+    missed = np.empty(flow.shape[:2], np.float32)
+    miss(flow, back, missed)
+    return cv2.exp(-missed)
 
 
 def finite(light: np.ndarray) -> np.ndarray:

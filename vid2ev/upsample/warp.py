@@ -19,33 +19,35 @@ from numba import njit
 F = np.float32
 BEFORE, AFTER = 1, 2  # pixels of margin that `carry` needs around an image
 _HALF, _ONE, _TWO, _THREE, _FOUR = F(0.5), F(1), F(2), F(3), F(4)
+_TINY = F(1e-20)  # in place of a sum of nothing
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def agree(flow, back, sure):
-    """How well `back` undoes `flow`: sure [h, w] = exp(-missed / (0.01 (lengths) + 0.5)), 0 where flow leads outside.
+def miss(flow, back, missed):
+    """How far `back` fails to undo `flow`: missed [h, w] = |flow + back there|**2 / (0.01 lengths + 0.5).
 
-    missed is |flow + back there|**2, lengths |flow|**2 + |back there|**2, both in px**2; flow and back are [h, w, 2].
+    It is infinite where flow leads outside;
+    lengths is |flow|**2 + |back there|**2; flow and back are [h, w, 2] px.
     """
-    height, width = sure.shape
+    height, width = missed.shape
     for y in range(height):
         for x in range(width):
             across, down = flow[y, x, 0], flow[y, x, 1]
             to_x, to_y = F(x) + across, F(y) + down
             if not (F(0) <= to_x <= F(width - 1) and F(0) <= to_y <= F(height - 1)):
-                sure[y, x] = F(0)
+                missed[y, x] = F(np.inf)
                 continue
-            left, top = int(to_x), int(to_y)
+            left, top = np.int32(to_x), np.int32(to_y)
             right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
             a, b = to_x - F(left), to_y - F(top)
-            missed, lengths = F(0), across * across + down * down
+            error, lengths = F(0), across * across + down * down
             for axis in range(2):
                 upper = back[top, left, axis] + a * (back[top, right, axis] - back[top, left, axis])
                 lower = back[bottom, left, axis] + a * (back[bottom, right, axis] - back[bottom, left, axis])
                 there = upper + b * (lower - upper)
-                missed += (flow[y, x, axis] + there) ** 2
+                error += (flow[y, x, axis] + there) ** 2
                 lengths += there * there
-            sure[y, x] = np.exp(-missed / (F(0.01) * lengths + _HALF))
+            missed[y, x] = error / (F(0.01) * lengths + _HALF)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -53,7 +55,7 @@ def splat(flow, sure, unsure, time, direction, share, slot, field):
     """Add a frame's velocities to `field`, at the places its pixels reach after `time` of the interval.
 
     flow       [h, w, 2] shift over the whole interval, px of this grid
-    sure       [h, w] of `agree`; `unsure` is added: what a pixel counts on which the flows do not agree at all
+    sure       [h, w] of `proxies.agreement`; `unsure` is added: what a pixel counts on which the flows do not agree
     direction  1 if flow runs with time, -1 if against
     share      factor on the weight in the average of velocities
     slot       2 or 3: where the weights go
@@ -94,17 +96,19 @@ def settle(field, time, enough, motion):
     counts as half): what only one of the frames sees is taken from that one.
     """
     _, height, width = motion.shape
+    four = np.uintp(4)
     for y in range(height):
-        for x in range(width):
-            sums = field[y + 1, x + 1]
-            before, after = sums[2], sums[3]
-            total = (_ONE - time) * before + time * after
-            inverse = _ONE / total if total > F(1e-9) else F(0)
-            motion[0, y, x] = sums[0] * inverse
-            motion[1, y, x] = sums[1] * inverse
+        sums = field[y + 1].reshape(-1)
+        across, down, share = motion[0, y], motion[1, y], motion[2, y]
+        for x in range(width):  # (flat entries and no branches: this runs in vectors)
+            k = four * np.uintp(x) + four
+            before, after = sums[k + np.uintp(2)], sums[k + np.uintp(3)]
+            inverse = _ONE / ((_ONE - time) * before + time * after + _TINY)
+            across[x] = sums[k] * inverse
+            down[x] = sums[k + np.uintp(1)] * inverse
             seen_before = (_ONE - time) * (before / (before + enough) + F(1e-6))
             seen_after = time * (after / (after + enough) + F(1e-6))
-            motion[2, y, x] = seen_before / (seen_before + seen_after)
+            share[x] = seen_before / (seen_before + seen_after)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
