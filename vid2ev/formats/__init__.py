@@ -33,6 +33,14 @@ __all__ = [
 # By name, in the order in which content is looked at: what can be mistaken for nothing else comes first.
 FORMATS = {
     "hdf5": "vid2ev.formats.hdf5",
+    "evt3": "vid2ev.formats.evt3",
+    "evt2": "vid2ev.formats.evt2",
+    "dat": "vid2ev.formats.dat",
+    "npz": "vid2ev.formats.npz",
+    "v2e-hdf5": "vid2ev.formats.v2e_hdf5",
+    "es": "vid2ev.formats.es",
+    "aedat2": "vid2ev.formats.aedat2",
+    "nmnist": "vid2ev.formats.nmnist",
 }
 
 

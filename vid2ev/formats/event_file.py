@@ -108,3 +108,49 @@ def within(blocks: Iterator[Events], start_us: int | None = None, stop_us: int |
             events = events.select(kept)
         if len(events):
             yield events
+
+
+def regrouped(blocks: Iterator[Events], block: int = BLOCK) -> Iterator[Events]:
+    """The same events, exactly `block` of them at a time but for the last."""
+    waiting: list[Events] = []
+    count = 0
+    for events in blocks:
+        while count + len(events) >= block:
+            first = block - count
+            yield Events.concatenate([*waiting, stretch(events, 0, first)])
+            events, waiting, count = stretch(events, first, len(events)), [], 0
+        if len(events):
+            waiting.append(events)
+            count += len(events)
+    if count:
+        yield Events.concatenate(waiting)
+
+
+def stretch(events: Events, first: int, last: int) -> Events:
+    """Events number first ... last - 1; no copy."""
+    if first == 0 and last == len(events):
+        return events
+    part = slice(first, last)
+    label = None if events.label is None else events.label[part]
+    return Events(events.t[part], events.x[part], events.y[part], events.p[part], label)
+
+
+def promised(recording: Recording) -> Iterator[tuple[np.ndarray, Events]]:
+    """The blocks of a recording, each with its times since start_us.
+
+    Raises ValueError if the recording does not keep what it says of itself.
+    """
+    width, height = recording.size
+    count, last_us = 0, 0
+    for events in recording.blocks():
+        if not len(events):
+            continue
+        t = events.t - recording.start_us
+        if t[0] < last_us or np.any(t[1:] < t[:-1]) or t[-1] > recording.duration_us:
+            raise ValueError(f"events out of order of time, or outside of the recording, after event {count}")
+        if int(events.x.max()) >= width or int(events.y.max()) >= height:
+            raise ValueError(f"events outside of {width}x{height} pixels after event {count}")
+        count, last_us = count + len(events), int(t[-1])
+        yield t, events
+    if count != recording.count:
+        raise ValueError(f"{count} events, {recording.count} announced")

@@ -19,9 +19,7 @@ Filter: Blosc with LZ4 and bit-shuffling, about 3 bytes per event; Zstandard sav
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +27,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
+from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, opened
 from vid2ev.stream.events import Events
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 
 VERSION = 1
 CHUNK = 1 << 16  # events per compressed chunk
-MAGIC = b"\x89HDF\r\n\x1a\n"
 MS_US = 1000
 
 
@@ -51,7 +49,7 @@ class Hdf5Events:
     def __init__(self, path: Path):
         self.path = path
         self.warnings: list[str] = []
-        with self._opened() as file:
+        with opened(path, _check) as file:
             self.start_us = int(file["t_offset"][()]) if "t_offset" in file else 0
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self.labelled = "label" in file["events"]
@@ -63,7 +61,7 @@ class Hdf5Events:
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         """The events with start_us <= t < stop_us; only what is asked for is read."""
-        with self._opened() as file:
+        with opened(self.path, _check) as file:
             columns = file["events"]
             first = 0 if start_us is None else _position(file, start_us - self.start_us)
             last = len(columns["t"]) if stop_us is None else _position(file, stop_us - self.start_us)
@@ -78,30 +76,13 @@ class Hdf5Events:
         """None."""
         return iter(())
 
-    @contextmanager
-    def _opened(self) -> Iterator[h5py.File]:
-        """The file, open; every way in which it is not one becomes a DataError."""
-        import h5py
-        import hdf5plugin  # noqa: F401  (registers the filters)
-
-        try:
-            with h5py.File(self.path, "r") as file:
-                _check(file, self.path)
-                yield file
-        except DataError:
-            raise
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-            raise DataError(
-                f"{self.path} cannot be read as events: it is cut short or damaged; make it again or get another copy"
-            ) from error
-
 
 def write_events(path: Path, recording: Recording) -> None:
     """Write a recording.  Raises OSError where the disk cannot take it, ValueError for times out of order."""
     import h5py
 
     offset_us, duration_us = recording.start_us, recording.duration_us
-    with _WholeFile(path) as raw, h5py.File(raw, "w") as file:
+    with WholeFile(path) as raw, h5py.File(raw, "w") as file:
         width, height = recording.size
         file.attrs.update(width=np.uint16(width), height=np.uint16(height), version=np.uint16(VERSION))
         file["t_offset"] = np.int64(offset_us)
@@ -166,49 +147,11 @@ def _check(file: h5py.File, path: Path) -> None:
         raise DataError(f"{path} is damaged: events/t, x, y, p differ in length; make it again or get another copy")
 
 
-class _WholeFile(io.FileIO):
-    """A file that takes all it is given, and says at the end if the disk did not.
-
-    HDF5 cannot close a file when the disk is full (the process ends in a crash); so it is never told.
-    """
-
-    failure: OSError | None = None
-
-    def __init__(self, path: Path):
-        super().__init__(path, "w+")
-
-    def write(self, data: Any) -> int:
-        left = memoryview(data).cast("B")
-        size = len(left)
-        try:
-            while left and not self.failure:
-                left = left[super().write(left) :]
-        except OSError as error:
-            self.failure = error
-        return size
-
-    def truncate(self, size: int | None = None) -> int:
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.failure = self.failure or error
-            return size or 0
-
-    def check(self) -> None:
-        """Raise what went wrong."""
-        if self.failure:
-            raise self.failure
-
-    def close(self) -> None:
-        super().close()
-        self.check()
-
-
 FORMAT = Format(
     "hdf5",
     "HDF5 in the layout of DSEC",
     ".h5",
-    recognises=lambda head, path: head.startswith(MAGIC),
+    recognises=lambda head, path: head.startswith(MAGIC) and not holds_table(path),
     open=Hdf5Events,
     write=write_events,
     largest=(1 << 16, 1 << 16),

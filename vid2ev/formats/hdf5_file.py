@@ -1,0 +1,83 @@
+"""HDF5 files as such: opened so that damage is an error in one sentence, written so that a full disk is one."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vid2ev.errors import DataError
+
+if TYPE_CHECKING:
+    import h5py
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+@contextmanager
+def opened(path: Path, check: Callable[[h5py.File, Path], None]) -> Iterator[h5py.File]:
+    """The file, open and checked; every way in which it is not one becomes a DataError."""
+    import h5py
+    import hdf5plugin  # noqa: F401  (registers the filters)
+
+    try:
+        with h5py.File(path, "r") as file:
+            check(file, path)
+            yield file
+    except DataError:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise DataError(
+            f"{path} cannot be read as events: it is cut short or damaged; make it again or get another copy"
+        ) from error
+
+
+def holds_table(path: Path) -> bool:
+    """Whether `events` is one dataset, as v2e writes it; a file that cannot be opened holds none."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return isinstance(file.get("events"), h5py.Dataset)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError):
+        return False
+
+
+class WholeFile(io.FileIO):
+    """A file that takes all it is given, and says at the end if the disk did not.
+
+    HDF5 cannot close a file when the disk is full (the process ends in a crash); so it is never told.
+    """
+
+    failure: OSError | None = None
+
+    def __init__(self, path: Path):
+        super().__init__(path, "w+")
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data).cast("B")
+        size = len(left)
+        try:
+            while left and not self.failure:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.failure = error
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise what went wrong."""
+        if self.failure:
+            raise self.failure
+
+    def close(self) -> None:
+        super().close()
+        self.check()

@@ -1,0 +1,136 @@
+"""What Prophesee's files have in common: lines of text at the start, then words.
+
+    % evt 3.0                                 version of the words; absent in DAT files
+    % format EVT3;height=720;width=1280       the same in newer files
+    % geometry 1280x720                       (DAT files: Width, Height)
+    % start_us 81000                          the instant from which times count, on the clock of the source
+    % end                                     newer files only
+
+`start_us` is ours, `t0` that of faery; other readers pass over lines that they do not know.  The date is left out, so
+the same events give the same bytes.  Sources: https://docs.prophesee.ai/stable/data/file_formats/raw.html and
+https://docs.prophesee.ai/stable/data/file_formats/dat.html
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vid2ev.errors import DataError
+from vid2ev.formats.event_file import HEAD, Recording, promised
+from vid2ev.formats.sequential import Sequential, decoded, pieces, reading
+from vid2ev.stream.events import Events
+
+WORDS = 1 << 18  # written at a time
+UNKNOWN_SIZE = (2048, 2048)  # all that the words can say
+
+
+class Header(NamedTuple):
+    """The lines at the start of a file: what they say, and how many bytes they are."""
+
+    fields: dict[str, str]
+    length: int
+
+    @property
+    def version(self) -> str | None:
+        """That of the words, such as "3.0"."""
+        named = {"EVT2": "2.0", "EVT21": "2.1", "EVT3": "3.0"}.get(self.fields.get("format", "").partition(";")[0])
+        return named or self.fields.get("evt")
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """(width, height) if there is one."""
+        both = ";".join(f"{name}={self.fields.get(name, '')}" for name in ("format", "width", "height"))
+        found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", self.fields.get("geometry", ""))
+        sides = found.groups() if found else [_number(rf"{side}=(\d{{1,5}})\b", both) for side in ("width", "height")]
+        width, height = (int(side or 0) for side in sides)
+        return (width, height) if width and height else None
+
+    @property
+    def start_us(self) -> int:
+        """The instant from which times count; 0 if it is not there."""
+        return int(_number(r"(-?\d{1,18})", self.fields.get("start_us", self.fields.get("t0", ""))) or 0)
+
+
+def read_header(head: bytes) -> Header | None:
+    """The header of a file, from its first bytes; None if there is none."""
+    fields, at = {}, 0
+    while line := re.compile(rb"%(?: ([\t\x20-\x7e]{0,4000}))?\r?\n").match(head, at):
+        key, _, value = (line[1] or b"").decode().strip().partition(" ")
+        fields[key.lower()] = value.strip()
+        at = line.end()
+        if key == "end":
+            break
+    return Header(fields, at) if fields else None
+
+
+class RawEvents(Sequential):
+    """The events of a RAW file.
+
+    kinds  version -> (dtype of the words, what gives the function that decodes them)
+    Raises DataError for a file without header.
+    """
+
+    def __init__(self, path: Path, kinds: dict[str, tuple[str, Callable[[], Callable]]]):
+        super().__init__(path)
+        with reading(path) as file:
+            header = read_header(file.read(HEAD))
+        if header is None or header.version not in kinds:
+            raise DataError(f"{path} has no header that says EVT {' or '.join(kinds)}; expected a RAW file")
+        self.size, self.start_us, self._header = header.size, header.start_us, header
+        dtype, self._decoder = kinds[header.version]
+        self._dtype = np.dtype(dtype).newbyteorder(">" if header.fields.get("endianness") == "big" else "<")
+
+    def describe(self) -> dict[str, Any]:
+        """The lines of the header."""
+        return {"version": self._header.version, "header": self._header.fields}
+
+    def _decoded(self) -> Iterator[Events]:
+        from vid2ev.formats.evt_state import Left, State
+
+        state, left = np.full(len(State), -1, np.int64), np.zeros(len(Left), np.int64)
+        with reading(self.path) as file:
+            file.seek(self._header.length)
+            words = (piece.astype(piece.dtype.newbyteorder("="), copy=False) for piece in pieces(file, self._dtype))
+            decode = partial(self._decoder(), state, left, self.start_us)
+            yield from decoded(words, decode, self.size or UNKNOWN_SIZE)
+        self._leave_out(int(left[Left.EARLY]), "events before the first time word are")
+        self._leave_out(int(left[Left.OUTSIDE]), f"{self._outside} are")
+        self._leave_out(int(left[Left.TRIGGERS]), "external triggers are")
+        self._leave_out(int(left[Left.OTHERS]), "words of other kinds are")
+        cut = (self.path.stat().st_size - self._header.length) % self._dtype.itemsize
+        self._leave_out(cut, "bytes at the end, where the file is cut within a word, are")
+
+
+def write_raw(path: Path, recording: Recording, version: str, dtype: str, encode: Callable) -> None:
+    """Write a RAW file; encode(t, x, y, p, first, until_us, state, words) is the compiled function that says events
+    number `first` and on in words, then time up to until_us, and returns how many events and words those were."""
+    from vid2ev.formats.evt_state import State
+
+    width, height = recording.size
+    name = f"EVT{version[0]}"
+    fields = (f"evt {version}", f"format {name};height={height};width={width}", f"geometry {width}x{height}")
+    state, words = np.full(len(State), -1, np.int64), np.empty(WORDS, dtype)
+    state[State.WIDTH] = width
+    with open(path, "wb") as file:
+        file.write("".join(f"% {line}\n" for line in (*fields, f"start_us {recording.start_us}", "end")).encode())
+
+        def put(t: np.ndarray, events: Events, until_us: int) -> None:
+            first = 0
+            while first <= len(t):
+                first, count = encode(t, events.x, events.y, events.p, first, until_us, state, words)
+                file.write(words[:count].data)
+
+        for t, events in promised(recording):
+            put(t, events, int(t[-1]))
+        put(np.empty(0, np.int64), Events.empty(), recording.duration_us)
+
+
+def _number(pattern: str, text: str) -> str | None:
+    found = re.search(pattern, text)
+    return found[1] if found else None
