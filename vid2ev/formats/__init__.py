@@ -33,6 +33,7 @@ __all__ = [
 # By name, in the order in which content is looked at: what can be mistaken for nothing else comes first.
 FORMATS = {
     "hdf5": "vid2ev.formats.hdf5",
+    "aedat4": "vid2ev.formats.aedat4",
     "evt3": "vid2ev.formats.evt3",
     "evt2": "vid2ev.formats.evt2",
     "dat": "vid2ev.formats.dat",
