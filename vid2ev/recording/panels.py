@@ -1,7 +1,6 @@
 """The two panels of the preview: a frame in gray, and counts of events in colour, as planes of yuv420p.
 
-ON is amber, OFF is blue, on dark ground; more events are brighter.  Codes have 8 bits and limited range, by Rec. ITU-R
-BT.709-6.
+Codes have 8 bits and limited range, by Rec. ITU-R BT.709-6.
 """
 
 from __future__ import annotations
@@ -10,10 +9,7 @@ import cv2
 import numpy as np
 from numba import njit
 
-MOST = 15  # events of one polarity that a pixel can tell apart
-ON, OFF, GROUND = np.array([[255, 190, 90], [90, 160, 255], [16, 18, 24]]) / 255
-STRENGTH_PER_EVENT = 0.55  # share of the remaining way from the ground to the full colour
-NEUTRAL = 128  # the code of no colour
+from vid2ev.pictures.colours import MOST, NEUTRAL, codes, event_colours
 
 
 def reduced(light: np.ndarray, across: int, down: int) -> np.ndarray:
@@ -58,21 +54,10 @@ def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-unt
             chroma[1, block_i, right] = v // n if n else colours[0, 0, 2]
 
 
-def _colour_table() -> np.ndarray:
-    """Codes Y, U, V [OFF events, ON events, 3], by the equations of Rec. ITU-R BT.709-6 items 3.2 to 3.4, 8 bits."""
-    off, on = np.mgrid[0 : MOST + 1, 0 : MOST + 1][..., None]
-    colour = (off * OFF + on * ON) / np.maximum(off + on, 1)
-    strength = 1 - (1 - STRENGTH_PER_EVENT) ** (off + on)
-    rgb = GROUND + strength * (colour - GROUND)
-    y = rgb @ [0.2126, 0.7152, 0.0722]
-    u, v = (rgb[..., 2] - y) / 1.8556, (rgb[..., 0] - y) / 1.5748
-    return np.rint(np.stack([16 + 219 * y, NEUTRAL + 224 * u, NEUTRAL + 224 * v], axis=-1)).astype(np.uint8)
-
-
 def _gray_table() -> np.ndarray:
     """Codes Y of light in steps of 1 / 65535, by Rec. ITU-R BT.709-6 items 1.2 and 3.4, 8 bits."""
     light = np.arange(1 << 16) / 65535
     return np.rint(16 + 219 * np.where(light < 0.018, 4.5 * light, 1.099 * light**0.45 - 0.099)).astype(np.uint8)
 
 
-COLOURS, GRAYS = _colour_table(), _gray_table()
+COLOURS, GRAYS = codes(event_colours()), _gray_table()

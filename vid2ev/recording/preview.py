@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.pictures.film import MUXER, film_frame, open_film
 from vid2ev.recording.disk import sync
 from vid2ev.recording.panels import COLOURS, count, paint, reduced
 from vid2ev.stream.events import Events
@@ -28,8 +29,6 @@ from vid2ev.stream.frames import Frame
 RATE = 30  # frames per second
 SIDE = 640
 ENCODER = {"preset": "ultrafast", "crf": "25"}  # 60 % of the time of "superfast", 24, in a third more bytes
-BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
-MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins while the file is still loading
 
 
 class Preview:
@@ -150,28 +149,12 @@ class Preview:
         return picture
 
     def _encode(self, picture: np.ndarray) -> None:
-        import av
-
         if self._container is None:
             self._open()
-        frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
-        frame.pts, frame.time_base = self._next - self._starts[-1], Fraction(1, RATE)
-        frame.colorspace = frame.color_primaries = frame.color_trc = BT709
-        frame.color_range = LIMITED
-        self._container.mux(self._stream.encode(frame))
+        self._container.mux(self._stream.encode(film_frame(picture, self._next - self._starts[-1], Fraction(RATE))))
 
     def _open(self) -> None:
         """Begin a piece with the next frame."""
-        import av
-
-        self._container = av.open(str(self._piece(len(self._starts))), "w")
+        size = 2 * self.panel[0], self.panel[1]
+        self._container, self._stream = open_film(self._piece(len(self._starts)), size, Fraction(RATE), ENCODER)
         self._starts.append(self._next)
-        self._stream = self._container.add_stream("libx264", rate=RATE, options=ENCODER)
-        self._stream.width, self._stream.height, self._stream.pix_fmt = 2 * self.panel[0], self.panel[1], "yuv420p"
-        context = self._stream.codec_context
-        context.time_base = Fraction(1, RATE)
-        context.max_b_frames = 0  # pieces can then be put one after the other as they are
-        context.thread_count = 1  # more would make other bits
-        context.gop_size = 4 * RATE
-        context.colorspace = context.color_primaries = context.color_trc = BT709
-        context.color_range = LIMITED

@@ -1,0 +1,1 @@
+"""How events and light look: colours, their codes, and films that a browser plays."""

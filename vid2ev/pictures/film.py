@@ -1,0 +1,102 @@
+"""Films that a browser plays: H.264, yuv420p, BT.709 in limited range, the index first; the same bytes each time.
+
+In 4:2:0 four pixels share their colour.  Here that is the mean of theirs, weighted by how far each is from gray:
+
+    U = sum w u / sum w,   w = |u| + |v| + 1/100        (V alike; u, v in codes from neutral)
+
+so that a single coloured pixel on gray ground keeps its colour; where all are alike it is the plain mean.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import av
+import numpy as np
+from numba import njit
+
+from vid2ev.pictures.colours import BLUE, BLUE_SPAN, GREEN, NEUTRAL, RED, RED_SPAN
+
+BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
+MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins while the file is still loading
+ENCODER = {"preset": "veryfast", "crf": "18"}
+
+
+class Film:
+    """A film of `size` (width, height), both even, at `fps` pictures a second, as a context; raises OSError."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction | int):
+        self.rate = Fraction(fps)
+        self.frames = 0
+        self._container, self._stream = open_film(path, size, self.rate, ENCODER, MUXER)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def add(self, picture: np.ndarray) -> None:
+        """The next picture: R'G'B' uint8 [height, width, 3]."""
+        self._container.mux(self._stream.encode(film_frame(planes(picture), self.frames, self.rate)))
+        self.frames += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._container.mux(self._stream.encode(None))
+        finally:
+            self._container.close()
+
+
+def open_film(
+    path: Path, size: tuple[int, int], rate: Fraction, encoder: dict[str, str], muxer: dict[str, str] | None = None
+) -> tuple[Any, Any]:
+    """A container to be written, and its stream; what is encoded does not depend on the machine's cores."""
+    container = av.open(str(path), "w", format="mp4", options=muxer or {})
+    stream = container.add_stream("libx264", rate=rate, options=encoder)
+    stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+    context = stream.codec_context
+    context.time_base = 1 / rate
+    context.max_b_frames = 0  # pieces can then be put one after the other as they are
+    context.thread_count = 1  # more would make other bits
+    context.gop_size = max(1, round(4 * rate))
+    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.color_range = LIMITED
+    return container, stream
+
+
+def film_frame(picture: np.ndarray, number: int, rate: Fraction) -> Any:
+    """Planes Y, U, V, one after the other as yuv420p has them, as the frame of a number."""
+    frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
+    frame.pts, frame.time_base = number, 1 / rate
+    frame.colorspace = frame.color_primaries = frame.color_trc = BT709
+    frame.color_range = LIMITED
+    return frame
+
+
+def planes(picture: np.ndarray) -> np.ndarray:
+    """Planes Y, U, V of yuv420p [3 height / 2, width] of R'G'B' uint8 [height, width, 3], both sides even."""
+    height, width = picture.shape[:2]
+    coded = np.empty((height * 3 // 2, width), np.uint8)
+    _encode(picture, coded[:height], coded[height:].reshape(2, height // 2, width // 2))
+    return coded
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _encode(picture, luma, chroma):  # type: ignore[no-untyped-def]
+    for block_i in range(chroma.shape[1]):
+        for block_j in range(chroma.shape[2]):
+            u_sum = v_sum = weights = 0.0
+            for k in range(4):
+                i, j = 2 * block_i + k // 2, 2 * block_j + k % 2
+                red, green, blue = picture[i, j, 0] / 255, picture[i, j, 1] / 255, picture[i, j, 2] / 255
+                y = RED * red + GREEN * green + BLUE * blue
+                u, v = 224 * (blue - y) / BLUE_SPAN, 224 * (red - y) / RED_SPAN
+                weight = abs(u) + abs(v) + 0.01
+                u_sum, v_sum, weights = u_sum + weight * u, v_sum + weight * v, weights + weight
+                luma[i, j] = np.uint8(16 + 219 * y + 0.5)
+            chroma[0, block_i, block_j] = np.uint8(NEUTRAL + u_sum / weights + 0.5)
+            chroma[1, block_i, block_j] = np.uint8(NEUTRAL + v_sum / weights + 0.5)

@@ -1,0 +1,1 @@
+"""How events are seen: cut into slices, and each slice made an array or a picture."""

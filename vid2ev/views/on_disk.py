@@ -1,0 +1,171 @@
+"""Slices as files: `write_frames` makes one of these of a recording, as a whole or not at all.
+
+    npz   frames      [N, ...] the arrays of the slices, as the representation says
+          start_us    int64 [N]; slice k is (start_us[k], stop_us[k]]
+          stop_us     int64 [N]
+          events      int64 [N] how many there are in each
+          slices, representation      the requests, in text
+    png   a folder with 000000.png ... in 8 bits, as a representation looks, and slices.csv: file, start_us, stop_us,
+          events
+    mp4   a film with a picture for each slice, one after the other at `fps` whatever they last
+
+All three are made in memory that does not grow with the recording.  The same recording gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.formats.event_file import Recording
+from vid2ev.recording.disk import sync
+from vid2ev.views.representation import Slice, represent, slices_of
+from vid2ev.views.requests import parse_representation, parse_slicing
+
+KINDS = {"npz": "frames.npz", "png": "frames", "mp4": "frames.mp4"}  # and what convert calls them
+FPS = 30
+SLICES = "slices.csv"
+
+Report = Callable[[Slice], object]
+
+
+def write_frames(
+    path: Path,
+    recording: Recording,
+    representation: str = "counts",
+    slicing: str = "duration:10ms",
+    *,
+    kind: str = "npz",
+    fps: Fraction | int = FPS,
+    report: Report | None = None,
+) -> int:
+    """Write the slices of a recording to a file (npz, mp4) or a folder (png); returns how many there are.
+
+    representation, slicing   as `requests` parses them
+    fps                       of a film
+    report                    called with every slice that is done
+    What is at `path` is replaced when the new is whole.  Raises UsageError for requests that cannot be meant, OSError
+    where the disk cannot take it, and what reading the recording raises.
+    """
+    if kind not in KINDS:
+        raise UsageError(f"frames as '{kind}': expected one of {', '.join(KINDS)}")
+    cut, view = parse_slicing(slicing), parse_representation(representation)(recording.size)
+    arrays = reported(represent(recording, cut, view), report)
+    with whole(path) as beside:
+        if kind == "npz":
+            table = list(slices_of(recording, cut))
+            texts = {"slices": str(cut), "representation": representation}
+            _write_npz(beside, table, (array for _, array in arrays), view.shape, view.dtype, texts)
+            return len(table)
+        pictures = ((part, view.picture(array)) for part, array in arrays)
+        return write_pictures(beside, pictures) if kind == "png" else write_film(beside, pictures, fps)
+
+
+def reported(arrays: Iterator[tuple[Slice, np.ndarray]], report: Report | None) -> Iterator[tuple[Slice, np.ndarray]]:
+    """The same, and each slice is reported once what is made of it is done."""
+    for part, array in arrays:
+        yield part, array
+        if report is not None:
+            report(part)
+
+
+def write_pictures(folder: Path, pictures: Iterator[tuple[Slice, np.ndarray]]) -> int:
+    """A folder of pictures, R'G'B' uint8 [height, width, 3], with their slices; returns how many there are."""
+    folder.mkdir()
+    number = 0
+    with open(folder / SLICES, "w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["file", "start_us", "stop_us", "events"])
+        for part, picture in pictures:
+            name = f"{number:06d}.png"
+            write_picture(folder / name, picture)
+            rows.writerow([name, part.start_us, part.stop_us, part.events])
+            number += 1
+    return number
+
+
+def write_picture(path: Path, picture: np.ndarray) -> None:
+    """A PNG of R'G'B' uint8 [height, width, 3]; gray where it has no colour."""
+    import cv2
+
+    gray = bool((picture[..., :1] == picture[..., 1:]).all())
+    coded = cv2.imencode(".png", picture[..., 0] if gray else np.ascontiguousarray(picture[..., ::-1]))[1]
+    path.write_bytes(coded.tobytes())
+
+
+def write_film(path: Path, pictures: Iterator[tuple[Slice, np.ndarray]], fps: Fraction | int) -> int:
+    """A film of pictures of one size, R'G'B' uint8 [height, width, 3], at least one; returns how many there are."""
+    from vid2ev.pictures.film import Film
+
+    first = next(pictures)
+    height, width = first[1].shape[:2]
+    margin = (0, height % 2), (0, width % 2), (0, 0)  # 4:2:0 needs even sides
+    with Film(path, (width + width % 2, height + height % 2), fps) as film:
+        for _, picture in chain([first], pictures):
+            film.add(np.pad(picture, margin, mode="edge"))
+    return film.frames
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A path beside another, for a file or folder that takes its place at the end; what goes wrong leaves nothing."""
+    beside, replaced = (path.with_name(f"{path.name}.{word}") for word in ("new", "replaced"))
+    _remove(beside)
+    try:
+        yield beside
+        for file in [*beside.iterdir(), beside] if beside.is_dir() else [beside]:
+            sync(file)
+        if path.is_dir():
+            path.rename(replaced)
+        beside.replace(path)
+        sync(path.absolute().parent)
+    finally:
+        _remove(beside)
+        _remove(replaced)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def _write_npz(
+    path: Path,
+    table: list[Slice],
+    arrays: Iterator[np.ndarray],
+    shape: tuple[int, ...],
+    dtype: np.dtype,
+    texts: dict[str, str],
+) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        _write_member(archive, "frames", (len(table), *shape), dtype, arrays)
+        for name in ("start_us", "stop_us", "events"):
+            column = np.array([getattr(part, name) for part in table], np.int64)
+            _write_member(archive, name, column.shape, column.dtype, iter([column]))
+        for name, text in texts.items():
+            _write_member(archive, name, (), np.array(text).dtype, iter([np.array(text)]))
+
+
+def _write_member(
+    archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: np.dtype, parts: Iterator[np.ndarray]
+) -> None:
+    """An array, part by part, as a member of an npz file."""
+    entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980, as files that are the same are to have the same bytes
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    with archive.open(entry, "w", force_zip64=True) as member:
+        np.lib.format.write_array_header_1_0(member, header)  # type: ignore[arg-type]
+        for part in parts:
+            member.write(np.ascontiguousarray(part).tobytes())
