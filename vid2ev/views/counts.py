@@ -23,7 +23,7 @@ COLOURS = in_8_bits(event_colours())
 class Counts:
     """Counts of the events of a slice; seen in the colours of the preview."""
 
-    tiles = 1
+    tiles = (1, 1)
     dtype: np.dtype[Any] = np.dtype(np.uint16)
 
     def __init__(self, size: tuple[int, int]):

@@ -21,7 +21,7 @@ from vid2ev.views.representation import check_within
 class Frame:
     """ON minus OFF events of a slice in gray; `full_scale` events are white."""
 
-    tiles = 1
+    tiles = (1, 1)
     dtype: np.dtype[Any] = np.dtype(np.float32)
 
     def __init__(self, size: tuple[int, int], full_scale: int = 2):

@@ -34,6 +34,7 @@ from vid2ev.views.requests import parse_representation, parse_slicing
 KINDS = {"npz": "frames.npz", "png": "frames", "mp4": "frames.mp4"}  # and what convert calls them
 FPS = 30
 SLICES = "slices.csv"
+LEVEL = 4  # of Deflate
 
 Report = Callable[[Slice], object]
 
@@ -149,7 +150,7 @@ def _write_npz(
     dtype: np.dtype,
     texts: dict[str, str],
 ) -> None:
-    with zipfile.ZipFile(path, "w") as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         _write_member(archive, "frames", (len(table), *shape), dtype, arrays)
         for name in ("start_us", "stop_us", "events"):
             column = np.array([getattr(part, name) for part in table], np.int64)
@@ -162,10 +163,8 @@ def _write_member(
     archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: np.dtype, parts: Iterator[np.ndarray]
 ) -> None:
     """An array, part by part, as a member of an npz file."""
-    entry = zipfile.ZipInfo(f"{name}.npy")  # of 1980, as files that are the same are to have the same bytes
-    entry.compress_type = zipfile.ZIP_DEFLATED
     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-    with archive.open(entry, "w", force_zip64=True) as member:
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
         np.lib.format.write_array_header_1_0(member, header)  # type: ignore[arg-type]
         for part in parts:
             member.write(np.ascontiguousarray(part).tobytes())

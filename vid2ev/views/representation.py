@@ -22,7 +22,7 @@ class Representation(Protocol):
 
     shape: tuple[int, ...]  # of the array of a slice; the last two are height and width
     dtype: np.dtype[Any]
-    tiles: int  # how many pictures of the sensor, side by side, `picture` shows
+    tiles: tuple[int, int]  # columns and rows of pictures of the sensor in `picture`, a pixel apart
 
     def add(self, events: Events, start_us: int, stop_us: int) -> None:
         """Take in events of the slice (start_us, stop_us].  Raises ValueError for pixels outside of the sensor."""

@@ -28,7 +28,7 @@ TAU_US = 30_000.0
 class ActiveEvents:
     """The surface of active events, in microseconds; seen as a time surface of 30 ms."""
 
-    tiles = 1
+    tiles = (1, 1)
     dtype: np.dtype[Any] = np.dtype(np.int64)
     tau_us = TAU_US
 

@@ -14,6 +14,7 @@ camera" (E2VID).  Their t_0 and t_1 are the first and the last event: so are tho
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,11 @@ from vid2ev.views.representation import check_within
 MOST_BINS = 1000
 STEPS = 16  # of a picture's values per event
 BRIGHTEST = 15 * STEPS
+LINES = 70  # gray between the bins
 
 
 class Voxel:
-    """The voxel grid of a slice; seen as its bins side by side, positive amber, negative blue."""
+    """The voxel grid of a slice; seen as its bins, positive amber, negative blue."""
 
     dtype: np.dtype[Any] = np.dtype(np.float32)
 
@@ -37,7 +39,8 @@ class Voxel:
         self.size, self.bins, self.normalised = size, bins, normalised
         grid = (bins, size[1], size[0])
         self.shape: tuple[int, ...] = (2, *grid) if polarity else grid
-        self.tiles = bins
+        columns = math.isqrt(bins - 1) + 1
+        self.tiles = columns, -(-bins // columns)
         self._grid = np.zeros((2 if polarity else 1, *grid), self.dtype)
 
     def add(self, events: Events, start_us: int, stop_us: int) -> None:
@@ -52,17 +55,17 @@ class Voxel:
         return _normalised(taken.reshape(self.shape)) if self.normalised else taken.reshape(self.shape)
 
     def picture(self, array: np.ndarray) -> np.ndarray:
-        """The bins side by side from left to right, with a line of one pixel between them."""
+        """The bins from left to right, in rows from top to bottom; ON minus OFF where they are apart."""
         signed = array if array.ndim == 3 else array[1] - array[0]
-        level = np.clip(np.rint(signed * STEPS), -BRIGHTEST, BRIGHTEST).astype(np.int16)
-        tiles = COLOURS[level + BRIGHTEST]
-        return np.concatenate(
-            [
-                tile if k == 0 else np.pad(tile, ((0, 0), (1, 0), (0, 0)), constant_values=70)
-                for k, tile in enumerate(tiles)
-            ],
-            axis=1,
-        )
+        level = np.clip(np.rint(signed * STEPS), -BRIGHTEST, BRIGHTEST).astype(np.int16) + BRIGHTEST
+        columns, rows = self.tiles
+        across, down = self.size[0] + 1, self.size[1] + 1
+        picture = np.full((rows * down - 1, columns * across - 1, 3), LINES, np.uint8)
+        for k in range(columns * rows):
+            top, left = k // columns * down, k % columns * across
+            tile = COLOURS[level[k]] if k < self.bins else COLOURS[BRIGHTEST]
+            picture[top : top + down - 1, left : left + across - 1] = tile
+        return picture
 
 
 def voxel_grid(

@@ -1,0 +1,124 @@
+"""`vid2ev render`: a film or a picture of any event file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from vid2ev.formats.event_file import Recording
+
+BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
+SECONDS = click.FloatRange(0, max_open=True, max=1e9)
+
+
+@click.command(short_help="Make a film or a picture of any event file.")
+@click.argument("events")
+@click.option(
+    "-o", "--output", type=Path, metavar="FILE.mp4|FILE.png|DIR", help="What to make.  [default: NAME.mp4 here]"
+)
+@click.option(
+    "--view",
+    default="polarity",
+    show_default=True,
+    metavar="VIEW",
+    help="polarity, time-surface[:TAU], accumulated[:FULL_SCALE] or voxel[:BINS].",
+)
+@click.option(
+    "--by",
+    metavar="SLICES",
+    help="What a picture shows: duration:10ms, count:50000, area:500,32 or source (from frame to frame)."
+    "  [default: what passes in a picture's time]",
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(0, 1000, min_open=True),
+    default=30,
+    show_default=True,
+    metavar="RATE",
+    help="Pictures per second of the film.",
+)
+@click.option(
+    "--speed",
+    type=click.FloatRange(0, 1e6, min_open=True),
+    metavar="FACTOR",
+    help="Of the film against reality; 0.1 is slow motion.  [default: 1]",
+)
+@click.option("--start", "start_s", type=SECONDS, metavar="S", help="Begin S seconds after the beginning.")
+@click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds after the beginning.")
+@click.option(
+    "--size",
+    type=click.IntRange(64, 8192),
+    default=1280,
+    show_default=True,
+    metavar="PIXELS",
+    help="Longest side; small sensors are enlarged a whole number of times, large ones reduced.",
+)
+@click.option(
+    "--with-frames/--no-frames",
+    "frames",
+    default=None,
+    help="Show the file's frames beside its events, under them if they are wide.  [default: if it has any]",
+)
+@click.option("--stamp/--no-stamp", default=True, help="Write time and number of events below.  [default: yes]")
+@click.option("--overwrite", is_flag=True, help="Replace what is there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def render(events: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
+    """Make a film (.mp4), a picture (.png) or a folder of pictures of EVENTS: an event file, or a recording's folder.
+
+    Every event is shown once.  ON is amber, OFF is blue.  A film has a picture for each slice; FILE.png is a picture of
+    all events from --start to --stop, or, with --by or without a window, of the slice with the most events.
+    """
+    from vid2ev.commands import summary
+    from vid2ev.views.render import render as make
+
+    with _bar(quiet) as report:
+        made = make(events, output or _default(events), report=report, **options)
+    if as_json:
+        click.echo(json.dumps(made, indent=2))
+    elif not quiet:
+        click.echo(summary.lines(_facts(made)))
+
+
+def _default(events: str) -> Path:
+    path = Path(events).absolute()
+    return Path(f"{path.name if path.is_dir() else path.stem}.mp4")
+
+
+def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
+    many, (width, height) = made["frames"], made["size"]
+    pictures = f"{many:,} picture{'s' * (many > 1)} of {width}x{height}"
+    film = f", {made['fps']:g} per second: {many / made['fps']:.3g} s" if made["kind"] == "mp4" else ""
+    each = f"{made['view']} by {made['by']}" + (f", the densest of {made['slices']:,}" if many < made["slices"] else "")
+    return [
+        ("made", f"{made['path']}: {pictures}{film}"),
+        ("shows", each),
+        ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.6g} s"),
+        *(("warning", text) for text in made["warnings"]),
+    ]
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
+    """A progress bar on a terminal: events."""
+    from tqdm import tqdm
+
+    bar: tqdm | None = None
+
+    def report(recording: Recording, events: int) -> None:
+        nonlocal bar
+        if bar is None:
+            bar = tqdm(total=recording.count, bar_format=BAR, leave=False, disable=quiet or None, unit_scale=True)
+        bar.update(events - bar.n)
+
+    try:
+        yield report
+    finally:
+        if bar is not None:
+            bar.close()

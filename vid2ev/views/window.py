@@ -1,0 +1,52 @@
+"""A part of an event file as a recording: from one instant to another, both in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from vid2ev.formats import survey
+from vid2ev.formats.event_file import BLOCK, EventFile, Recording
+from vid2ev.stream.events import Events
+
+LONG_US = 1_000_000  # a silence that says that a file counts from another instant than it begins
+
+
+def beginning_us(file: EventFile) -> int:
+    """Where a recording begins: where its file counts from, but with the first event if that comes a second later.
+
+    Files of cameras often count from when the camera was switched on, or do not say from when.
+    """
+    first = next((int(events.t[0]) for events in file.events(block=1) if len(events)), file.start_us)
+    return first if first - file.start_us > LONG_US else min(first, file.start_us)
+
+
+def window(file: EventFile, start_us: int, stop_us: int | None = None) -> Recording:
+    """The events with start_us <= t <= stop_us, and the frames of the file.
+
+    It ends with the last of these events.  Reads all of them once; raises as `survey` does.
+    """
+    return survey(_Window(file, start_us, stop_us))
+
+
+def with_frame_times(recording: Recording) -> Recording:
+    """The recording with the instants of its frames, if it has any; reads the frames once."""
+    if recording.frames is None:
+        return recording
+    return replace(recording, frame_us=np.array([picture.t_us for picture in recording.frames()], np.int64))
+
+
+class _Window:
+    """An event file of which only a part is there."""
+
+    def __init__(self, file: EventFile, start_us: int, stop_us: int | None):
+        self._file, self.start_us, self._stop_us = file, start_us, stop_us
+        self.path, self.size, self.labelled, self.has_frames = file.path, file.size, file.labelled, file.has_frames
+        self.warnings = file.warnings
+        self.describe, self.frames = file.describe, file.frames
+
+    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
+        assert start_us is None and stop_us is None
+        return self._file.events(self.start_us, None if self._stop_us is None else self._stop_us + 1, block)
