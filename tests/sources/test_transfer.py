@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from vid2ev.errors import UsageError
 from vid2ev.sources.transfer import code_table, parse_transfer, signal_of_codes
 
-CURVES = ["linear", "srgb", "bt709", "gamma:2.2", "gamma:0.5"]
+CURVES = ["linear", "srgb", "bt709", "smpte240m", "gamma:2.2", "gamma:0.5"]  # from 0 at 0 to 1 at 1
 
 
 def published_srgb(v: float) -> float:
@@ -23,9 +23,15 @@ def published_bt709(v: float) -> float:
     return v / 4.5 if v < 0.081 else ((v + 0.099) / 1.099) ** (1 / 0.45)
 
 
+def published_240m(v: float) -> float:
+    """SMPTE 240M with the four-digit constants that H.273 has."""
+    return v / 4 if v < 4 * 0.0228 else ((v + 0.1115) / 1.1115) ** (1 / 0.45)
+
+
 @pytest.mark.parametrize(("name", "published", "tolerance"), [
     ("srgb", published_srgb, 1e-15),
     ("bt709", published_bt709, 3e-4),  # its own step at the knee, which the exact constants remove
+    ("smpte240m", published_240m, 2e-4),  # likewise
 ])  # fmt: skip
 def test_the_curve_is_the_published_one(name: str, published, tolerance: float) -> None:
     signal = np.linspace(0, 1, 10001)
@@ -41,9 +47,9 @@ def test_anchors() -> None:
     assert parse_transfer("srgb").to_light(np.array(0.5)) == pytest.approx(0.21404114)  # the value on everybody's lips
 
 
-def test_bt709_has_neither_step_nor_kink() -> None:
-    curve = parse_transfer("bt709")
-    knee = 4.5 * 0.018053968510807
+@pytest.mark.parametrize(("name", "knee"), [("bt709", 4.5 * 0.018053968510807), ("smpte240m", 4 * 0.022821585529445)])
+def test_a_camera_curve_has_neither_step_nor_kink(name: str, knee: float) -> None:
+    curve = parse_transfer(name)
     below, at, above = curve.to_light(np.array([knee - 1e-9, knee, knee + 1e-9]))
     assert (at - below) / 1e-9 == pytest.approx((above - at) / 1e-9, rel=1e-4)
 

@@ -81,7 +81,7 @@ class Auto(click.ParamType):
     default="auto",
     show_default=True,
     metavar="CURVE",
-    help="Codes to light: auto, srgb, bt709, gamma:G or linear.",
+    help="Codes to light: auto, srgb, bt709, pq, hlg, gamma:G, linear or another curve of the standards.",
 )
 @click.option(
     "--fps",

@@ -8,9 +8,12 @@ Y', Cb and Cr come from the codes in float32 and never touch 8 bits again; the t
 before the channels are added, because luminance is a sum of light, not of codes.  Codes brighter than white (above 235
 in limited range) become light above 1; a channel that the matrix makes negative is black.
 
+Y'CgCo has R' = Y' - Cg + Co, G' = Y' + Cg, B' = Y' - Cg - Co instead.
+
 Chroma of 4:2:0 and 4:2:2 is interpolated linearly, sited left in a row and centred between rows, which is what H.264
 and HEVC mean when they say nothing.  The curve is read from a table of 4096 steps per unit of signal and interpolated:
-within 3e-8 of the closed form for the curves of the standards.
+within 8e-8 of the closed form for sRGB and BT.709.  PQ, HLG and the others that are steep for their light have a table
+of 32768 steps: within 3e-7 (light + 0.001), which is as fine as float32 signals are.
 
 Sources: equations and ranges, Rec. ITU-T H.273 section 8.3; chroma siting, Rec. ITU-T H.264 figure E-1.
 """
@@ -25,7 +28,8 @@ from numba import njit
 
 from vid2ev.sources.transfer import parse_transfer
 
-STEPS = 4096  # table entries per unit of signal
+STEPS, FINE_STEPS = 4096, 32768  # table entries per unit of signal
+FINE_CURVES = ("pq", "hlg", "smpte240m", "st428", "log100", "log316")
 TOP = 1.25  # the highest signal: limited range ends at (255 - 16) / 219 = 1.09, saturated colours go beyond
 F = np.float32
 _ZERO = F(0)
@@ -36,14 +40,52 @@ class YuvCode(NamedTuple):
 
     bits: int  # of a code, 8 to 16
     full_range: bool
-    kr_kb: tuple[float, float]  # the matrix: shares of red and of blue in Y'
+    kr_kb: tuple[float, float] | None  # the matrix: shares of red and of blue in Y'; None: Y'CgCo
     halvings: tuple[int, int]  # of chroma, in x and in y: (1, 1) is 4:2:0, (1, 0) 4:2:2, (0, 0) 4:4:4
 
 
 def signal_table(transfer: str) -> np.ndarray:
     """Light [float32] of the signals 0, 1 / STEPS, ... TOP, and one entry more for the interpolation."""
-    signal = np.arange(int(STEPS * TOP) + 2) / STEPS
+    steps = FINE_STEPS if transfer in FINE_CURVES else STEPS
+    signal = np.arange(int(steps * TOP) + 2) / steps
     return parse_transfer(transfer).to_light(signal).astype(np.float32)
+
+
+class Steps(NamedTuple):
+    """How codes become places in a signal table: luma * scale + offset + (cb, cr less neutral) * per_cb, per_cr."""
+
+    scale: np.float32
+    offset: np.float32
+    neutral: np.float32
+    per_cb: np.ndarray  # [3]: red, green, blue
+    per_cr: np.ndarray
+
+    @classmethod
+    def of(cls, code: YuvCode, table: np.ndarray) -> Steps:
+        """The numbers for pictures of this code and a table of `signal_table`."""
+        steps = round((table.size - 2) / TOP)
+        unit = 2.0 ** (code.bits - 8)
+        luma = 1 / (2**code.bits - 1) if code.full_range else 1 / (219 * unit)
+        chroma = 1 / (2**code.bits - 1) if code.full_range else 1 / (224 * unit)
+        black = 0.0 if code.full_range else 16 * unit
+        per_cb, per_cr = _chroma_shares(code.kr_kb, chroma)
+        return cls(
+            F(steps * luma),
+            F(-steps * luma * black),
+            F(2 ** (code.bits - 1)),
+            (F(steps) * per_cb).astype(np.float32),
+            (F(steps) * per_cr).astype(np.float32),
+        )
+
+
+def _chroma_shares(kr_kb: tuple[float, float] | None, chroma: float) -> tuple[np.ndarray, np.ndarray]:
+    """What a code of Cb, and one of Cr, adds to red, green and blue."""
+    if kr_kb is None:
+        return chroma * np.array([-1.0, 1.0, -1.0]), chroma * np.array([1.0, 0.0, -1.0])
+    kr, kb = kr_kb
+    kg = 1 - kr - kb
+    red_cr, blue_cb = 2 * (1 - kr) * chroma, 2 * (1 - kb) * chroma
+    return np.array([0, -blue_cb * kb / kg, blue_cb]), np.array([red_cr, -red_cr * kr / kg, 0])
 
 
 def luminance_of_yuv(
@@ -61,21 +103,10 @@ def luminance_of_yuv(
     weights  luminance of the red, green and blue primary
     """
     width, height = size
-    kr, kb = code.kr_kb
-    kg = 1 - kr - kb
-    unit = 2.0 ** (code.bits - 8)
-    luma = 1 / (2**code.bits - 1) if code.full_range else 1 / (219 * unit)
-    chroma = 1 / (2**code.bits - 1) if code.full_range else 1 / (224 * unit)
-    black = 0.0 if code.full_range else 16 * unit
-    red_cr, blue_cb = 2 * (1 - kr) * chroma, 2 * (1 - kb) * chroma
-    # (signals are kept in steps of the table, so that no pixel needs to be scaled to them)
-    per_cr = (F(STEPS) * np.array([red_cr, -red_cr * kr / kg, 0])).astype(np.float32)
-    per_cb = (F(STEPS) * np.array([0, -blue_cb * kb / kg, blue_cb])).astype(np.float32)
     tables = np.outer(weights, table).astype(np.float32)
-    scale, offset, neutral = F(STEPS * luma), F(-STEPS * luma * black), F(2 ** (code.bits - 1))
     out = np.empty((height, width), np.float32)
-    luma_plane, cb, cr = planes
-    _yuv(luma_plane, cb, cr, code.halvings, neutral, scale, offset, per_cb, per_cr, tables, out)
+    luma, cb, cr = planes
+    _yuv(luma, cb, cr, code.halvings, tuple(Steps.of(code, table)), tables, out)
     return out
 
 
@@ -94,7 +125,7 @@ def luminance_of_rgb(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
+def chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
     """One row of chroma, less its neutral value, at the places of luma; `column` is room for the row before."""
     centre = (row + 0.5) / (1 << halvings_y) - 0.5
     above = int(np.floor(centre))
@@ -112,7 +143,7 @@ def _chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _places(luma, scale, offset, cb, per_cb, cr, per_cr, top, entry, share):
+def places(luma, scale, offset, cb, per_cb, cr, per_cr, top, entry, share):
     """Where in the table the signals of a channel lie, along a row: the entry below, the share of the one above."""
     for x in range(entry.size):
         step = F(luma[x]) * scale + offset + per_cb * cb[x] + per_cr * cr[x]
@@ -125,7 +156,8 @@ def _places(luma, scale, offset, cb, per_cb, cr, per_cr, top, entry, share):
 
 # Places first and look-ups after: the first loop runs in vectors, which a loop with a look-up in it cannot.
 @njit(cache=True, nogil=True, error_model="numpy")
-def _yuv(y, u, v, halvings, neutral, scale, offset, per_cb, per_cr, tables, out):
+def _yuv(y, u, v, halvings, steps, tables, out):
+    scale, offset, neutral, per_cb, per_cr = steps
     height, width = out.shape
     halvings_x, halvings_y = halvings
     column = np.empty(((width + (1 << halvings_x) - 1) >> halvings_x) + 1, np.float32)
@@ -135,11 +167,11 @@ def _yuv(y, u, v, halvings, neutral, scale, offset, per_cb, per_cr, tables, out)
     top = F(red.size - 2)
     one = np.uintp(1)
     for row in range(height):
-        _chroma_row(u, row, halvings_x, halvings_y, neutral, column, cb)
-        _chroma_row(v, row, halvings_x, halvings_y, neutral, column, cr)
+        chroma_row(u, row, halvings_x, halvings_y, neutral, column, cb)
+        chroma_row(v, row, halvings_x, halvings_y, neutral, column, cr)
         for channel in range(3):
             k, f = entry[channel], share[channel]
-            _places(y[row], scale, offset, cb, per_cb[channel], cr, per_cr[channel], top, k, f)
+            places(y[row], scale, offset, cb, per_cb[channel], cr, per_cr[channel], top, k, f)
         for x in range(width):
             r, g, b = np.uintp(entry[0, x]), np.uintp(entry[1, x]), np.uintp(entry[2, x])
             light = red[r] + (red[r + one] - red[r]) * share[0, x]

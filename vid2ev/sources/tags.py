@@ -8,25 +8,22 @@ point (SMPTE RP 177); the matrices are those of table 4.
 from __future__ import annotations
 
 from vid2ev.errors import DataError
-from vid2ev.sources.transfer import KNOWN
 
-UNSPECIFIED = 2
+IDENTITY, UNSPECIFIED, YCGCO = 0, 2, 8
 FULL_RANGE = 2  # of the range flag: 0 unspecified, 1 limited, 2 full
 
 # table 3; the curve of BT.709 is also that of BT.601 (6), xvYCC (11), BT.1361 (12) and BT.2020 (14, 15)
 TRANSFERS = dict.fromkeys((1, 6, 11, 12, 14, 15), "bt709") | {
     4: "gamma:2.2",
     5: "gamma:2.8",
+    7: "smpte240m",
     8: "linear",
+    9: "log100",
+    10: "log316",
     13: "srgb",
-}
-UNREAD_TRANSFERS = {
-    7: "SMPTE 240M",
-    9: "logarithmic",
-    10: "logarithmic",
-    16: "PQ (SMPTE ST 2084, HDR)",
-    17: "SMPTE ST 428",
-    18: "HLG (ARIB STD-B67, HDR)",
+    16: "pq",
+    17: "st428",
+    18: "hlg",
 }
 
 # table 4: shares of red and blue in luma
@@ -51,27 +48,21 @@ WEIGHTS = {
 }
 
 
-def transfer_of(tag: int, asked: str, path: object) -> str:
-    """Name of the transfer curve: what was asked for, else the tag's, else BT.709.  Raises DataError."""
-    if asked != "auto":
-        return asked
-    if tag in UNREAD_TRANSFERS:
-        raise DataError(
-            f"{path}: tagged with the transfer curve {UNREAD_TRANSFERS[tag]}, which is not supported;"
-            f" convert it to BT.709 first, or say what to take it for with --transfer {KNOWN}"
-        )
-    return TRANSFERS.get(tag, "bt709")
+def transfer_of(tag: int, asked: str) -> str:
+    """Name of the transfer curve: what was asked for, else the tag's, else BT.709."""
+    return asked if asked != "auto" else TRANSFERS.get(tag, "bt709")
 
 
-def matrix_of(tag: int, width: int, height: int, path: object) -> tuple[float, float]:
-    """Shares of red and blue in luma.  Raises DataError for matrices that are no such thing (YCgCo, ICtCp,
-    ...).
+def matrix_of(tag: int, width: int, height: int, path: object) -> tuple[float, float] | None:
+    """Shares of red and blue in luma; None for Y'CgCo.  Raises DataError for matrices that are neither (ICtCp, ...).
 
     Untagged video is BT.709 if it is larger than television's standard definition, else BT.601, as players
-    take it.
+    take it; so is video in Y'CbCr that is tagged as RGB, which cannot be.
     """
-    if tag == UNSPECIFIED:
+    if tag in (UNSPECIFIED, IDENTITY):
         return MATRICES[1] if width >= 1280 or height > 576 else MATRICES[6]
+    if tag == YCGCO:
+        return None
     if tag not in MATRICES:
         raise DataError(f"{path}: colour matrix {tag} of H.273 is not supported; convert the video to BT.709 first")
     return MATRICES[tag]

@@ -10,34 +10,41 @@ A file stores codes; a code stands for a signal V, and that for light L; both ar
                L = ((V + 0.055) / 1.055)**2.4    above
     bt709      L = V / 4.5                       V <= 4.5 b
                L = ((V + a - 1) / a)**(1/0.45)   above
+    smpte240m  like bt709, with 4 for 4.5 and constants of its own
+    st428      L = 52.37/48 V**2.6
     gamma:G    L = V**G
+
+PQ, HLG and the logarithmic curves are in `hdr.py`.
 
 `bt709` is the inverse of the camera's curve (OETF), not the curve of a display (BT.1886): an event camera looks at the
 scene, not at a screen.  Its constants a and b are the exact ones, for which the curve and its slope are continuous;
 the three-digit ones of BT.709 itself (1.099, 0.018) leave a step, by which a brighter code could be darker light.
-The same curve serves BT.601 and BT.2020 (10 and 12 bit).
+The same curve serves BT.601 and BT.2020 (10 and 12 bit).  `st428` is that of digital cinema.
 
 Signals and light below 0 count as 0; above 1 the curves go on.  NaN stays NaN.
 
 Sources: sRGB, IEC 61966-2-1:1999; BT.709, Rec. ITU-R BT.709-6 item 1.2, with the constants of Rec. ITU-T H.273 table 3,
-value 1; ranges, Rec. ITU-T H.273 section 8.3.
+value 1; SMPTE 240M and ST 428, the same table, values 7 and 17; ranges, Rec. ITU-T H.273 section 8.3.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.sources import hdr
+from vid2ev.sources.hdr import Curve
 
-KNOWN = "srgb, bt709, linear or gamma:G (such as gamma:2.2)"
+KNOWN = "srgb, bt709, linear, pq, hlg, smpte240m, st428, log100, log316 or gamma:G (such as gamma:2.2)"
 STEEPEST_GAMMA = 10.0
 
 SRGB_KNEE, SRGB_SLOPE, SRGB_OFFSET, SRGB_POWER = 0.04045, 12.92, 0.055, 2.4
 BT709_ALPHA, BT709_BETA, BT709_SLOPE, BT709_POWER = 1.09929682680944, 0.018053968510807, 4.5, 0.45
+SMPTE240M_ALPHA, SMPTE240M_BETA, SMPTE240M_SLOPE = 1.11157219592173, 0.022821585529445, 4.0
+ST428_PEAK, ST428_POWER = 52.37 / 48, 2.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,18 +52,14 @@ class Transfer:
     """A curve in closed form, both ways; arrays of any shape, computed and returned in float64."""
 
     name: str
-    to_light: Callable[[np.ndarray], np.ndarray]
-    to_signal: Callable[[np.ndarray], np.ndarray]
+    to_light: Curve
+    to_signal: Curve
 
 
 def parse_transfer(name: str) -> Transfer:
-    """The curve of a name: `srgb`, `bt709`, `linear`, `gamma:G` with 0.1 <= G <= 10.  Raises UsageError."""
-    if name == "linear":
-        return Transfer(name, _not_negative, _not_negative)
-    if name == "srgb":
-        return Transfer(name, _srgb_to_light, _srgb_to_signal)
-    if name == "bt709":
-        return Transfer(name, _bt709_to_light, _bt709_to_signal)
+    """The curve of a name: one of `CURVES`, or `gamma:G` with 0.1 <= G <= 10.  Raises UsageError."""
+    if name in CURVES:
+        return Transfer(name, *CURVES[name])
     if name.startswith("gamma:"):
         gamma = _gamma(name)
         return Transfer(
@@ -106,13 +109,38 @@ def _srgb_to_signal(light: np.ndarray) -> np.ndarray:
     return np.where(x <= SRGB_KNEE / SRGB_SLOPE, x * SRGB_SLOPE, root)
 
 
-def _bt709_to_light(signal: np.ndarray) -> np.ndarray:
-    v = _not_negative(signal)
-    power = ((v + (BT709_ALPHA - 1)) / BT709_ALPHA) ** (1 / BT709_POWER)
-    return np.where(v <= BT709_SLOPE * BT709_BETA, v / BT709_SLOPE, power)
+def _camera(alpha: float, beta: float, slope: float) -> tuple[Curve, Curve]:
+    """The power 0.45 with a straight toe below `beta`: to light, and to signal."""
+
+    def to_light(signal: np.ndarray) -> np.ndarray:
+        v = _not_negative(signal)
+        power = ((v + (alpha - 1)) / alpha) ** (1 / BT709_POWER)
+        return np.where(v <= slope * beta, v / slope, power)
+
+    def to_signal(light: np.ndarray) -> np.ndarray:
+        x = _not_negative(light)
+        root = alpha * x**BT709_POWER - (alpha - 1)
+        return np.where(x <= beta, x * slope, root)
+
+    return to_light, to_signal
 
 
-def _bt709_to_signal(light: np.ndarray) -> np.ndarray:
-    x = _not_negative(light)
-    root = BT709_ALPHA * x**BT709_POWER - (BT709_ALPHA - 1)
-    return np.where(x <= BT709_BETA, x * BT709_SLOPE, root)
+def _st428_to_light(signal: np.ndarray) -> np.ndarray:
+    return ST428_PEAK * _not_negative(signal) ** ST428_POWER
+
+
+def _st428_to_signal(light: np.ndarray) -> np.ndarray:
+    return (_not_negative(light) / ST428_PEAK) ** (1 / ST428_POWER)
+
+
+CURVES: dict[str, tuple[Curve, Curve]] = {
+    "linear": (_not_negative, _not_negative),
+    "srgb": (_srgb_to_light, _srgb_to_signal),
+    "bt709": _camera(BT709_ALPHA, BT709_BETA, BT709_SLOPE),
+    "pq": (hdr.pq_to_light, hdr.pq_to_signal),
+    "hlg": (hdr.hlg_to_light, hdr.hlg_to_signal),
+    "smpte240m": _camera(SMPTE240M_ALPHA, SMPTE240M_BETA, SMPTE240M_SLOPE),
+    "st428": (_st428_to_light, _st428_to_signal),
+    "log100": hdr.logarithmic(2),
+    "log316": hdr.logarithmic(2.5),
+}

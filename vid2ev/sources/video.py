@@ -56,7 +56,7 @@ class Video:
         if first is None:
             raise DataError(f"{self.path}: no frame in it can be decoded; {REMEDY}")
         self.frames_expected = self._planned or self._estimate()
-        self._transfer = transfer_of(first.color_trc, transfer, self.path)
+        self._transfer = transfer_of(first.color_trc, transfer)
         self._tables: dict[Any, np.ndarray] = {}
         self._orientation = orientation_of(first)
         self._coded_size = (first.width, first.height)
