@@ -336,14 +336,14 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
 
 @posix
 def test_control_c_counts_even_where_python_loses_the_exception() -> None:
-    from vid2ev.commands.convert import _heard
+    from vid2ev.commands.progress import heard
 
     class Callback:
         def __del__(self) -> None:
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.01)
 
-    with _heard() as check:
+    with heard() as check:
         check()
         callback = Callback()
         del callback

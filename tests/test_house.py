@@ -37,6 +37,7 @@ FLOORS = {
     "kernels": 3,
     "sensors": 4,
     "recipe": 5,
+    "outputs": 5,
     "conversion": 6,
     "": 7,  # vid2ev/__init__.py: the public names
     "commands": 8,

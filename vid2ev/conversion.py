@@ -17,7 +17,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Recording
-from vid2ev.formats.hdf5 import write_events
+from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder, begun_job
 from vid2ev.recording.manifest import machine, write_manifest
@@ -28,6 +28,7 @@ from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
+FRAME_US = "frame_us"  # the file of the instants of the frames
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
 
 
@@ -82,7 +83,6 @@ def convert(
     *,
     seed: int | None = 0,
     threads: int | None = None,
-    preview: bool = True,
     overwrite: bool = False,
     resume: bool = False,
     report: Report | None = None,
@@ -97,7 +97,8 @@ def convert(
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame
     piece      pixel-steps between two checkpoints
-    Everything else is as for `Recipe.of`.
+    What is written is said by the fields of `Outputs`: formats, preview, frames, frames_by, frames_as.  Everything else
+    is as for `Recipe.of`.
 
     Returns the manifest.  The same recipe makes the same bytes in events.h5, with or without interruptions.
     Raises UsageError for what cannot be meant, DataError for a source that cannot be read or a folder that cannot
@@ -106,18 +107,24 @@ def convert(
     directory = default_directory(video) if directory is None else Path(directory)
     if seed is None:
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
+    outputs = Outputs.of(**Outputs.taken_from(rest))
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
-    job = recipe.describe() | {"preview": preview}
-    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume) as folder:
+    outputs.check(recipe.source.size, None)
+    job = recipe.describe() | {"outputs": outputs.describe()}
+    growing = [FRAME_US]
+    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=growing) as folder:
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
         dvs = recipe.dvs(threads)
-        film = Preview(recipe.source.size, folder.partial, wanted=preview)
+        film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview)
         done = _record(recipe, dvs, film, folder, piece, report)
         manifest = job | _outcome(done, dvs) | {"run": _run(video, threads, done)}
         with folder.writing():
-            _write(folder, film, recipe, done, manifest)
+            outputs.write(folder.whole, _recording(folder, recipe, done, outputs.want_frames))
+            film.join(folder.whole / "preview.mp4")
+            write_manifest(folder.whole / "manifest.json", manifest)
+            folder.publish()
     return manifest
 
 
@@ -146,11 +153,13 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
         if not done.frames:
             dvs.step(first[0].light, first[0].t_ns)
             done.frames, done.start_ns, done.end_ns = 1, first[0].t_ns, first[0].t_ns
+            _note(folder, first[0])
         for frame, limited in light:
             events = dvs.see(frame)
             with folder.writing():
                 folder.append(events)
                 film.add(frame, events)
+                _note(folder, frame)
             done.add(frame, events)
             done.limited, done.seconds = limited_before + limited, time.monotonic() - began
             work += max(STEP, frame.light.size)
@@ -167,6 +176,12 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
     done.finished, done.warnings = True, list(recipe.source.warnings)
     _checkpoint(folder, dvs, film, done)
     return done
+
+
+def _note(folder: Folder, frame: Frame) -> None:
+    """Note the instant of a frame of the source."""
+    if frame.original:
+        folder.write(FRAME_US, np.int64(frame.t_ns // 1000).tobytes())
 
 
 def _take_up(folder: Folder, dvs: Dvs, film: Preview) -> Progress:
@@ -187,21 +202,18 @@ def _checkpoint(folder: Folder, dvs: Dvs, film: Preview, done: Progress) -> None
         folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(done)))})
 
 
-def _write(folder: Folder, film: Preview, recipe: Recipe, done: Progress, manifest: dict[str, Any]) -> None:
-    """The files of the recording, in their place at once."""
-    whole = folder.whole
-    recording = Recording(
+def _recording(folder: Folder, recipe: Recipe, done: Progress, want_frames: bool) -> Recording:
+    """What event files are written from."""
+    return Recording(
         recipe.source.size,
         done.offset_us,
         done.duration_us,
         done.events,
         lambda: folder.events(BLOCK),
         recipe.labels,
+        recipe.pictures if want_frames else None,
+        np.fromfile(folder.written(FRAME_US), np.int64),
     )
-    write_events(whole / "events.h5", recording)
-    film.join(whole / "preview.mp4")
-    write_manifest(whole / "manifest.json", manifest)
-    folder.publish()
 
 
 def _outcome(done: Progress, dvs: Dvs) -> dict[str, Any]:

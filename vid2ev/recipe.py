@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from vid2ev.errors import UsageError
+from vid2ev.formats.event_file import Picture
 from vid2ev.recording.manifest import identity, versions
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import Source, open_source
+from vid2ev.sources.eight_bits import srgb_codes
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import Interval, Upsampler, make_upsampler
@@ -126,6 +128,11 @@ class Recipe:
                 method = straight if cuts.unrelated else upsampler
                 yield method.between(before, replace(frame, cut=cut))
             before = frame
+
+    def pictures(self) -> Iterator[Picture]:
+        """The frames of the source, read again, in 8 bits of sRGB: to be kept beside the events."""
+        for frame in self.source.frames():
+            yield Picture(frame.t_ns // 1000, srgb_codes(frame.light))
 
     def describe(self) -> dict[str, Any]:
         """The recipe as JSON: what the manifest says of it, and by which a run is known again."""

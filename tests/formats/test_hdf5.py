@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import DataError
-from vid2ev.formats import describe_events, read_events
+from vid2ev.formats import describe_events, open_events, read_events, survey
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.formats.hdf5 import write_events
 from vid2ev.stream.events import Events
@@ -88,6 +88,24 @@ def test_any_window_of_any_times_is_found(
     inside = events.select((events.t >= start) & (events.t < stop))
     assert_same(Events.concatenate(read_events(tmp_path / "events.h5", start, stop, block=7)), inside)
     assert_same(Events.concatenate(read_events(tmp_path / "events.h5", block=7)), events)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(gaps=gaps, frame_gaps=gaps, offset=st.integers(0, 2**50), block=st.integers(1, 70))
+def test_events_are_counted_frame_by_frame(
+    tmp_path: Path, gaps: list[int], frame_gaps: list[int], offset: int, block: int
+) -> None:
+    t, frame_us = (offset + np.cumsum(column, dtype=np.int64) for column in (gaps, frame_gaps))
+    events, last = events_at(t), int(max([offset, *t, *frame_us]))
+    blocks = [events.select(np.arange(at, min(at + block, len(t)))) for at in range(0, len(t), block)]
+    recording = Recording(SIZE, offset, last - offset, len(t), lambda: iter(blocks), frame_us=frame_us)
+    write_events(tmp_path / "events.h5", recording)
+    with h5py.File(tmp_path / "events.h5") as file:
+        np.testing.assert_array_equal(file["frames/t"][:] + offset, frame_us)
+        np.testing.assert_array_equal(file["frames/to_idx"], [np.count_nonzero(t <= at) for at in frame_us])
+    again = survey(open_events(tmp_path / "events.h5"))
+    assert again.frame_us is not None and again.duration_us == (last - offset if len(t) or len(frame_us) else 0)
+    np.testing.assert_array_equal(again.frame_us, frame_us)
 
 
 @pytest.mark.parametrize(("last", "kind"), [(2**32 - 1, "u4"), (2**32, "u8"), (2**33, "u8")])

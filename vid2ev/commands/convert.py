@@ -2,25 +2,10 @@
 
 from __future__ import annotations
 
-import signal
-import sys
-import threading
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-from vid2ev.commands import INTERRUPTED
-from vid2ev.errors import DataError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from vid2ev.conversion import Progress
-    from vid2ev.recipe import Recipe
-
-BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left{postfix}"
 
 
 class Auto(click.ParamType):
@@ -45,8 +30,11 @@ class Auto(click.ParamType):
 
 
 @click.command(short_help="Turn a video into the recording of an event camera.")
-@click.argument("video")
-@click.option("-o", "--output", type=Path, metavar="DIR", help="Folder to make.  [default: NAME_events here]")
+@click.argument("videos", nargs=-1, required=True, metavar="VIDEO...")
+@click.option(
+    "-o", "--output", type=Path, metavar="DIR",
+    help="Folder to make; of several videos, the folder for their folders.  [default: NAME_events here]",
+)  # fmt: skip
 @click.option(
     "--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="`vid2ev sensors` lists them."
 )
@@ -103,6 +91,21 @@ class Auto(click.ParamType):
     help="Changes nothing but the time it takes.  [default: all cores]",
 )
 @click.option("--labels", is_flag=True, help="Store the cause of each event (signal, shot, leak, hot).")
+@click.option(
+    "--format", "formats", multiple=True, default=["hdf5"], show_default=True, metavar="NAME[,NAME...]",
+    help="Event files to write, among them aedat4, evt3, dat, npz and csv.",
+)  # fmt: skip
+@click.option(
+    "--frames-out", "frames", type=click.Choice(["npz", "png", "mp4"]), help="Write the events as frames, too."
+)
+@click.option(
+    "--frames-by", default="duration:10ms", show_default=True, metavar="SLICES",
+    help="What a frame holds: duration:10ms, count:50000, area:500,32, or source (from frame to frame).",
+)  # fmt: skip
+@click.option(
+    "--frames-as", default="counts", show_default=True, metavar="KIND",
+    help="counts, frame:2 (full scale), voxel:5 (bins), time-surface:30ms or sae.",
+)  # fmt: skip
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")
@@ -110,119 +113,66 @@ class Auto(click.ParamType):
 @click.option("-v", "--verbose", is_flag=True, help="Say what is going to be done, too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def convert(
-    video: str,
+    videos: tuple[str, ...],
     output: Path | None,
     dry_run: bool,
     verbose: bool,
     quiet: bool,
-    overwrite: bool,
-    resume: bool,
     **options: Any,
 ) -> None:
-    """Turn VIDEO into the recording of an event camera.
+    """Turn each VIDEO into the recording of an event camera.
 
-    VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy array, or synthetic:NAME.  The
-    recording is a folder with events.h5, preview.mp4 and manifest.json.
+    VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy array, synthetic:NAME, or a folder
+    of videos.  A recording is a folder with events.h5, preview.mp4 and manifest.json.
+
+    Of several videos, one that fails does not stop the others; with --resume, those that are done are left as they are.
     """
     from vid2ev import conversion
-    from vid2ev.commands import summary
+    from vid2ev.commands import batch
 
-    directory = output or conversion.default_directory(video)
     options["seed"] = None if options["seed"] == "random" else options["seed"]
-    if (dry_run or verbose) and not quiet:
-        click.echo(_plan(video, directory, overwrite, resume, dict(options)))
-    if dry_run:
+    found = [source for video in videos for source in batch.sources_in(video)]
+    if len(videos) == 1 and found == [videos[0]]:
+        _one(videos[0], output or conversion.default_directory(videos[0]), dry_run, verbose, quiet, options)
         return
-    with _kept(directory), _heard() as check, _bar(quiet, check) as report:
-        manifest = conversion.convert(video, directory, overwrite=overwrite, resume=resume, report=report, **options)
+    directories = batch.directories(found, output or Path())
+    batch.convert_each(
+        directories, lambda video, directory: _one(video, directory, dry_run, verbose, quiet, dict(options)), quiet
+    )
+
+
+def _one(
+    video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
+) -> dict[str, Any] | None:
+    """Convert a video; returns the manifest, or None if nothing was to be made."""
+    from vid2ev import conversion
+    from vid2ev.commands import summary
+    from vid2ev.commands.progress import bar, heard, kept
+
+    if (dry_run or verbose) and not quiet:
+        click.echo(_plan(video, directory, dict(options)))
+    if dry_run:
+        return None
+    with kept(directory), heard() as check, bar(quiet, check) as report:
+        manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
         click.echo(summary.lines(facts))
+    return manifest
 
 
-def _plan(video: str, directory: Path, overwrite: bool, resume: bool, options: dict[str, Any]) -> str:
+def _plan(video: str, directory: Path, options: dict[str, Any]) -> str:
     """What a conversion would do; raises what it would raise before its first frame."""
     from vid2ev.commands import summary
+    from vid2ev.outputs import Outputs
     from vid2ev.recipe import Recipe
     from vid2ev.recording.folder import check_free
 
-    threads, preview, seed = options.pop("threads"), options.pop("preview"), options.pop("seed")
+    threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
+    overwrite, resume = options.pop("overwrite"), options.pop("resume")
     recipe = Recipe.of(video, seed=seed or 0, **options)
+    outputs.check(recipe.source.size, None)
     check_free(directory, overwrite, resume)
-    files = f"events.h5, {'preview.mp4, ' * preview}manifest.json"
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
-    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {files}")]
+    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(outputs.names())}")]
     return summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
-
-
-@contextmanager
-def _kept(directory: Path) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed."""
-    from vid2ev.recording.folder import partial_of
-
-    try:
-        yield
-    except (DataError, KeyboardInterrupt) as error:
-        kept = (partial_of(directory) / "checkpoint.npz").exists()
-        remedy = (
-            "; what is done is kept, the same command with --resume goes on" if kept else "; nothing is left behind"
-        )
-        if isinstance(error, DataError):
-            raise DataError(f"{error}{remedy * kept}") from error
-        click.echo(f"interrupted{remedy}", err=True)
-        sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def _heard() -> Iterator[Callable[[], None]]:
-    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew."""
-    asked = False
-
-    def note(*_: Any) -> None:
-        nonlocal asked
-        asked = True
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    def tell(lost: Any) -> None:
-        if lost.exc_type is not KeyboardInterrupt:  # that one is not lost
-            tell_before(lost)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    before, tell_before = signal.signal(signal.SIGINT, note), sys.unraisablehook
-    sys.unraisablehook = tell
-    try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, before)
-        sys.unraisablehook = tell_before
-
-
-@contextmanager
-def _bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Progress], None]]:
-    """A progress bar on a terminal: frames, time left, events per second, and speed against real time."""
-    from tqdm import tqdm
-
-    bar: tqdm | None = None
-
-    def report(recipe: Recipe, done: Progress) -> None:
-        nonlocal bar
-        check()
-        if bar is None:
-            total, first = recipe.source.frames_expected, done.frames - 1
-            bar = tqdm(total=total, initial=first, bar_format=BAR, leave=False, disable=quiet or None)
-        speed, video_s = done.seconds or 1.0, (done.end_ns - done.start_ns) / 1e9
-        bar.set_postfix_str(f"{done.events / speed:,.0f} events/s, {video_s / speed:.2g} x real time", refresh=False)
-        bar.update(done.frames - bar.n)
-
-    try:
-        yield report
-    finally:
-        if bar is not None:
-            bar.refresh()
-            bar.close()

@@ -124,7 +124,9 @@ def survey(file: EventFile) -> Recording:
             " the file is damaged"
         )
     frames = file.frames if file.has_frames else None
-    return Recording(size, start_us, last_us - start_us, count, file.events, file.labelled, frames)
+    frame_us = getattr(file, "frame_us", None)
+    duration_us = max(last_us, int(frame_us[-1]) if frame_us is not None and len(frame_us) else last_us) - start_us
+    return Recording(size, start_us, duration_us, count, file.events, file.labelled, frames, frame_us)
 
 
 def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:

@@ -6,6 +6,8 @@
     events/p   uint8                                        1 brighter (ON), 0 darker (OFF)
     events/label  uint8, on request                         why the event was sent (`vid2ev.stream.events.Label`)
     ms_to_idx  uint64                                       [k] = number of events with t < 1000 k
+    frames/t, frames/to_idx   int64 [us] since t_offset, uint64   the frames of the source, where known: events of the
+               interval that ends with frame k are events[to_idx[k - 1]:to_idx[k]]
     t_offset   int64                                        [us] of t = 0 (the first frame) on the clock of the source
     attributes width, height, version                       size in pixels, version of this layout
 
@@ -53,6 +55,7 @@ class Hdf5Events:
             self.start_us = int(file["t_offset"][()]) if "t_offset" in file else 0
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self.labelled = "label" in file["events"]
+            self.frame_us = file["frames/t"][:] + self.start_us if "frames/t" in file else None
             self._time_type = str(file["events/t"].dtype)
 
     def describe(self) -> dict[str, Any]:
@@ -88,6 +91,7 @@ def write_events(path: Path, recording: Recording) -> None:
         file["t_offset"] = np.int64(offset_us)
         columns = _columns(file, recording.count, np.uint32 if duration_us < 1 << 32 else np.uint64, recording.labelled)
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
+        frames = None if recording.frame_us is None else _FrameIndex(recording.frame_us - offset_us)
         indexed = start = last_us = 0
         for block in recording.blocks():
             t = block.t - offset_us
@@ -97,11 +101,15 @@ def write_events(path: Path, recording: Recording) -> None:
             for name, dataset in columns.items():
                 dataset[start : start + len(t)] = t if name == "t" else getattr(block, name)
             indexed = _index(index, indexed, last_us // MS_US + 1, t, start)
+            if frames is not None:
+                frames.add(t, start)
             start += len(t)
             raw.check()
         if start != recording.count:
             raise ValueError(f"{start} events, {recording.count} announced")
         _index(index, indexed, len(index), np.empty(0, np.int64), start)
+        if frames is not None:
+            frames.write(file)
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:
@@ -123,6 +131,26 @@ def _index(index: h5py.Dataset, first: int, last: int, t: np.ndarray, start: int
         edges = np.arange(at, min(at + BLOCK, last)) * MS_US
         index[at : at + len(edges)] = start + np.searchsorted(t, edges)
     return max(first, last)
+
+
+class _FrameIndex:
+    """How many events there are up to each frame of the source, counted while the events pass by."""
+
+    def __init__(self, frame_us: np.ndarray):
+        self.frame_us, self.counts, self._known = frame_us, np.zeros(len(frame_us), np.uint64), 0
+
+    def add(self, t: np.ndarray, start: int) -> None:
+        """Count a block of times that begins at event `start`; a frame counts once a later event has come."""
+        known = int(np.searchsorted(self.frame_us, t[-1])) if len(t) else self._known
+        part = slice(self._known, known)
+        self.counts[part] = start + np.searchsorted(t, self.frame_us[part], side="right")
+        self._known = max(self._known, known)
+        self.counts[self._known :] = start + len(t)
+
+    def write(self, file: h5py.File) -> None:
+        """The instants and the counts, as datasets."""
+        _dataset(file, "frames/t", len(self.counts), np.int64)[...] = self.frame_us
+        _dataset(file, "frames/to_idx", len(self.counts), np.uint64)[...] = self.counts
 
 
 def _position(file: h5py.File, t_us: int) -> int:

@@ -3,7 +3,7 @@
     DIR.partial/          while the recording is being made
         lock              held by the process that makes it
         job.json          what is made; only the same is ever continued
-        t x y p [label]   the events so far, raw columns that only grow
+        t x y p [label]   the events so far, raw columns that only grow; so do the other files that are begun
         preview-00000.mp4 finished pieces of the preview
         checkpoint.npz    the last point at which everything fitted together
         whole/            the files of the finished recording
@@ -18,8 +18,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -33,7 +34,9 @@ from vid2ev.recording.manifest import difference, read_manifest
 from vid2ev.stream.events import Events
 
 COLUMNS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}
-FILES = {"events.h5", "preview.mp4", "manifest.json"}  # what a recording holds, and nothing else
+FILES = re.compile(  # what a recording holds, and nothing else
+    r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4)?|preview\.mp4|probe\.(csv|png)|noise_maps\.npz|manifest\.json"
+)
 
 
 class Folder:
@@ -42,6 +45,7 @@ class Folder:
     job        what decides the recording, for JSON; what is there of another job is in the way
     overwrite  replace a recording that is in the way; it stays until the new one is whole
     resume     take what is there if it is of the same job: a finished recording, or the last checkpoint
+    growing    names of other files that grow with the recording (`write`)
     Left without `publish`, the folder keeps its last checkpoint; without one it leaves nothing.
     Raises UsageError where `directory` is taken, DataError where it cannot be written.
     """
@@ -54,6 +58,7 @@ class Folder:
         overwrite: bool = False,
         resume: bool = False,
         labels: bool = False,
+        growing: Sequence[str] = (),
     ):
         self.directory = directory
         self.partial = partial_of(directory)
@@ -61,6 +66,7 @@ class Folder:
         self.overwrite, self.resume = overwrite, resume
         self.columns = {name: dtype for name, dtype in COLUMNS.items() if labels or name != "label"}
         self.count = 0
+        self._growing = tuple(growing)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
         self._files: dict[str, io.BufferedRandom] = {}
         self._lock: int | None = None
@@ -95,9 +101,18 @@ class Folder:
 
     def append(self, events: Events) -> None:
         """Add events; they count from the next checkpoint on."""
-        for name, file in self._files.items() if len(events) else ():
-            file.write(np.ascontiguousarray(getattr(events, name), self.columns[name]).data)
+        for name, dtype in self.columns.items() if len(events) else ():
+            self._files[name].write(np.ascontiguousarray(getattr(events, name), dtype).data)
         self.count += len(events)
+
+    def write(self, name: str, content: bytes) -> None:
+        """Add to one of the other files that grow; counts from the next checkpoint on."""
+        self._files[name].write(content)
+
+    def written(self, name: str) -> Path:
+        """One of the other files that grow, with all that was written to it."""
+        self._files[name].flush()
+        return self.partial / name
 
     def checkpoint(self, state: Mapping[str, np.ndarray]) -> None:
         """Make all that was appended, and `state` with it, the point to resume from."""
@@ -105,7 +120,8 @@ class Folder:
             file.flush()
             os.fsync(file.fileno())
         with whole_file(self.partial / "checkpoint.npz") as saved:
-            np.savez(saved, allow_pickle=False, **state, events=np.int64(self.count))
+            sizes = {f"size.{name}": np.int64(file.tell()) for name, file in self._files.items()}
+            np.savez(saved, allow_pickle=False, **state, **sizes, events=np.int64(self.count))
 
     def saved(self) -> dict[str, np.ndarray]:
         """The state of the last checkpoint; empty without one."""
@@ -116,8 +132,8 @@ class Folder:
 
     def events(self, block: int) -> Iterator[Events]:
         """All events appended, `block` of them at a time but for the last."""
-        for file in self._files.values():
-            file.flush()
+        for name in self.columns:
+            self._files[name].flush()
         for at in range(0, max(self.count, 1), block):
             n = min(block, self.count - at)
             yield Events(
@@ -161,10 +177,11 @@ class Folder:
 
     def _begin(self) -> None:
         """Take up the checkpoint, find the recording finished, or start."""
-        made = self.directory / "manifest.json"
+        made, sizes = self.directory / "manifest.json", dict[str, int]()
         if self.resume and self.resumable and self._is_same(self.partial / "job.json"):
             with np.load(self.partial / "checkpoint.npz") as saved:
                 self.count = int(saved["events"])
+                sizes = {name[5:]: int(saved[name]) for name in saved if name.startswith("size.")}
         elif self.resume and not self.resumable and made.exists() and self._is_same(made):
             self.finished = read_manifest(made)
             return
@@ -172,11 +189,11 @@ class Folder:
             self._clear()
             with whole_file(self.partial / "job.json") as file:
                 file.write(json.dumps(self.job, indent=2).encode())
-        for name, dtype in self.columns.items():
+        for name in (*self.columns, *self._growing):
             (self.partial / name).touch()
-            self._files[name] = column = open(self.partial / name, "r+b")  # noqa: SIM115 (closed by __exit__)
-            column.truncate(self.count * np.dtype(dtype).itemsize)
-            column.seek(0, os.SEEK_END)
+            self._files[name] = file = open(self.partial / name, "r+b")  # noqa: SIM115 (closed by __exit__)
+            file.truncate(sizes.get(name, 0))
+            file.seek(0, os.SEEK_END)
 
     def _is_same(self, path: Path) -> bool:
         """Whether a job or manifest is of this job; if it is not, that is an error unless it may be overwritten."""
@@ -217,9 +234,10 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
     if directory.exists() and not directory.is_dir():
         raise UsageError(f"{directory} is a file; choose a folder with -o")
     held = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
-    if held - FILES:
+    others = {name for name in held if not FILES.fullmatch(name)}
+    if others:
         raise UsageError(
-            f"{directory} holds files that are no recording ({min(held - FILES)}); choose another folder with -o"
+            f"{directory} holds files that are no recording ({min(others)}); choose another folder with -o"
         )
     if held and not (overwrite or resume):
         raise UsageError(f"{directory} exists; --overwrite replaces it, -o chooses another folder")

@@ -1,0 +1,96 @@
+"""What a person sees of long work while it goes on: a progress bar, and what is kept when it is interrupted."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vid2ev.commands import INTERRUPTED
+from vid2ev.errors import DataError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from vid2ev.conversion import Progress
+    from vid2ev.recipe import Recipe
+
+BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left{postfix}"
+
+
+@contextmanager
+def kept(directory: Path) -> Iterator[None]:
+    """What goes wrong within says so if it can be resumed."""
+    from vid2ev.recording.folder import partial_of
+
+    try:
+        yield
+    except (DataError, KeyboardInterrupt) as error:
+        kept = (partial_of(directory) / "checkpoint.npz").exists()
+        remedy = (
+            "; what is done is kept, the same command with --resume goes on" if kept else "; nothing is left behind"
+        )
+        if isinstance(error, DataError):
+            raise DataError(f"{error}{remedy * kept}") from error
+        click.echo(f"interrupted{remedy}", err=True)
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def heard() -> Iterator[Callable[[], None]]:
+    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew."""
+    asked = False
+
+    def note(*_: Any) -> None:
+        nonlocal asked
+        asked = True
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    def tell(lost: Any) -> None:
+        if lost.exc_type is not KeyboardInterrupt:  # that one is not lost
+            tell_before(lost)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield check
+        return
+    before, tell_before = signal.signal(signal.SIGINT, note), sys.unraisablehook
+    sys.unraisablehook = tell
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)
+        sys.unraisablehook = tell_before
+
+
+@contextmanager
+def bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Progress], None]]:
+    """A progress bar on a terminal: frames, time left, events per second, and speed against real time."""
+    from tqdm import tqdm
+
+    shown: tqdm | None = None
+
+    def report(recipe: Recipe, done: Progress) -> None:
+        nonlocal shown
+        check()
+        if shown is None:
+            total, first = recipe.source.frames_expected, done.frames - 1
+            shown = tqdm(total=total, initial=first, bar_format=BAR, leave=False, disable=quiet or None)
+        speed, video_s = done.seconds or 1.0, (done.end_ns - done.start_ns) / 1e9
+        shown.set_postfix_str(f"{done.events / speed:,.0f} events/s, {video_s / speed:.2g} x real time", refresh=False)
+        shown.update(done.frames - shown.n)
+
+    try:
+        yield report
+    finally:
+        if shown is not None:
+            shown.refresh()
+            shown.close()

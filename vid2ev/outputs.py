@@ -1,0 +1,94 @@
+"""What a conversion writes: event files of any format, frames made of events, a preview."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from vid2ev.errors import UsageError
+from vid2ev.formats import FORMATS, check_holds, format_named
+from vid2ev.formats.event_file import Format, Recording
+from vid2ev.views.on_disk import KINDS, write_frames
+from vid2ev.views.requests import parse_representation, parse_slicing
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The files of a recording beside its manifest; checked when they are named.
+
+    formats     names of `vid2ev.formats.FORMATS`
+    preview     preview.mp4
+    frames      slices of the events as "npz", "png" or "mp4"; None for none
+    frames_by   the slices, as `views.requests.parse_slicing` has them
+    frames_as   what they are made into, as `views.requests.parse_representation` has it
+    """
+
+    formats: tuple[str, ...] = ("hdf5",)
+    preview: bool = True
+    frames: str | None = None
+    frames_by: str = "duration:10ms"
+    frames_as: str = "counts"
+
+    @classmethod
+    def of(cls, formats: str | Sequence[str] = ("hdf5",), **rest: Any) -> Outputs:
+        """The outputs of these options; several formats may be in one text, with commas.  Raises UsageError."""
+        texts = [formats] if isinstance(formats, str) else formats
+        names = tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",")))
+        outputs = cls(names, **rest)
+        for name in names:
+            if not format_named(name).write:
+                writable = ", ".join(name for name in FORMATS if format_named(name).write)
+                raise UsageError(f"format '{name}' is only read; expected one of {writable}")
+        if outputs.frames is not None and outputs.frames not in KINDS:
+            raise UsageError(f"frames as '{outputs.frames}': expected one of {', '.join(KINDS)}")
+        parse_slicing(outputs.frames_by)
+        parse_representation(outputs.frames_as)
+        return outputs
+
+    @classmethod
+    def taken_from(cls, options: dict[str, Any]) -> dict[str, Any]:
+        """Those options that are fields of this class, taken out of all."""
+        return {each.name: options.pop(each.name) for each in fields(cls) if each.name in options}
+
+    def check(self, size: tuple[int, int], duration_us: int | None) -> None:
+        """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration if known."""
+        for kind in self.kinds():
+            check_holds(kind, size, duration_us)
+
+    def kinds(self) -> list[Format]:
+        """The formats."""
+        return [format_named(name) for name in self.formats]
+
+    @property
+    def want_frames(self) -> bool:
+        """Whether one of the formats holds frames beside its events."""
+        return any("frames" in kind.keeps for kind in self.kinds())
+
+    def describe(self) -> dict[str, Any]:
+        """The outputs, ready for JSON."""
+        return asdict(self) | {"formats": list(self.formats)}
+
+    def files(self) -> dict[str, str]:
+        """The file of each format; where two have one suffix, the second has its format's name, too."""
+        taken: dict[str, str] = {}
+        for kind in self.kinds():
+            plain = f"events{kind.suffix}"
+            taken[kind.name] = f"events-{kind.name}{kind.suffix}" if plain in taken.values() else plain
+        return taken
+
+    def names(self) -> list[str]:
+        """All files, the manifest among them."""
+        frames = [KINDS[self.frames]] if self.frames else []
+        return [*self.files().values(), *frames, *["preview.mp4"] * self.preview, "manifest.json"]
+
+    def write(self, folder: Path, recording: Recording) -> None:
+        """Write the files of a recording, but for the preview.  Raises OSError."""
+        files = self.files()
+        for kind in self.kinds():
+            assert kind.write is not None
+            kind.write(folder / files[kind.name], recording)
+        if self.frames is not None:
+            path = folder / KINDS[self.frames]
+            write_frames(path, recording, self.frames_as, self.frames_by, kind=self.frames)
