@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording
+from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
 from vid2ev.stream.events import Events
 
 __all__ = [
@@ -42,6 +42,8 @@ FORMATS = {
     "v2e-hdf5": "vid2ev.formats.v2e_hdf5",
     "es": "vid2ev.formats.es",
     "aedat2": "vid2ev.formats.aedat2",
+    "csv": "vid2ev.formats.csv_text",
+    "rpg": "vid2ev.formats.rpg",
     "nmnist": "vid2ev.formats.nmnist",
 }
 
@@ -126,7 +128,9 @@ def survey(file: EventFile) -> Recording:
     frames = file.frames if file.has_frames else None
     frame_us = getattr(file, "frame_us", None)
     duration_us = max(last_us, int(frame_us[-1]) if frame_us is not None and len(frame_us) else last_us) - start_us
-    return Recording(size, start_us, duration_us, count, file.events, file.labelled, frames, frame_us)
+    return Recording(
+        size, start_us, duration_us, count, lambda: regrouped(file.events()), file.labelled, frames, frame_us
+    )
 
 
 def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:

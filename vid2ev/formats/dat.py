@@ -53,17 +53,17 @@ class DatEvents(Sequential):
 
     def _decoded(self) -> Iterator[Events]:
         yield from self._alone()
+        missing = [path for path in self._further() if not path.exists()]
+        self._leave_out(len(missing), f"further files of the recording are not there ({self.path.stem}_*) and are")
         for path in self._further():
-            if not path.exists():
-                self._leave_out(1, f"part of the recording, {path.name}, is not there and")
-                continue
-            part = DatEvents(path)
-            yield from part._alone()
-            self.warnings += [f"{path.name}: {text}" for text in part.warnings if text not in self.warnings]
+            if path not in missing:
+                part = DatEvents(path)
+                yield from part._alone()
+                self.warnings += [text for text in part.warnings if text not in self.warnings]
 
     def _further(self) -> list[Path]:
         """The files in which the recording goes on."""
-        found = re.fullmatch(r"1/([1-9]\d{0,5})", self._header.fields.get("part", ""))
+        found = re.fullmatch(r"1/([1-9]\d{0,3})", self._header.fields.get("part", ""))
         return [_part(self.path, k) for k in range(1, int(found[1]) if found else 1)]
 
     def _alone(self) -> Iterator[Events]:

@@ -6,6 +6,9 @@ import numpy as np
 from numba import njit
 
 from vid2ev.formats.es import EXPOSURES, OUTSIDE, TIME
+from vid2ev.kernel_cache import mark_our_kernels
+
+mark_our_kernels()
 
 EVENT = 5  # bytes
 

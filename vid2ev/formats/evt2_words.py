@@ -6,6 +6,9 @@ import numpy as np
 from numba import njit
 
 from vid2ev.formats.evt_state import Left, State
+from vid2ev.kernel_cache import mark_our_kernels
+
+mark_our_kernels()
 
 HIGH, TRIGGER, OTHERS, CONTINUED = 0x8, 0xA, 0xE, 0xF
 BEAT = 64  # steps of EVT_TIME_HIGH, of 64 us each, after which there is one even in silence

@@ -29,7 +29,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
-from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, opened
+from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, is_whole, opened
 from vid2ev.stream.events import Events
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Hdf5Events:
                 t = columns["t"][part].astype(np.int64) + self.start_us
                 label = columns["label"][part] if self.labelled else None
                 x, y, p = (columns[name][part] for name in "xyp")
-                yield Events(t, x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8), label)
+                yield Events(t, x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8), label)
 
     def frames(self) -> Iterator[Picture]:
         """None."""
@@ -171,6 +171,8 @@ def _check(file: h5py.File, path: Path) -> None:
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
         raise DataError(f"{path} has no events/t, x, y, p; expected an event file in the layout of DSEC")
+    if not all(is_whole(column) for column in columns):
+        raise DataError(f"{path} is damaged: parts of events/t, x, y, p are missing; get another copy")
     if len({len(column) for column in columns}) > 1:
         raise DataError(f"{path} is damaged: events/t, x, y, p differ in length; make it again or get another copy")
 
@@ -182,6 +184,6 @@ FORMAT = Format(
     recognises=lambda head, path: head.startswith(MAGIC) and not holds_table(path),
     open=Hdf5Events,
     write=write_events,
-    largest=(1 << 16, 1 << 16),
+    largest=((1 << 16) - 1, (1 << 16) - 1),
     keeps=frozenset({"labels", "size", "start"}),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,15 @@ def holds_table(path: Path) -> bool:
             return isinstance(file.get("events"), h5py.Dataset)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError):
         return False
+
+
+def is_whole(dataset: h5py.Dataset) -> bool:
+    """Whether the file holds all of a dataset; what is missing would read as zeros, however much that is."""
+    if dataset.is_virtual:
+        return True
+    if dataset.chunks:
+        return dataset.id.get_num_chunks() * math.prod(dataset.chunks) >= dataset.size
+    return dataset.id.get_storage_size() >= dataset.size * dataset.dtype.itemsize
 
 
 class WholeFile(io.FileIO):

@@ -1,0 +1,95 @@
+"""Whatever bytes a file has, reading it ends in events or in one sentence: no crash, no hang, no full memory."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import foreign
+import numpy as np
+import pytest
+from recordings import events_of, recording_of, written
+
+from vid2ev.errors import DataError
+from vid2ev.formats import FORMATS, format_named, open_events, read_events
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / ".." / "shared" / "data" / "events"
+REAL = {"nmnist": DATA / "nmnist_sample.bin"}
+FEW, MANY = 60, 10_000
+READABLE = [name for name in FORMATS if format_named(name).open]
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time are set as on Linux")
+
+
+def sample(name: str, folder: Path) -> Path:
+    """A small file of a format: written by vid2ev, or made of its bytes."""
+    kind, size = format_named(name), (34, 34)
+    gaps = np.random.default_rng(5).choice([0, 0, 1, 70, 5000], 400)
+    events = events_of(np.cumsum(gaps), size)
+    if kind.write:
+        return written(kind, recording_of(events, size), folder)
+    made = {
+        "es": lambda: foreign.es(events, size),
+        "aedat2": lambda: foreign.aedat2(foreign.davis_address(events, (240, 180)), events.t, "DAVIS240C"),
+        "nmnist": lambda: foreign.nmnist(events),
+    }
+    if name not in made:
+        pytest.skip(f"there is no sample of {name}")
+    path = folder / f"events{kind.suffix}"
+    path.write_bytes(made[name]())
+    return path
+
+
+def survives(name: str, path: Path, first: int, count: int) -> None:
+    command = [sys.executable, "-X", "faulthandler", "-m", "tests.formats.mutations"]
+    arguments = [name, str(path), str(first), str(count)]
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, f"{name}, attempt {(done.stdout.split() or ['none'])[-1]}: {done.stderr[-2000:]}"
+    assert len(done.stdout.split()) == count
+
+
+@pytest.mark.parametrize("name", READABLE)
+def test_a_few_damaged_files(tmp_path: Path, name: str) -> None:
+    survives(name, sample(name, tmp_path), 0, FEW)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("name", READABLE)
+def test_many_damaged_files(tmp_path: Path, name: str) -> None:
+    survives(name, sample(name, tmp_path), FEW, MANY)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("name", REAL)
+def test_damaged_files_of_cameras(name: str) -> None:
+    if not REAL[name].exists():
+        pytest.skip(f"{REAL[name].name} is not there")
+    survives(name, REAL[name], 0, MANY)
+
+
+@pytest.mark.parametrize("name", READABLE)
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.9, 0.999])
+def test_a_file_cut_short_gives_the_events_before_the_cut_or_an_error(tmp_path: Path, name: str, kept: float) -> None:
+    path = sample(name, tmp_path)
+    whole = path.read_bytes()
+    (events,) = read_events(path)
+    path.write_bytes(whole[: int(kept * len(whole))])
+    try:
+        file = format_named(name).open(path)  # type: ignore[misc]
+        found = [event for block in file.events() for event in zip(block.t, block.x, block.y, block.p, strict=True)]
+    except DataError:
+        return
+    assert found == list(zip(events.t, events.x, events.y, events.p, strict=True))[: len(found)]
+
+
+def test_garbage_is_no_event_file(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    texts = [b"", b"hello", b"%\n", b"% end\n", b"1,2\n", b"a b\n", b"PK\x03\x04"]
+    for k, content in enumerate([*texts, random.bytes(5000)]):
+        (tmp_path / str(k)).write_bytes(content)
+        with pytest.raises(DataError, match="no event file"):
+            open_events(tmp_path / str(k))

@@ -1,0 +1,297 @@
+"""Files of others, in the ways in which they come: made here of their bytes, word by word."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import foreign
+import h5py
+import numpy as np
+import pytest
+from recordings import all_events, assert_same, dense, events_of, recording_of, written
+
+from vid2ev.errors import DataError
+from vid2ev.formats import describe_events, format_named, open_events, read_events, recognise
+from vid2ev.formats.event_file import EventFile
+from vid2ev.stream.events import Events
+
+NMNIST = Path(__file__).parents[2] / ".." / "shared" / "data" / "events" / "nmnist_sample.bin"
+
+
+def opened(tmp_path: Path, content: bytes, name: str) -> EventFile:
+    """The file with that content, which is of the format of that name, whatever it is called."""
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    kind = recognise(path)
+    assert kind is not None and kind.name == name
+    return open_events(path)
+
+
+def rows(file: EventFile) -> list[tuple[int, ...]]:
+    """t, x, y, p of each event."""
+    return [tuple(map(int, row)) for e in file.events() for row in zip(e.t, e.x, e.y, e.p, strict=True)]
+
+
+def raw(version: str, words: list[int], bits: int, head: str = "% geometry 640x480\n% end\n", cut: int = 0) -> bytes:
+    content = f"% Date 2024-01-01 10:00:00\n% evt {version}\n{head}".encode()
+    return content + np.array(words, np.dtype(f"u{bits // 8}").newbyteorder("<")).tobytes()[: -cut or None]
+
+
+def test_evt3_of_a_camera(tmp_path: Path) -> None:
+    words = [
+        *(0x0005, 0x2003, 0x6011),  # a row and an event before the time is known
+        *(0x8002, 0x6010, 0x0007, 0x2809),  # ON at (9, 7), 2 * 4096 + 16 us
+        *(0xA101, 0xE014, 0xF123, 0xF456, 0x7007),  # a trigger, a count of events and its continuation
+        *(0x3805, 0x4801, 0x4000, 0x5080),  # ON at 5, 5 + 11 and 5 + 24 + 7
+        *(0x0FFF & 0x7FF, 0x2001, 0x0007, 0x2FFF),  # a row and a column that there are not
+        *(0x8FFF, 0x8000, 0x6001, 0x2002),  # the upper bits start anew
+        *(0x8001, 0x8000, 0x2004),  # and go back a little, which is taken for what it is
+    ]
+    file = opened(tmp_path, raw("3.0", words, 16, cut=1), "evt3")
+    turn = 1 << 24
+    expected = [(8208, 9, 7, 1), (8208, 5, 7, 1), (8208, 16, 7, 1), (8208, 36, 7, 1), (turn + 1, 2, 7, 0)]
+    assert rows(file) == expected
+    assert file.size == (640, 480) and file.start_us == 0
+    for part in (
+        "1 events before the first time",
+        "2 events outside of the 640x480",
+        "1 external",
+        "1 words",
+        "1 bytes",
+    ):
+        assert sum(text.startswith(part) for text in file.warnings) == 1, part
+    assert rows(file) == expected and len(file.warnings) == 5  # (again, and nothing is said twice)
+
+
+def test_evt2_of_a_camera(tmp_path: Path) -> None:
+    def event(p: int, low: int, x: int, y: int) -> int:
+        return p << 28 | low << 22 | x << 11 | y
+
+    words = [event(1, 3, 4, 5), 0x80000002, event(1, 3, 4, 5), 0xA0000101, 0xE0000000, 0xF0000000]
+    words += [event(0, 63, 639, 479), event(0, 0, 640, 0), 0x8FFFFFFF, 0x80000000, event(0, 1, 0, 0)]
+    file = opened(tmp_path, raw("2.0", words, 32, "% geometry 640x480\n", cut=0), "evt2")
+    assert rows(file) == [(131, 4, 5, 1), (191, 639, 479, 0), ((1 << 34) + 1, 0, 0, 0)]
+    assert len(file.warnings) == 4
+
+
+@pytest.mark.parametrize("legacy", [False, True])
+def test_evt21(tmp_path: Path, legacy: bool) -> None:
+    words = [0x8000_0001_0000_0000, 0x1 << 60 | 5 << 54 | 32 << 43 | 7 << 32 | 0x8000_0005]
+    words = [word >> 32 | (word & 0xFFFFFFFF) << 32 for word in words] if legacy else words
+    head = f"% format EVT21;{'endianness=legacy;' if legacy else ''}height=480;width=640\n% end\n"
+    file = opened(tmp_path, raw("2.1", words, 64, head), "evt2")
+    assert rows(file) == [(69, 32, 7, 1), (69, 34, 7, 1), (69, 63, 7, 1)]
+    assert file.size == (640, 480)
+
+
+def test_a_header_may_end_where_the_words_look_like_another_line(tmp_path: Path) -> None:
+    content = b"% evt 2.0\n% geometry 1280x720\n" + np.array([0x80002025, 0x00000A25], "<u4").tobytes()
+    assert rows(opened(tmp_path, content, "evt2")) == [(0x2025 << 6, 1, 0x225, 0)]
+    assert describe_events(tmp_path / "file")["stored"]["header"] == {"evt": "2.0", "geometry": "1280x720"}
+
+
+def test_evt3_sends_time_in_silence_and_vectors_where_they_are_shorter(tmp_path: Path) -> None:
+    events = events_of(np.array([0, 20_000_000]), (640, 480))
+    path = written(format_named("evt3"), recording_of(events, (640, 480), 0, 21_000_000), tmp_path)
+    words = np.frombuffer(path.read_bytes().partition(b"% end\n")[2], "<u2")
+    high = words[words >> 12 == 8] & 0xFFF
+    np.testing.assert_array_equal(high, np.arange(21_000_000 // 4096 + 1) & 0xFFF)
+    recording = dense()
+    words = np.frombuffer(
+        written(format_named("evt3"), recording, tmp_path).read_bytes().partition(b"% end\n")[2], "<u2"
+    )
+    kinds = words >> 12
+    base = np.flatnonzero(kinds == 3)
+    assert len(base) > 1000 and len(words) < recording.count
+    for after, kind in enumerate((4, 4, 5), 1):  # the only pattern that Prophesee's decoder takes
+        assert np.all(kinds[base + after] == kind)
+    assert np.all((words[base] & 0x7FF) + 32 <= recording.size[0])
+
+
+def test_evt2_sends_time_in_silence(tmp_path: Path) -> None:
+    events = events_of(np.array([0, 20_000_000]), (640, 480))
+    path = written(format_named("evt2"), recording_of(events, (640, 480), 0, 21_000_000), tmp_path)
+    words = np.frombuffer(path.read_bytes().partition(b"% end\n")[2], "<u4")
+    high = (words[words >> 28 == 8] & 0xFFFFFFF).astype(np.int64) * 64
+    assert high[0] == 0 and np.diff(high).max() <= 4096 and high[-1] > 21_000_000 - 64
+
+
+def test_times_of_dat_start_anew_and_may_go_back(tmp_path: Path) -> None:
+    records = np.array([[5, 1 << 28], [3, 2], [2**32 - 1, 3 << 14], [0, 4]], "<u4")
+    content = b"% Data file containing CD events\n% Version 2\n% Width 304\n% Height 240\n\x0c\x08" + records.tobytes()
+    file = opened(tmp_path, content + b"abc", "dat")
+    assert rows(file) == [(5, 0, 0, 1), (3, 2, 0, 0), (2**32 - 1, 0, 3, 0), (2**32, 4, 0, 0)]
+    assert file.warnings == ["3 bytes at the end, where the file is cut within an event, are left out"]
+
+
+@pytest.mark.parametrize("kind", [1, 2])
+def test_event_stream(tmp_path: Path, kind: int) -> None:
+    gaps = np.random.default_rng(0).choice([0, 1, 62, 63, 64, 126, 127, 128, 5000], 500)
+    events = events_of(np.cumsum(gaps), (304, 240))
+    content = foreign.es(events, (304, 240), kind)
+    assert_same(Events.concatenate(opened(tmp_path, content, "es").events()), events)
+    outside = np.array([304, 0], "<u2").tobytes()
+    file = opened(tmp_path, content + b"\x00" + outside + b"\x01\x00", "es")
+    assert_same(Events.concatenate(file.events()), events)
+    assert len(file.warnings) == 2
+    for wrong in (b"Event Stream\x02\x00\x00\x04\x05\x00\x05\x00", b"Event Stream\x01\x00\x00\x01", content[:15]):
+        with pytest.raises(DataError, match="expected"):
+            opened(tmp_path, wrong, "es")
+
+
+@pytest.mark.parametrize(
+    ("size", "chip"),
+    [((240, 180), "eu.seebetter.ini.chips.davis.DAVIS240C"), ((346, 260), "...Davis346blue"), ((346, 260), "")],
+)
+def test_aedat2_of_a_davis(tmp_path: Path, size: tuple[int, int], chip: str) -> None:
+    events = events_of(np.arange(3000) * 7, size)
+    address = foreign.davis_address(events, size)
+    special = np.concatenate([address, [1 << 31 | 5, 1 << 10 | 2]])
+    file = opened(tmp_path, foreign.aedat2(special, np.append(events.t, [30_000, 30_000]), chip), "aedat2")
+    assert_same(Events.concatenate(file.events()), events)
+    assert file.size == size
+    assert len(file.warnings) == (1 if chip else 2)
+
+
+def test_aedat2_of_a_dvs128_and_beyond_the_end_of_its_clock(tmp_path: Path) -> None:
+    events = events_of(2**31 - 1000 + np.arange(2000), (128, 128))
+    for chip in ("ch.unizh.ini.jaer.chip.retina.DVS128", ""):
+        file = opened(tmp_path, foreign.aedat2(foreign.dvs128_address(events), events.t, chip), "aedat2")
+        assert_same(Events.concatenate(file.events()), events)
+        assert file.size == (128, 128)
+    with pytest.raises(DataError, match="unknown camera"):
+        opened(tmp_path, foreign.aedat2(foreign.dvs128_address(events), events.t, "Cochlea"), "aedat2")
+
+
+def test_nmnist(tmp_path: Path) -> None:
+    events = events_of(np.arange(1000) * 300, (34, 34))
+    content = foreign.nmnist(events)
+    assert_same(Events.concatenate(opened(tmp_path, content, "nmnist").events()), events)
+    later = content[:2500] + bytes([0, 240, 0, 0, 0]) + content[2500:]  # half way, 8.192 ms more
+    read = Events.concatenate(opened(tmp_path, later, "nmnist").events())
+    np.testing.assert_array_equal(read.t, events.t + 8192 * (np.arange(1000) >= 500))
+
+
+@pytest.mark.skipif(not NMNIST.exists(), reason=f"{NMNIST.name} is not there")
+def test_nmnist_of_a_camera() -> None:
+    found = describe_events(NMNIST)
+    assert (found["format"], found["size"], found["events"]) == ("nmnist", [34, 34], NMNIST.stat().st_size // 5)
+    assert found["times_going_back"] == 0 and found["warnings"] == [] and 290_000 < found["last_us"] < 330_000
+
+
+def columns(events: Events) -> dict[str, np.ndarray]:
+    return {"t": events.t, "x": events.x, "y": events.y, "p": events.p}
+
+
+def test_arrays_of_others(tmp_path: Path) -> None:
+    events = events_of(np.arange(1, 2000) * 1001, (640, 480))
+    table = np.stack(list(columns(events).values()), axis=1)
+    structured = np.rec.fromarrays([events.x, events.y, events.p, events.t], names="x,y,polarity,timestamp")
+    path = tmp_path / "others.npz"
+    np.savez(path, ts=events.t, xs=events.x.astype(float), ys=events.y, ps=events.p.astype(np.int8) * 2 - 1)
+    files = {"names": path.read_bytes()}
+    for name, content in {"events": {"events": table}, "fields": {"data": events.x, "events": structured}}.items():
+        np.savez_compressed(path, **content)
+        files[name] = path.read_bytes()
+    for name, array in {"npy": table, "structured npy": structured, "floats": table.astype(float)}.items():
+        np.save(tmp_path / "others.npy", array)
+        files[name] = (tmp_path / "others.npy").read_bytes()
+    for name, content in files.items():
+        file = opened(tmp_path, content, "npz")
+        assert_same(Events.concatenate(file.events()), events)
+        assert file.warnings == [] and file.size is None, name
+    np.savez(path, **columns(events) | {"t": events.t / 1e6})
+    file = opened(tmp_path, path.read_bytes(), "npz")
+    assert_same(Events.concatenate(file.events()), events)
+    assert "seconds" in file.warnings[0]
+
+
+def test_arrays_that_are_no_events(tmp_path: Path) -> None:
+    for array in (np.zeros((9, 8, 8), np.uint8), np.zeros((9, 5)), np.zeros(4), np.array([{}], object)):
+        np.save(tmp_path / "stack.npy", array, allow_pickle=True)
+        assert recognise(tmp_path / "stack.npy") is None
+    np.savez(tmp_path / "uneven.npz", t=np.arange(3), x=np.arange(3), y=np.arange(3), p=np.arange(2))
+    with pytest.raises(DataError, match="differ in length"):
+        list(read_events(tmp_path / "uneven.npz"))
+    np.savez(tmp_path / "wide.npz", t=np.arange(3), x=np.arange(3) - 1, y=np.arange(3), p=np.arange(3))
+    with pytest.raises(DataError, match="65535"):
+        list(read_events(tmp_path / "wide.npz"))
+
+
+def test_numpy_and_h5py_read_what_is_written(tmp_path: Path) -> None:
+    recording = dense()
+    events = all_events(recording)
+    with np.load(written(format_named("npz"), recording, tmp_path)) as arrays:
+        assert set(arrays) == {"t", "x", "y", "p", "label", "size", "start_us"}
+        for name, column in columns(events).items():
+            np.testing.assert_array_equal(arrays[name], column)
+        assert arrays["size"].tolist() == list(recording.size) and arrays["start_us"] == 0
+    with h5py.File(written(format_named("v2e-hdf5"), recording, tmp_path)) as file:
+        assert file["events"].dtype == "u4"
+        np.testing.assert_array_equal(file["events"], np.stack(list(columns(events).values()), axis=1))
+
+
+def test_hdf5_of_v2e(tmp_path: Path) -> None:
+    table = np.array([[10, 1, 2, 1], [20, 3, 4, 0]], np.uint32)
+    with h5py.File(tmp_path / "v2e.h5", "w") as file:
+        file.create_dataset("events", data=table, compression="gzip", chunks=True, maxshape=(None, 4))
+    file = opened(tmp_path, (tmp_path / "v2e.h5").read_bytes(), "v2e-hdf5")
+    assert rows(file) == [tuple(row) for row in table.tolist()]
+    assert file.size is None and file.start_us == 0
+
+
+def test_hdf5_that_says_it_holds_more_than_it_does(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "table.h5", "w") as file:
+        file.create_dataset("events", (10**12, 4), np.uint32, chunks=(1000, 4))
+    with h5py.File(tmp_path / "columns.h5", "w") as file:
+        for name in "txyp":
+            file.create_dataset(f"events/{name}", (10**12,), np.uint32, chunks=(1000,))
+    for name in ("table.h5", "columns.h5"):
+        with pytest.raises(DataError, match="missing"):
+            next(read_events(tmp_path / name))
+
+
+CSV = {
+    "other order": b"x,y,p,t\n1,2,1,10\n3,4,0,20\n",
+    "other names": b"timestamp, x, y, polarity\r\n10, 1, 2, 1\r\n20, 3, 4, -1\r\n",
+    "more columns": b"t,frame,x,y,p\n10,a,1,2,1\n\n20,,3,4,0\n",
+    "Metavision": b"%geometry:640,480\n1,2,1,10\n3,4,0,20\n",
+    "faery": b"t,x@640,y@480,on\r\n10,1,2,1\r\n20,3,4,0",
+}
+RPG = {
+    "with size": b"640 480\n0.000010 1 2 1\n0.000020 3 4 0\n",
+    "nanoseconds": b"# t x y p\n0.000009700 1 2 1\n0.000020499 3 4 -1\n",
+    "numpy": b"1.000000000000000000e-05 1.000e+00 2.0e0 1.00e+00\n2.0e-05 3.0 4.0 0.0\n",
+    "microseconds": b"10 1 2 1\n20 3 4 0",
+}
+
+
+@pytest.mark.parametrize(("name", "text"), [*(("csv", text) for text in CSV), *(("rpg", text) for text in RPG)])
+def test_text_of_others(tmp_path: Path, name: str, text: str) -> None:
+    file = opened(tmp_path, (CSV if name == "csv" else RPG)[text], name)
+    assert rows(file) == [(10, 1, 2, 1), (20, 3, 4, 0)]
+    assert file.size == ((640, 480) if text in ("Metavision", "faery", "with size") else None)
+    assert bool(file.warnings) == (text == "microseconds")
+
+
+def test_text_that_is_wrong_is_refused_with_its_line(tmp_path: Path) -> None:
+    for line in (
+        b"1,2,3",
+        b"1.5,2,3,1",
+        b"1,65536,3,1",
+        b"1,-1,3,1",
+        b"1,2,3,on",
+        b"1-2,3,4,1",
+        b"9" * 30 + b"e9,2,3,1",
+    ):
+        with pytest.raises(DataError, match="line 3: "):
+            rows(opened(tmp_path, b"t,x,y,p\n0,0,0,1\n" + line + b"\n5,5,5,1\n", "csv"))
+    file = opened(tmp_path, b"t,x,y,p\n0,0,0,1\n1,2", "csv")
+    assert rows(file) == [(0, 0, 0, 1)] and len(file.warnings) == 1
+    with pytest.raises(DataError, match="no event"):
+        rows(opened(tmp_path, b"t,x,y,p\n" + b"7" * 200_000, "csv"))
+
+
+def test_seconds_since_1970_lose_nothing(tmp_path: Path) -> None:
+    text = b"1468941032.229165635 128 154 1\n1468941032.229165 0 0 0\n"
+    assert [row[0] for row in rows(opened(tmp_path, text, "rpg"))] == [1468941032229166, 1468941032229165]

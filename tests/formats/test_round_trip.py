@@ -1,0 +1,115 @@
+"""What any format writes, it reads: every event, its time on the clock of the source, and what else it keeps."""
+
+from __future__ import annotations
+
+import errno
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from recordings import all_events, assert_same, events_of, recording_of, recordings_for, sparse, written
+
+from vid2ev.formats import FORMATS, format_named, open_events, read_events, recognise, survey
+from vid2ev.stream.events import Events
+
+WRITABLE = [name for name in FORMATS if format_named(name).write]
+CASES = [(name, case) for name in WRITABLE for case in recordings_for(format_named(name))]
+
+
+@pytest.mark.parametrize(("name", "case"), CASES)
+def test_all_that_is_written_is_read(tmp_path: Path, name: str, case: str) -> None:
+    kind = format_named(name)
+    recording = recordings_for(kind)[case]
+    path = written(kind, recording, tmp_path)
+    found = recognise(path)
+    assert found is not None and found.name == name
+    file = open_events(path)
+    read = Events.concatenate(file.events())
+    assert_same(read, all_events(recording))
+    assert file.warnings == []
+    assert file.size == (recording.size if "size" in kind.keeps else None)
+    assert file.start_us == (recording.start_us if "start" in kind.keeps else 0)
+    assert file.labelled == ("labels" in kind.keeps)
+    if file.labelled and len(read):
+        np.testing.assert_array_equal(read.label, all_events(recording).label)
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+def test_the_same_events_give_the_same_bytes(tmp_path: Path, name: str) -> None:
+    kind, recording = format_named(name), recordings_for(format_named(name))["dense"]
+    assert written(kind, recording, tmp_path).read_bytes() == written(kind, recording, tmp_path).read_bytes()
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+def test_windows_and_blocks(tmp_path: Path, name: str) -> None:
+    recording = sparse()
+    path, events = written(format_named(name), recording, tmp_path), all_events(recording)
+    start, stop = int(events.t[100]), int(events.t[-100])
+    blocks = list(read_events(path, start, stop, block=64))
+    assert all(0 < len(block) <= 64 for block in blocks)
+    assert_same(Events.concatenate(blocks), events.select((events.t >= start) & (events.t < stop)))
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+def test_what_is_read_and_written_again_is_the_same_file(tmp_path: Path, name: str) -> None:
+    kind, events = format_named(name), all_events(sparse())
+    first = written(kind, recording_of(events, (346, 260), int(events.t[0])), tmp_path).read_bytes()
+    again = survey(open_events(tmp_path / f"events{kind.suffix}"))
+    (tmp_path / "again").mkdir()
+    assert written(kind, again, tmp_path / "again").read_bytes() == first
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_events(tmp_path: Path, name: str, data: st.DataObject) -> None:
+    kind = format_named(name)
+    most = kind.largest or (1 << 16, 1 << 16)
+    size = tuple(data.draw(st.integers(1, side)) for side in most)
+    gaps = data.draw(
+        st.lists(st.integers(0, 3) | st.integers(0, 10**5) | st.sampled_from([4096, 1 << 24]), max_size=40)
+    )
+    start, late = data.draw(st.integers(0, 1 << 50)), data.draw(st.integers(0, 5000))
+    events = events_of(start + np.cumsum(gaps, dtype=np.int64), (size[0], size[1]), data.draw(st.integers(0, 99)))
+    duration = sum(gaps) + late
+    path = written(kind, recording_of(events, (size[0], size[1]), start, duration, block=7), tmp_path)
+    file = open_events(path)
+    assert_same(Events.concatenate(file.events()), events)
+    assert file.warnings == []
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+@pytest.mark.parametrize("t", [[5, 4], [-1, 0]])
+def test_times_out_of_order_or_before_the_start_are_not_written(tmp_path: Path, name: str, t: list[int]) -> None:
+    with pytest.raises(ValueError, match="order"):
+        written(format_named(name), recording_of(events_of(np.array(t), (9, 9)), (9, 9), 0, 10), tmp_path)
+
+
+@pytest.mark.parametrize("name", WRITABLE)
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+def test_a_full_disk_is_an_error(tmp_path: Path, name: str) -> None:
+    kind = format_named(name)
+    if name == "dat" or "hdf5" in name:  # (they seek, which /dev/full cannot, or append; hdf5 has a test of its own)
+        pytest.skip("this format needs a file that can be sought in")
+    assert kind.write is not None and sys.platform == "linux"
+    with pytest.raises(OSError) as raised:
+        kind.write(Path("/dev/full"), recordings_for(kind)["dense"])
+    assert raised.value.errno == errno.ENOSPC
+
+
+def test_dat_goes_on_in_further_files(tmp_path: Path) -> None:
+    kind = format_named("dat")
+    recording = recordings_for(kind)["long"]
+    path, events = written(kind, recording, tmp_path), all_events(recording)
+    parts = sorted(tmp_path.iterdir())
+    assert [part.name for part in parts] == ["events.dat", *(f"events_{k}.dat" for k in range(1, 6))]
+    alone = Events.concatenate(read_events(tmp_path / "events_2.dat"))
+    assert_same(alone, events.select(events.t >> 32 == 2))
+    assert open_events(tmp_path / "events_2.dat").start_us == 2 << 32
+    (tmp_path / "events_4.dat").unlink()
+    file = open_events(path)
+    assert_same(Events.concatenate(file.events()), events.select(events.t >> 32 != 4))
+    assert len(file.warnings) == 1 and file.warnings[0].startswith("1 further files of the recording are not there")
