@@ -5,9 +5,10 @@
           stop_us     int64 [N]
           events      int64 [N] how many there are in each
           slices, representation      the requests, in text
-    png   a folder with 000000.png ... in 8 bits, as a representation looks, and slices.csv: file, start_us, stop_us,
-          events
-    mp4   a film with a picture for each slice, one after the other at `fps` whatever they last
+    png   a folder with 000000.png ... in 8 bits, as the representation looks, and slices.csv
+    mp4   a film with a picture for each slice, one after the other at `fps` whatever they last, and NAME.csv beside it
+
+A .csv has a row for each slice: number, start_us, stop_us, events.
 
 All three are made in memory that does not grow with the recording.  The same recording gives the same bytes.
 """
@@ -37,6 +38,7 @@ SLICES = "slices.csv"
 LEVEL = 4  # of Deflate
 
 Report = Callable[[Slice], object]
+Pictures = Iterator[tuple[Slice, np.ndarray]]  # R'G'B' uint8 [height, width, 3]
 
 
 def write_frames(
@@ -60,7 +62,7 @@ def write_frames(
     if kind not in KINDS:
         raise UsageError(f"frames as '{kind}': expected one of {', '.join(KINDS)}")
     cut, view = parse_slicing(slicing), parse_representation(representation)(recording.size)
-    arrays = reported(represent(recording, cut, view), report)
+    arrays = _reported(represent(recording, cut, view), report)
     with whole(path) as beside:
         if kind == "npz":
             table = list(slices_of(recording, cut))
@@ -68,10 +70,13 @@ def write_frames(
             _write_npz(beside, table, (array for _, array in arrays), view.shape, view.dtype, texts)
             return len(table)
         pictures = ((part, view.picture(array)) for part, array in arrays)
-        return write_pictures(beside, pictures) if kind == "png" else write_film(beside, pictures, fps)
+        if kind == "png":
+            return write_pictures(beside, pictures)
+        with whole(path.with_suffix(".csv")) as table_path:
+            return write_film(beside, listed(table_path, pictures), fps)
 
 
-def reported(arrays: Iterator[tuple[Slice, np.ndarray]], report: Report | None) -> Iterator[tuple[Slice, np.ndarray]]:
+def _reported(arrays: Iterator[tuple[Slice, np.ndarray]], report: Report | None) -> Iterator[tuple[Slice, np.ndarray]]:
     """The same, and each slice is reported once what is made of it is done."""
     for part, array in arrays:
         yield part, array
@@ -79,19 +84,23 @@ def reported(arrays: Iterator[tuple[Slice, np.ndarray]], report: Report | None) 
             report(part)
 
 
-def write_pictures(folder: Path, pictures: Iterator[tuple[Slice, np.ndarray]]) -> int:
-    """A folder of pictures, R'G'B' uint8 [height, width, 3], with their slices; returns how many there are."""
+def write_pictures(folder: Path, pictures: Pictures) -> int:
+    """A folder of pictures with the table of their slices; returns how many there are."""
     folder.mkdir()
     number = 0
-    with open(folder / SLICES, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["file", "start_us", "stop_us", "events"])
-        for part, picture in pictures:
-            name = f"{number:06d}.png"
-            write_picture(folder / name, picture)
-            rows.writerow([name, part.start_us, part.stop_us, part.events])
-            number += 1
+    for number, (_, picture) in enumerate(listed(folder / SLICES, pictures), 1):
+        write_picture(folder / f"{number - 1:06d}.png", picture)
     return number
+
+
+def listed(path: Path, pictures: Pictures) -> Pictures:
+    """The same, and their slices go into a table."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["number", "start_us", "stop_us", "events"])
+        for number, (part, picture) in enumerate(pictures):
+            yield part, picture
+            rows.writerow([number, part.start_us, part.stop_us, part.events])
 
 
 def write_picture(path: Path, picture: np.ndarray) -> None:
@@ -103,8 +112,8 @@ def write_picture(path: Path, picture: np.ndarray) -> None:
     path.write_bytes(coded.tobytes())
 
 
-def write_film(path: Path, pictures: Iterator[tuple[Slice, np.ndarray]], fps: Fraction | int) -> int:
-    """A film of pictures of one size, R'G'B' uint8 [height, width, 3], at least one; returns how many there are."""
+def write_film(path: Path, pictures: Pictures, fps: Fraction | int) -> int:
+    """A film of pictures of one size, at least one; returns how many there are."""
     from vid2ev.pictures.film import Film
 
     first = next(pictures)
@@ -118,20 +127,34 @@ def write_film(path: Path, pictures: Iterator[tuple[Slice, np.ndarray]], fps: Fr
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A path beside another, for a file or folder that takes its place at the end; what goes wrong leaves nothing."""
-    beside, replaced = (path.with_name(f"{path.name}.{word}") for word in ("new", "replaced"))
-    _remove(beside)
+    """A path for a new file or folder, which takes the place of `path` at the end; what goes wrong changes nothing."""
+    aside = path.with_name(f"{path.name}.new")
+    made, replaced = aside / path.name, aside / "replaced"
+    aside.mkdir(exist_ok=True)
     try:
-        yield beside
-        for file in [*beside.iterdir(), beside] if beside.is_dir() else [beside]:
+        _remove(made)
+        yield made
+        for file in [*made.iterdir(), made] if made.is_dir() else [made]:
             sync(file)
-        if path.is_dir():
-            path.rename(replaced)
-        beside.replace(path)
+        _exchange(made, path, replaced)
         sync(path.absolute().parent)
     finally:
-        _remove(beside)
+        _remove(made)
         _remove(replaced)
+        with suppress(OSError):
+            aside.rmdir()
+
+
+def _exchange(made: Path, path: Path, replaced: Path) -> None:
+    if not path.is_dir():
+        made.replace(path)
+        return
+    path.rename(replaced)
+    try:
+        made.rename(path)
+    except OSError:
+        replaced.rename(path)
+        raise
 
 
 def _remove(path: Path) -> None:

@@ -17,6 +17,7 @@ from vid2ev.views.slices import Area, Count, Duration, Slicing, Source
 if TYPE_CHECKING:
     from vid2ev.views.representation import Kind
 
+NUMBER = r"[0-9]{1,15}/[0-9]{1,15}|(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})(?:[eE][+-]?[0-9]{1,2})?"
 UNITS_US = {"us": 1, "ms": 1000, "s": 10**6, "": 10**6}
 SLICINGS = "duration:10ms, count:50000, area:500,32 or source"
 REPRESENTATIONS = "counts, frame:2, voxel:5, time-surface:30ms or sae"
@@ -43,10 +44,10 @@ def parse_slicing(text: str) -> Slicing:
 
 def parse_us(text: str, within: str) -> Fraction:
     """Microseconds of a length of time above 0 such as 10ms, 0.01 or 1/30 (seconds); raises UsageError."""
-    found = re.fullmatch(r"([0-9.eE/+-]+?)\s*(us|ms|s|)", text.strip())
+    found = re.fullmatch(rf"({NUMBER})\s*(us|ms|s|)", text.strip())
     try:
         us = Fraction(found[1]) * UNITS_US[found[2]] if found else Fraction(0)
-    except (ValueError, ZeroDivisionError):
+    except ZeroDivisionError:
         us = Fraction(0)
     if us <= 0:
         raise UsageError(f"{within}: '{text}' is no length of time above 0; give it as 10ms, 500us or 0.01 (seconds)")
