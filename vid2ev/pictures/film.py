@@ -85,18 +85,23 @@ def planes(picture: np.ndarray) -> np.ndarray:
     return coded
 
 
+_RED, _GREEN, _BLUE = (np.float32(share) for share in (RED, GREEN, BLUE))
+_LUMA, _U, _V = (np.float32(scale / 255) for scale in (219, 224 / BLUE_SPAN, 224 / RED_SPAN))
+_LEAST, _HALF = np.float32(0.01), np.float32(0.5)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _encode(picture, luma, chroma):  # type: ignore[no-untyped-def]
     for block_i in range(chroma.shape[1]):
         for block_j in range(chroma.shape[2]):
-            u_sum = v_sum = weights = 0.0
+            u_sum = v_sum = weights = np.float32(0)
             for k in range(4):
                 i, j = 2 * block_i + k // 2, 2 * block_j + k % 2
-                red, green, blue = picture[i, j, 0] / 255, picture[i, j, 1] / 255, picture[i, j, 2] / 255
-                y = RED * red + GREEN * green + BLUE * blue
-                u, v = 224 * (blue - y) / BLUE_SPAN, 224 * (red - y) / RED_SPAN
-                weight = abs(u) + abs(v) + 0.01
+                red, green, blue = picture[i, j, 0], picture[i, j, 1], picture[i, j, 2]
+                y = _RED * np.float32(red) + _GREEN * np.float32(green) + _BLUE * np.float32(blue)
+                u, v = _U * (np.float32(blue) - y), _V * (np.float32(red) - y)
+                weight = abs(u) + abs(v) + _LEAST
                 u_sum, v_sum, weights = u_sum + weight * u, v_sum + weight * v, weights + weight
-                luma[i, j] = np.uint8(16 + 219 * y + 0.5)
-            chroma[0, block_i, block_j] = np.uint8(NEUTRAL + u_sum / weights + 0.5)
-            chroma[1, block_i, block_j] = np.uint8(NEUTRAL + v_sum / weights + 0.5)
+                luma[i, j] = np.uint8(np.float32(16) + _LUMA * y + _HALF)
+            chroma[0, block_i, block_j] = np.uint8(np.float32(NEUTRAL) + u_sum / weights + _HALF)
+            chroma[1, block_i, block_j] = np.uint8(np.float32(NEUTRAL) + v_sum / weights + _HALF)

@@ -51,27 +51,30 @@ class Canvas:
         self.view = Reduced(kind, size, min(_factor(kind(size), size, limit, panels), 1.0))
         across, down = _extent(self.view)
         self._enlarged = max(1, limit // max(across * panels[0], down * panels[1]))
-        across, down = across * self._enlarged, down * self._enlarged
+        self._panel = across, down = across * self._enlarged, down * self._enlarged
         self._beside = None if frames is None else Beside(frames, (across, down))
         self._stamp, self._zero_us, self._digits = stamp, zero_us, digits
         self.size = across * panels[0], down * panels[1] + LINE * stamp
 
     def draw(self, part: Slice, array: np.ndarray) -> np.ndarray:
         """The picture of a slice, R'G'B' uint8 [height, width, 3]; slices must come in order of time."""
-        picture = self.view.picture(array)
-        panels = [picture.repeat(self._enlarged, axis=0).repeat(self._enlarged, axis=1)]
-        panels += [] if self._beside is None else [self._beside.at(part.stop_us)]
-        rows = [np.concatenate(panels, axis=0 if self._under else 1)]
-        return np.concatenate([*rows, self._line(part)]) if self._stamp else rows[0]
+        drawn = np.empty((self.size[1], self.size[0], 3), np.uint8)
+        across, down = self._panel
+        drawn[:down, :across] = cv2.resize(self.view.picture(array), (across, down), interpolation=cv2.INTER_NEAREST)
+        if self._beside is not None:
+            top, left = (down, 0) if self._under else (0, across)
+            drawn[top : top + down, left : left + across] = self._beside.at(part.stop_us)
+        if self._stamp:
+            self._write(part, drawn[-LINE:])
+        return drawn
 
-    def _line(self, part: Slice) -> np.ndarray:
-        line = np.full((LINE, self.size[0], 3), DARK, np.uint8)
+    def _write(self, part: Slice, line: np.ndarray) -> None:
+        line[:] = DARK
         left, right = f"{(part.stop_us - self._zero_us) / 1e6:.{self._digits}f} s", f"{part.events:,} events"
         widths = [cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0] for text in (left, right)]
         _write(line, left, INSET)
         if sum(widths) + 4 * INSET <= self.size[0]:
             _write(line, right, self.size[0] - INSET - widths[1])
-        return line
 
 
 class Reduced:

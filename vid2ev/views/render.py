@@ -68,6 +68,7 @@ def render(
     """
     output = Path(output)
     check_free(output, overwrite)
+    _check_numbers(fps=fps, speed=speed, start=start_s, stop=stop_s, size=size)
     slicing, kind = _slicing(by, fps, speed), _kind(view)
     file = open_events(events)
     zero_us = beginning_us(file)
@@ -114,6 +115,13 @@ class _Done:
             "start_us": start_us,
             "duration_us": stop_us - start_us,
         }
+
+
+def _check_numbers(**options: float | None) -> None:
+    for name, value in options.items():
+        least_in = name in ("start", "stop")
+        if value is not None and not (0 < value < 1e9 or (least_in and value == 0)):
+            raise UsageError(f"--{name} {value}: expected a number {'from' if least_in else 'above'} 0 to 1e9")
 
 
 def _slicing(by: str | None, fps: float, speed: float | None) -> Slicing:

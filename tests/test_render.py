@@ -1,0 +1,332 @@
+"""`vid2ev render`: every event is shown once, where and when it should; failures are a sentence and leave nothing."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from vid2ev.commands.render import render as command
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.event_file import BLOCK, Picture, Recording, within
+from vid2ev.formats.hdf5 import write_events
+from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
+from vid2ev.stream.events import Events
+from vid2ev.views import canvas
+from vid2ev.views import render as rendering
+
+SIZE = (32, 24)
+AMBER, BLUE, DARK = (in_8_bits(colour).astype(int) for colour in (ON, OFF, GROUND))
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def render(*arguments: str) -> dict[str, Any]:
+    result = CliRunner().invoke(command, [*arguments, "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def refused(kind: type[Exception], sentence: str, *arguments: str) -> None:
+    before = sorted(Path().rglob("*"))
+    with pytest.raises(kind, match=sentence) as raised:
+        CliRunner().invoke(command, arguments, catch_exceptions=False)
+    assert "\n" not in str(raised.value)
+    assert sorted(Path().rglob("*")) == before
+
+
+def events_of(t: Any, x: Any, y: Any, p: Any) -> Events:
+    t = np.asarray(t, np.int64)
+    x, y = (np.broadcast_to(np.asarray(side, np.uint16), t.shape) for side in (x, y))
+    return Events(t, x, y, np.broadcast_to(np.asarray(p, np.uint8), t.shape))
+
+
+def write(events: Events, path: str = "events.h5", size: tuple[int, int] = SIZE, start_us: int = 0) -> str:
+    Path(path).parent.mkdir(exist_ok=True)
+    last_us = int(events.t[-1]) if len(events) else start_us
+    write_events(Path(path), Recording(size, start_us, last_us - start_us, len(events), lambda: iter([events])))
+    return path
+
+
+def scattered(n: int = 600, duration_us: int = 1_000_000, start_us: int = 0) -> Events:
+    """Events at pixels of their own: that of event k is (k mod 32, k div 32)."""
+    k = np.arange(n)
+    t = start_us + np.sort(np.random.default_rng(1).integers(0, duration_us + 1, n))
+    return events_of(t, k % SIZE[0], k // SIZE[0], k % 2)
+
+
+def film(path: str) -> list[np.ndarray]:
+    with av.open(path) as container:
+        return [frame.to_ndarray(format="rgb24").astype(int) for frame in container.decode(video=0)]
+
+
+def picture(path: str | Path) -> np.ndarray:
+    return cv2.imread(str(path), cv2.IMREAD_COLOR)[..., ::-1].astype(int)
+
+
+def lit(shown: np.ndarray, enlarged: int, size: tuple[int, int] = SIZE) -> dict[tuple[int, int], int]:
+    """The pixels that are not dark, and whether they are amber (1) or blue (0)."""
+    middles = shown[enlarged // 2 :: enlarged, enlarged // 2 :: enlarged][: size[1], : size[0]]
+    there = np.argwhere(np.abs(middles - DARK).max(axis=2) > 60)
+    return {(int(x), int(y)): int(middles[y, x, 0] > middles[y, x, 2]) for y, x in there}
+
+
+# ----------------------------------------------------------------------------------------------------- what is shown
+
+
+@pytest.mark.parametrize(
+    "options", [[], ["--fps", "20"], ["--speed", "0.5"], ["--by", "count:70"], ["--by", "duration:0.04"]]
+)
+def test_every_event_is_in_one_picture_of_the_film(options: list[str]) -> None:
+    events = scattered()
+    made = render(write(events), "-o", "film.mp4", "--size", "320", *options)
+    frames = film("film.mp4")
+    assert made["frames"] == made["slices"] == len(frames) and made["events"] == len(events)
+    assert made["size"] == [frames[0].shape[1], frames[0].shape[0]] == [320, 270]
+    found = [pixel for shown in frames for pixel in lit(shown, 10).items()]
+    assert sorted(found) == sorted(((k % 32, k // 32), k % 2) for k in range(len(events)))
+
+
+def test_pictures_come_when_the_film_should_show_them() -> None:
+    t = [100_000, 200_000, 200_001, 900_000]
+    write(events_of(t, [1, 2, 3, 4], 5, 1))
+    for fps, speed in ((10, 1.0), (10, 0.5), (20, 0.5), (25, 2.0)):
+        made = render(
+            "events.h5", "-o", "film.mp4", "--fps", str(fps), "--speed", str(speed), "--overwrite", "--size", "320"
+        )
+        shown = [sorted(lit(frame, 10)) for frame in film("film.mp4")]
+        each_us = 1e6 * speed / fps
+        when = [next(k for k, pixels in enumerate(shown) if (x, 5) in pixels) for x in (1, 2, 3, 4)]
+        assert when == [int(np.ceil(at / each_us)) - 1 for at in t]
+        assert made["duration_us"] == len(shown) * each_us
+
+
+def test_a_folder_has_the_pictures_of_the_film_and_their_times() -> None:
+    made = render(write(scattered()), "-o", "pictures", "--by", "duration:0.1", "--no-stamp")
+    with open("pictures/slices.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == made["frames"] == 10
+    assert [(row["start_us"], row["stop_us"]) for row in table] == [
+        (str(k * 10**5), str(k * 10**5 + 10**5)) for k in range(10)
+    ]
+    assert sum(int(row["events"]) for row in table) == 600
+    found = [len(lit(picture(f"pictures/{k:06d}.png"), 40)) for k in range(10)]
+    assert found == [int(row["events"]) for row in table]
+
+
+def test_a_picture_is_the_densest_slice() -> None:
+    busy = events_of(300_000 + 1 + np.arange(100), np.arange(100) % 32, np.arange(100) // 32, 0)
+    write(Events.concatenate([events_of([0, 100_000], 20, 20, 1), busy, events_of([900_000], 21, 21, 1)]))
+    made = render("events.h5", "-o", "a.png", "--by", "duration:100ms")
+    assert (made["events"], made["start_us"], made["duration_us"], made["frames"]) == (100, 300_000, 100_000, 1)
+    assert sorted(lit(picture("a.png"), 40)) == sorted((k % 32, k // 32) for k in range(100))
+
+
+def test_a_picture_of_a_window_has_all_of_it() -> None:
+    made = render(write(scattered()), "-o", "a.png", "--start", "0.25", "--stop", "0.5")
+    t = scattered().t
+    inside = np.flatnonzero((t >= 250_000) & (t <= 500_000))
+    assert made["events"] == len(inside)
+    assert sorted(lit(picture("a.png"), 40)) == sorted((k % 32, k // 32) for k in inside.tolist())
+
+
+def test_windows_have_both_ends_in_and_count_from_the_beginning() -> None:
+    start_us = 7_000_000_000
+    write(events_of(start_us + np.array([0, 10_000, 20_000, 20_001, 30_000]), [1, 2, 3, 4, 5], 5, 1), start_us=start_us)
+    made = render("events.h5", "-o", "a.png", "--start", "0.01", "--stop", "0.02")
+    assert sorted(lit(picture("a.png"), 40)) == [(2, 5), (3, 5)] and made["start_us"] == start_us + 10_000
+    made = render("events.h5", "-o", "b.png", "--stop", "0.02", "--by", "count:10")
+    assert made["events"] == 3
+
+
+def test_a_silence_before_the_first_event_is_left_out_where_nothing_says_when_the_file_begins() -> None:
+    write(events_of([5_000_000_000, 5_000_050_000], 3, 3, 1))
+    made = render("events.h5", "-o", "film.mp4")
+    assert (made["start_us"], made["frames"], made["events"]) == (5_000_000_000, 2, 2)
+
+
+def test_folders_of_recordings_and_defaults() -> None:
+    write(scattered(), "clip_events/events.h5")
+    assert render("clip_events")["path"] == "clip_events.mp4"
+    assert render("clip_events/events.h5")["path"] == "events.mp4"
+    shown = CliRunner().invoke(command, ["clip_events", "-o", "new/deep/a.png"], catch_exceptions=False)
+    assert "a.png" in shown.stdout and "events" in shown.stdout and Path("new/deep/a.png").exists()
+    assert CliRunner().invoke(command, ["clip_events", "-o", "b.png", "-q"], catch_exceptions=False).stdout == ""
+
+
+def test_a_recording_without_events_is_dark() -> None:
+    assert render(write(events_of([], [], [], [])), "-o", "film.mp4")["frames"] == 1
+    assert lit(film("film.mp4")[0], 40) == {}
+
+
+@pytest.mark.parametrize(
+    "view", ["polarity", "time-surface", "time-surface:5ms", "accumulated", "accumulated:1", "voxel", "voxel:2"]
+)
+@pytest.mark.parametrize("size", [(1, 1), (3, 200), (700, 11), (1281, 721)])
+def test_any_view_of_any_size_fits(view: str, size: tuple[int, int]) -> None:
+    corner = events_of([0, 10_000, 20_000], size[0] - 1, size[1] - 1, [1, 0, 1])
+    made = render(write(corner, size=size), "-o", "film.mp4", "--view", view, "--size", "300")
+    shown = film("film.mp4")
+    width, height = made["size"]
+    assert width <= 300 and height <= 300 + canvas.LINE
+    assert shown[0].shape == (height + height % 2, width + width % 2, 3)
+
+
+def test_pixels_of_large_sensors_share_and_none_is_lost() -> None:
+    k = np.arange(4000)
+    write(events_of(k, k % 200, k // 200 * 3, 1), size=(200, 60))
+    render("events.h5", "-o", "a.png", "--size", "100", "--view", "polarity", "--by", "count:4000", "--no-stamp")
+    shown = picture("a.png")
+    assert shown.shape == (30, 100, 3)
+    assert (np.abs(shown - DARK).max(axis=2) > 60).sum() == 100 * 20
+
+
+def test_the_line_says_when_and_how_many() -> None:
+    write(events_of([0, 1000], [1, 2], 3, 1))
+    plain, stamped = (
+        render("events.h5", "-o", f"{name}.png", *more) for name, more in (("a", ["--no-stamp"]), ("b", []))
+    )
+    a, b = picture("a.png"), picture("b.png")
+    assert stamped["size"] == [plain["size"][0], plain["size"][1] + canvas.LINE]
+    np.testing.assert_array_equal(a, b[: len(a)])
+    line = b[len(a) :]
+    assert line[:, :100].max() > 120 and line[:, -100:].max() > 120 and np.abs(line[:, 400:800] - DARK).max() == 0
+
+
+# ------------------------------------------------------------------------------------------------------- with frames
+
+
+class Filmed:
+    """An event file with frames: frame k, at 50 ms k, is gray or coloured at level 40 k."""
+
+    warnings: tuple[str, ...] = ("a cable was loose",)
+    labelled, has_frames = False, True
+
+    def __init__(self, size: tuple[int, int], colour: bool = False):
+        self.path, self.size, self.start_us, self.colour = Path("davis.aedat4"), size, 0, colour
+
+    def describe(self) -> dict[str, Any]:
+        return {}
+
+    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
+        return within(iter([events_of(np.arange(0, 250_001, 1000), 2, 3, 1)]), start_us, stop_us)
+
+    def frames(self) -> Iterator[Picture]:
+        for k in range(1, 6):
+            gray = np.full((12, 16), 40 * k, np.uint8)
+            yield Picture(50_000 * k, np.stack([gray, gray // 2, gray * 0], axis=2) if self.colour else gray)
+
+
+@pytest.fixture
+def filmed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Filmed:
+    file = Filmed(*request.param)
+    monkeypatch.setattr(rendering, "open_events", lambda path: file)
+    return file
+
+
+@pytest.mark.parametrize("filmed", [((32, 24), False), ((32, 24), True)], indirect=True)
+def test_frames_are_beside_the_events_from_when_they_are_there(filmed: Filmed) -> None:
+    made = render("davis.aedat4", "-o", "pictures", "--by", "duration:25ms", "--no-stamp")
+    assert made["size"] == [1280, 480] and made["warnings"] == ["a cable was loose"]
+    for k in range(10):
+        shown = picture(f"pictures/{k:06d}.png")
+        newest = 25_000 * (k + 1) // 50_000
+        level = np.array([40, 20, 0] if filmed.colour else [40, 40, 40]) * newest
+        np.testing.assert_array_equal(shown[240, 700:1200], np.broadcast_to(level if newest else DARK, (500, 3)))
+        assert lit(shown[:, :640], 20) == {(2, 3): 1}
+
+
+@pytest.mark.parametrize("filmed", [((64, 24), False)], indirect=True)
+def test_frames_are_under_wide_events(filmed: Filmed) -> None:
+    made = render("davis.aedat4", "-o", "a.png", "--by", "source", "--view", "accumulated", "--no-stamp")
+    assert made["size"] == [1280, 960] and made["slices"] == 5
+    assert picture("a.png")[700, 640].tolist() == [40, 40, 40]
+    assert (picture("a.png")[700, 100] == DARK).all()  # a frame that is narrower stands in the middle
+    assert render("davis.aedat4", "-o", "b.png", "--no-frames", "--no-stamp")["size"] == [1280, 480]
+
+
+# ------------------------------------------------------------------------------------------------------ what does not
+
+
+def test_what_is_there_is_kept_unless_told_otherwise() -> None:
+    write(scattered())
+    for output in ("film.mp4", "a.png", "pictures"):
+        render("events.h5", "-o", output, "--size", "64")
+        refused(UsageError, "--overwrite replaces it", "events.h5", "-o", output)
+        render("events.h5", "-o", output, "--overwrite", "--stop", "0.3")
+    assert len(list(Path("pictures").iterdir())) == 1 + 9
+    Path("pictures/notes.txt").touch()
+    refused(UsageError, "notes.txt", "events.h5", "-o", "pictures", "--overwrite")
+    Path("empty").mkdir()
+    render("events.h5", "-o", "empty", "--stop", "0.1")
+
+
+@pytest.mark.parametrize(
+    ("sentence", "arguments"),
+    [
+        ("expected one of polarity", ["--view", "colours"]),
+        ("representation", ["--view", "voxel:0"]),
+        ("duration:10ms", ["--by", "often"]),
+        ("times of the frames", ["--by", "source"]),
+        ("leave out one", ["--by", "count:5", "--speed", "2"]),
+        ("less than 1 us", ["--speed", "1e-6"]),
+        ("above 0", ["--fps", "nan"]),
+        ("above 0", ["--speed", "nan"]),
+        ("from 0", ["--start", "nan"]),
+        ("from 0", ["--stop", "nan"]),
+        ("no frames", ["--with-frames"]),
+        ("not after --start", ["--start", "0.5", "--stop", "0.5"]),
+        ("no events from 5 s to the end", ["--start", "5"]),
+        ("no events from 0.5 s to 0.500001 s", ["--start", "0.5", "--stop", "0.500001"]),
+        ("cannot be made", ["-o", "film.gif"]),
+        ("within", ["-o", "."]),
+        ("within", ["-o", ".."]),
+        ("is a file", ["-o", "file"]),
+    ],
+)
+def test_requests_that_cannot_be_meant(sentence: str, arguments: list[str]) -> None:
+    write(scattered(50))
+    Path("file").touch()
+    refused(UsageError, sentence, "events.h5", *arguments)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--fps", "0"], ["--fps", "1001"], ["--fps", "fast"], ["--speed", "-1"], ["--size", "1"], ["--size", "9000"],
+     ["--start=-1"], ["--stop", "inf"], ["--colour", "red"], []],
+    ids=" ".join,
+)  # fmt: skip
+def test_options_that_cannot_be_meant(arguments: list[str]) -> None:
+    write(scattered(50))
+    result = CliRunner().invoke(command, [*(["events.h5"] if arguments else []), *arguments])
+    assert result.exit_code == 2 and "Error: " in result.stderr and not Path("events.mp4").exists()
+
+
+def test_files_that_are_none_or_damaged() -> None:
+    refused(DataError, "no such file", "missing.h5")
+    Path("text.h5").write_text("t x y p")
+    refused(DataError, "no event file", "text.h5")
+    write(scattered(50), size=(4, 4))
+    refused(DataError, "4x4 sensor", "events.h5")
+    content = Path(write(scattered(600))).read_bytes()
+    Path("cut.h5").write_bytes(content[: len(content) // 2])
+    refused(DataError, "cut.h5", "cut.h5")
+
+
+def test_a_place_that_cannot_be_written_is_said_in_a_sentence() -> None:
+    write(scattered(50))
+    Path("file").touch()
+    for output in ("file/film.mp4", "file/a.png", "file/pictures"):
+        refused(DataError, "cannot be written", "events.h5", "-o", output)
