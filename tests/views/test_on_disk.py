@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import subprocess
+import sys
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -136,6 +138,38 @@ def test_requests_that_cannot_be_meant_touch_nothing(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="frames"):
         write_frames(path, replace(RECORDING, frame_us=None), slicing="source")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
+    program = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from vid2ev.formats.event_file import Recording
+from vid2ev.stream.events import Events
+from vid2ev.views.on_disk import KINDS, write_frames
+random = np.random.default_rng(0)
+n = 1 << 18
+t = np.sort(random.integers(0, 10**6, n))
+x = random.integers(0, 300, n).astype(np.uint16)
+events = Events(t, x, x[::-1].copy(), (x & 1).astype(np.uint8))
+recording = Recording((300, 300), 0, 10**6, n, lambda: iter([events]))
+for kind in KINDS:  # compiles
+    write_frames(Path(sys.argv[1]) / "first" / KINDS[kind], recording, kind=kind)
+for limit in (0, 100, 5000, 50_000):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    for kind in KINDS:
+        try:
+            write_frames(Path(sys.argv[1]) / KINDS[kind], recording, kind=kind)
+        except OSError as error:
+            print(kind, end=" ")
+"""
+    (tmp_path / "first").mkdir()
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split()[:9] == ["npz", "png", "mp4"] * 3
+    assert not any(".new" in path.name for path in tmp_path.rglob("*"))
 
 
 def test_every_slice_is_reported(tmp_path: Path) -> None:

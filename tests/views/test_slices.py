@@ -116,6 +116,12 @@ def test_what_lies_outside_of_the_frames_is_a_slice_as_well() -> None:
     ]
 
 
+def test_areas_refuse_events_outside_of_the_sensor() -> None:
+    outside = events_at([1, 2, 3], size=(9999, 9999))
+    with pytest.raises(ValueError, match="outside of the 20x14 sensor"):
+        list(Area(5, 4).pieces(recording_of(outside)))
+
+
 def test_source_needs_frames() -> None:
     with pytest.raises(UsageError, match="duration:10ms"):
         list(Source().pieces(recording_of(events_at([1]))))

@@ -23,6 +23,7 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -72,8 +73,8 @@ def write_frames(
         pictures = ((part, view.picture(array)) for part, array in arrays)
         if kind == "png":
             return write_pictures(beside, pictures)
-        with whole(path.with_suffix(".csv")) as table_path:
-            return write_film(beside, listed(table_path, pictures), fps)
+        with whole(path.with_suffix(".csv")) as listing, _table(listing) as rows:
+            return write_film(beside, _listed(rows, pictures), fps)
 
 
 def _reported(arrays: Iterator[tuple[Slice, np.ndarray]], report: Report | None) -> Iterator[tuple[Slice, np.ndarray]]:
@@ -88,19 +89,23 @@ def write_pictures(folder: Path, pictures: Pictures) -> int:
     """A folder of pictures with the table of their slices; returns how many there are."""
     folder.mkdir()
     number = 0
-    for number, (_, picture) in enumerate(listed(folder / SLICES, pictures), 1):
-        write_picture(folder / f"{number - 1:06d}.png", picture)
+    with _table(folder / SLICES) as table:
+        for number, (_, picture) in enumerate(_listed(table, pictures), 1):
+            write_picture(folder / f"{number - 1:06d}.png", picture)
     return number
 
 
-def listed(path: Path, pictures: Pictures) -> Pictures:
+def _table(path: Path) -> TextIO:
+    return open(path, "w", newline="", encoding="utf-8")
+
+
+def _listed(table: TextIO, pictures: Pictures) -> Pictures:
     """The same, and their slices go into a table."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["number", "start_us", "stop_us", "events"])
-        for number, (part, picture) in enumerate(pictures):
-            yield part, picture
-            rows.writerow([number, part.start_us, part.stop_us, part.events])
+    rows = csv.writer(table, lineterminator="\n")
+    rows.writerow(["number", "start_us", "stop_us", "events"])
+    for number, (part, picture) in enumerate(pictures):
+        yield part, picture
+        rows.writerow([number, part.start_us, part.stop_us, part.events])
 
 
 def write_picture(path: Path, picture: np.ndarray) -> None:

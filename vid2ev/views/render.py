@@ -83,8 +83,10 @@ def render(
     done = _Done(recording, report)
     arrays = represent(recording, slicing, canvas.view)
     made = _write(output, canvas, arrays, done, Fraction(fps))
-    asked = {"path": str(output), "kind": kind_of(output), "view": view, "by": str(slicing), "fps": float(fps)}
-    return asked | made | {"size": list(canvas.size), "warnings": file.warnings}
+    made_as = kind_of(output)
+    asked = {"path": str(output), "kind": made_as, "view": view, "by": str(slicing), "fps": float(fps)}
+    size_px = [side + side % 2 for side in canvas.size] if made_as == "mp4" else list(canvas.size)
+    return asked | made | {"size": size_px, "warnings": list(file.warnings)}
 
 
 @dataclass

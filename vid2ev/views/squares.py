@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from vid2ev.stream.events import Events
+from vid2ev.views.representation import check_within
 
 
 class Squares:
@@ -14,13 +15,18 @@ class Squares:
 
     def __init__(self, size: tuple[int, int], side: int, most: int):
         width, height = size
-        self.most = most
+        self.most, self._size = most, size
         self._column = np.arange(width) // side
         self._row = np.arange(height) // side * (self._column[-1] + 1)
         self._counts = np.zeros(self._row[-1] + self._column[-1] + 1, np.int64)
 
     def fills(self, events: Events, first: int) -> int:
-        """The index of the event, from `first` on, that fills the slice; -1 if none does."""
+        """The index of the event, from `first` on, that fills the slice; -1 if none does.
+
+        Raises ValueError for events outside of the sensor.
+        """
+        if first == 0:
+            check_within(events, self._size)
         at = int(_fills(events.x, events.y, first, self._column, self._row, self._counts, self.most))
         if at >= 0:
             self._counts[:] = 0
