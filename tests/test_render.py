@@ -113,6 +113,15 @@ def test_pictures_come_when_the_film_should_show_them() -> None:
         assert made["duration_us"] == len(shown) * each_us
 
 
+def test_any_rate_makes_a_film() -> None:
+    write(scattered(duration_us=100_000))
+    for fps in ("29.97", "12.345678901234", "1000", "0.01"):
+        made = render("events.h5", "-o", "film.mp4", "--fps", fps, "--overwrite", "--size", "64")
+        assert len(film("film.mp4")) == made["frames"] == int(np.ceil(0.1 * float(fps)))
+        with av.open("film.mp4") as container:
+            assert float(container.streams.video[0].average_rate or fps) == pytest.approx(float(fps), rel=1e-4)
+
+
 def test_a_folder_has_the_pictures_of_the_film_and_their_times() -> None:
     made = render(write(scattered()), "-o", "pictures", "--by", "duration:0.1", "--no-stamp")
     with open("pictures/slices.csv", newline="") as file:
@@ -282,8 +291,8 @@ def test_what_is_there_is_kept_unless_told_otherwise() -> None:
         ("times of the frames", ["--by", "source"]),
         ("leave out one", ["--by", "count:5", "--speed", "2"]),
         ("less than 1 us", ["--speed", "1e-6"]),
-        ("above 0", ["--fps", "nan"]),
-        ("above 0", ["--speed", "nan"]),
+        ("from 0.01", ["--fps", "nan"]),
+        ("from 1e-06", ["--speed", "nan"]),
         ("from 0", ["--start", "nan"]),
         ("from 0", ["--stop", "nan"]),
         ("no frames", ["--with-frames"]),

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from vid2ev.formats.event_file import Recording
 
 BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
-SECONDS = click.FloatRange(0, max_open=True, max=1e9)
+SECONDS = click.FloatRange(0, 1e9)
 
 
 @click.command(short_help="Make a film or a picture of any event file.")
@@ -37,7 +37,7 @@ SECONDS = click.FloatRange(0, max_open=True, max=1e9)
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(0, 1000, min_open=True),
+    type=click.FloatRange(0.01, 1000),
     default=30,
     show_default=True,
     metavar="RATE",
@@ -45,7 +45,7 @@ SECONDS = click.FloatRange(0, max_open=True, max=1e9)
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(0, 1e6, min_open=True),
+    type=click.FloatRange(1e-6, 1e6),
     metavar="FACTOR",
     help="Of the film against reality; 0.1 is slow motion.  [default: 1]",
 )

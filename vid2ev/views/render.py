@@ -29,6 +29,7 @@ from vid2ev.views.window import beginning_us, window, with_frame_times
 
 VIEWS = {"polarity": "counts", "accumulated": "frame", "voxel": "voxel", "time-surface": "time-surface"}
 SIDE = 1280  # pixels
+RANGES = {"fps": (0.01, 1000), "speed": (1e-6, 1e6), "start": (0, 1e9), "stop": (0, 1e9), "size": (64, 8192)}
 
 Report = Callable[[Recording, int], object]
 Drawn = Iterator[tuple[Slice, np.ndarray]]
@@ -69,7 +70,8 @@ def render(
     output = Path(output)
     check_free(output, overwrite)
     _check_numbers(fps=fps, speed=speed, start=start_s, stop=stop_s, size=size)
-    slicing, kind = _slicing(by, fps, speed), _kind(view)
+    rate = Fraction(str(fps)).limit_denominator(10**6)  # films have no finer ones
+    slicing, kind = _slicing(by, rate, speed), _kind(view)
     file = open_events(events)
     zero_us = beginning_us(file)
     recording = _recording(file, zero_us, start_s, stop_s, frames)
@@ -82,7 +84,7 @@ def render(
     canvas = Canvas(kind, recording.size, size, shown, stamp=stamp, zero_us=zero_us, digits=6 if fine else 3)
     done = _Done(recording, report)
     arrays = represent(recording, slicing, canvas.view)
-    made = _write(output, canvas, arrays, done, Fraction(fps))
+    made = _write(output, canvas, arrays, done, rate)
     made_as = kind_of(output)
     asked = {"path": str(output), "kind": made_as, "view": view, "by": str(slicing), "fps": float(fps)}
     size_px = [side + side % 2 for side in canvas.size] if made_as == "mp4" else list(canvas.size)
@@ -121,19 +123,19 @@ class _Done:
 
 def _check_numbers(**options: float | None) -> None:
     for name, value in options.items():
-        least_in = name in ("start", "stop")
-        if value is not None and not (0 < value < 1e9 or (least_in and value == 0)):
-            raise UsageError(f"--{name} {value}: expected a number {'from' if least_in else 'above'} 0 to 1e9")
+        least, most = RANGES[name]
+        if value is not None and not least <= value <= most:
+            raise UsageError(f"--{name} {value}: expected a number from {least:g} to {most:g}")
 
 
-def _slicing(by: str | None, fps: float, speed: float | None) -> Slicing:
+def _slicing(by: str | None, fps: Fraction, speed: float | None) -> Slicing:
     if by is not None and speed is not None:
         raise UsageError(f"--by {by} says what a picture shows, and so does --speed {speed:g}; leave out one of them")
     if by is not None:
         return parse_slicing(by)
-    us = 10**6 * Fraction(str(speed or 1)) / Fraction(str(fps))
+    us = 10**6 * Fraction(str(speed or 1)) / fps
     if us < 1:
-        raise UsageError(f"--speed {speed} at {fps:g} pictures per second is less than 1 us for each; go faster")
+        raise UsageError(f"--speed {speed} at {float(fps):g} pictures per second is less than 1 us for each; go faster")
     return Duration(us)
 
 
