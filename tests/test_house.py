@@ -38,6 +38,7 @@ FLOORS = {
     "sensors": 4,
     "recipe": 5,
     "outputs": 5,
+    "reformat": 5,
     "conversion": 6,
     "": 7,  # vid2ev/__init__.py: the public names
     "commands": 8,

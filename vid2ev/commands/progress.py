@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from vid2ev.conversion import Progress
+    from vid2ev.formats.event_file import Recording
     from vid2ev.recipe import Recipe
 
-BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left{postfix}"
+EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
+FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left{postfix}"
 
 
 @contextmanager
@@ -83,7 +85,7 @@ def bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Pr
         check()
         if shown is None:
             total, first = recipe.source.frames_expected, done.frames - 1
-            shown = tqdm(total=total, initial=first, bar_format=BAR, leave=False, disable=quiet or None)
+            shown = tqdm(total=total, initial=first, bar_format=FRAMES, leave=False, disable=quiet or None)
         speed, video_s = done.seconds or 1.0, (done.end_ns - done.start_ns) / 1e9
         shown.set_postfix_str(f"{done.events / speed:,.0f} events/s, {video_s / speed:.2g} x real time", refresh=False)
         shown.update(done.frames - shown.n)
@@ -93,4 +95,24 @@ def bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Pr
     finally:
         if shown is not None:
             shown.refresh()
+            shown.close()
+
+
+@contextmanager
+def event_bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
+    """A progress bar on a terminal: events."""
+    from tqdm import tqdm
+
+    shown: tqdm | None = None
+
+    def report(recording: Recording, events: int) -> None:
+        nonlocal shown
+        if shown is None:
+            shown = tqdm(total=recording.count, bar_format=EVENTS, leave=False, disable=quiet or None, unit_scale=True)
+        shown.update(events - shown.n)
+
+    try:
+        yield report
+    finally:
+        if shown is not None:
             shown.close()

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from vid2ev.formats.event_file import Recording
+    pass
 
-BAR = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
 SECONDS = click.FloatRange(0, 1e9)
 
 
@@ -76,9 +73,10 @@ def render(events: str, output: Path | None, as_json: bool, quiet: bool, **optio
     all events from --start to --stop, or, with --by or without a window, of the slice with the most events.
     """
     from vid2ev.commands import summary
+    from vid2ev.commands.progress import event_bar
     from vid2ev.views.render import render as make
 
-    with _bar(quiet) as report:
+    with event_bar(quiet) as report:
         made = make(events, output or _default(events), report=report, **options)
     if as_json:
         click.echo(json.dumps(made, indent=2))
@@ -102,23 +100,3 @@ def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
         ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.6g} s"),
         *(("warning", text) for text in made["warnings"]),
     ]
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
-    """A progress bar on a terminal: events."""
-    from tqdm import tqdm
-
-    bar: tqdm | None = None
-
-    def report(recording: Recording, events: int) -> None:
-        nonlocal bar
-        if bar is None:
-            bar = tqdm(total=recording.count, bar_format=BAR, leave=False, disable=quiet or None, unit_scale=True)
-        bar.update(events - bar.n)
-
-    try:
-        yield report
-    finally:
-        if bar is not None:
-            bar.close()

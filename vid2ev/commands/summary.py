@@ -40,7 +40,7 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Events, duration and warnings, from a manifest."""
     counts = manifest["counts"]
     seconds, (width, height) = manifest["duration_us"] / 1e6, manifest["sensor"]["size"]
-    rate = f", {_short(counts['events'] / seconds)}/s, {counts['events'] / seconds / width / height:.3g}/s per pixel"
+    rate = f", {short(counts['events'] / seconds)}/s, {counts['events'] / seconds / width / height:.3g}/s per pixel"
     share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
     return [
         ("events", f"{counts['events']:,}{rate if seconds else ''}{share}"),
@@ -59,8 +59,9 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def file_facts(directory: Path) -> list[tuple[str, str]]:
     """The files of a recording."""
-    files = sorted(path for path in directory.iterdir() if path.is_file())
-    return [("files", f"{directory}: " + ", ".join(f"{path.name} {_bytes(path)}" for path in files))]
+    files = [f"{path.name} {_bytes(path)}" for path in sorted(directory.iterdir()) if path.is_file()]
+    folders = [f"{path.name}/ {len(list(path.iterdir())):,} files" for path in directory.iterdir() if path.is_dir()]
+    return [("files", f"{directory}: " + ", ".join(files + folders))]
 
 
 def source_text(source: Mapping[str, Any]) -> str:
@@ -80,14 +81,17 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     spread = (last - first) / 1e6 if count else 0.0
     share = f", {100 * facts['on'] / count:.1f} % ON" if count else ""
     found = [
-        ("events", f"{count:,}{share}{', ' + _short(count / spread) + '/s' if spread else ''}"),
+        ("events", f"{count:,}{share}{', ' + short(count / spread) + '/s' if spread else ''}"),
         ("size", "x".join(map(str, facts["size"])) if facts["size"] else "not stated"),
     ]
     if count:
         found.append(("time", f"{first} ... {last} us ({spread:.6f} s), counted from {facts['start_us']} us"))
     if facts["times_going_back"]:
         found.append(("order", f"times go back at {facts['times_going_back']:,} places"))
-    stored = [facts["format"], *(f"{key.replace('_', ' ')} {value}" for key, value in facts["stored"].items())]
+    stored = [
+        facts["format"],
+        *(f"{key.replace('_', ' ')} {value}" for key, value in facts["stored"].items() if not isinstance(value, dict)),
+    ]
     stored += [f"{facts['bytes'] / count:.2f} bytes per event"] if count else []
     stored += [f"with {name}" for name in ("labels", "frames") if facts[name]]
     return [*found, ("stored", ", ".join(stored)), *(("warning", text) for text in facts["warnings"])]
@@ -98,7 +102,8 @@ def _parts(upsampling: Mapping[str, Any], auto: str) -> str:
     return auto.format(upsampling["max_subframes"]) if parts == "auto" else f"in {parts} parts"
 
 
-def _short(number: float) -> str:
+def short(number: float) -> str:
+    """A number to three digits, in thousands, millions or billions, with a space before the unit to come."""
     for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
         if number >= size:
             return f"{number / size:.3g} {unit}"
@@ -106,4 +111,4 @@ def _short(number: float) -> str:
 
 
 def _bytes(path: Path) -> str:
-    return f"{_short(path.stat().st_size)}B"
+    return f"{short(path.stat().st_size)}B"

@@ -1,0 +1,151 @@
+"""reformat: every event of one format stands in the other, and a failure leaves what was there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from vid2ev import Events, UsageError, read_events
+from vid2ev.commands import main
+from vid2ev.formats import FORMATS, format_named, open_events
+from vid2ev.formats.event_file import Recording
+from vid2ev.reformat import format_of_suffix, reformat, writable
+
+SIZE = (320, 240)
+START_US = 5_000_000
+
+
+@pytest.fixture
+def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Two seconds of events with labels, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    t = START_US + np.sort(rng.integers(0, 2_000_000, 5000))
+    x, y = (rng.integers(0, side, 5000).astype(np.uint16) for side in SIZE)
+    p, label = (rng.integers(0, n, 5000).astype(np.uint8) for n in (2, 4))
+    events = Events(t, x, y, p, label)
+    write = format_named("hdf5").write
+    assert write is not None
+    write(Path("whole.h5"), Recording(SIZE, START_US, 2_000_000, 5000, lambda: iter([events]), labelled=True))
+    return Path("whole.h5")
+
+
+def columns(path: Path) -> list[list[int]]:
+    events = Events.concatenate(read_events(path))
+    return [column.tolist() for column in (events.t, events.x, events.y, events.p)]
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["reformat", *arguments])
+
+
+@pytest.mark.parametrize("name", [name for name in writable() if name not in ("ros1", "ros2")])
+def test_there_and_back(recording: Path, name: str) -> None:
+    there = Path(f"there{format_named(name).suffix}")
+    made = reformat(recording, there, name)
+    assert (made["format"], made["events"], made["size"]) == (name, 5000, list(SIZE))
+    assert made["bytes"] == there.stat().st_size
+    back = Path("back.h5")
+    reformat(there, back)
+    t, *rest = columns(recording)
+    shift = 0 if "start" in format_named(name).keeps else columns(back)[0][0] - t[0]
+    assert columns(back) == [[at + shift for at in t], *rest]
+    assert {path.name for path in Path().iterdir()} == {"whole.h5", there.name, "back.h5"}
+    lost = [] if "labels" in format_named(name).keeps else ["labels"]
+    assert [text for text in made["warnings"] if "left out" in text] == [
+        f"{name} does not hold {what}; they are left out" for what in lost
+    ]
+
+
+def test_the_suffix_says_the_format() -> None:
+    for name in writable():
+        kind = format_of_suffix(Path(f"any{format_named(name).suffix.upper()}"))
+        assert kind.suffix == format_named(name).suffix
+    assert format_of_suffix(Path("a.h5")).name == "hdf5" and format_of_suffix(Path("a.raw")).name == "evt3"
+    with pytest.raises(UsageError, match="suffix of no format"):
+        format_of_suffix(Path("a.mp4"))
+
+
+def test_a_part(recording: Path) -> None:
+    assert run(str(recording), "part.csv", "--start", "0.5", "--stop", "1.5").exit_code == 0
+    t = np.array(columns(recording)[0])
+    kept = t[(t >= START_US + 500_000) & (t <= START_US + 1_500_000)]
+    assert columns(Path("part.csv"))[0] == kept.tolist()
+
+
+def test_json_and_a_summary(recording: Path) -> None:
+    found = json.loads(run(str(recording), "one.npz", "--json").stdout)
+    assert found["events"] == 5000 and found["files"] == ["one.npz"]
+    assert "5,000" in run(str(recording), "two.npz").stdout
+
+
+def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> None:
+    t = np.array([0, 2**32 - 1, 2**32, 2**33 + 5])
+    x = np.arange(4, dtype=np.uint16)
+    events = Events(t, x, x, (x & 1).astype(np.uint8))
+    write = format_named("hdf5").write
+    assert write is not None
+    write(Path("long.h5"), Recording((4, 4), 0, int(t[-1]), 4, lambda: iter([events])))
+    made = reformat("long.h5", "long.dat")
+    assert made["files"] == ["long.dat", "long_1.dat", "long_2.dat"]
+    assert columns(Path("long.dat"))[0] == t.tolist()
+    with pytest.raises(UsageError, match="exists"):
+        reformat("long.h5", "long_1.dat")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "exit_code", "sentence"),
+    [
+        (["missing.raw", "out.h5"], 1, "no such file"),
+        (["whole.h5", "out.xyz"], 2, "suffix"),
+        (["whole.h5", "out.es", "--format", "es"], 2, "only read"),
+        (["whole.h5", "out.es", "--format", "evt9"], 2, "expected one of"),
+        (["whole.h5", "whole.h5"], 2, "--overwrite"),
+        (["whole.h5", "out.h5", "--start", "3", "--stop", "2"], 2, "after the start"),
+        (["noise.raw", "out.h5"], 1, "no event file"),
+        (["whole.h5", "whole.h5/out.h5"], 1, "cannot be written"),
+        (["wide.h5", "out.raw"], 2, "cannot hold 4000x3 pixels, at most 2048x2048; choose --format hdf5"),
+        (["long.h5", "out.h5", "--format", "v2e-hdf5"], 2, "minutes"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_one_sentence(recording: Path, arguments: list[str], exit_code: int, sentence: str) -> None:
+    Path("noise.raw").write_bytes(np.random.default_rng(0).bytes(5000))
+    one = np.array([0], np.uint16)
+    write = format_named("hdf5").write
+    assert write is not None
+    for name, size, t in (("wide.h5", (4000, 3), 0), ("long.h5", (1, 1), 2**33)):
+        events = Events(np.array([t]), one, one, one.astype(np.uint8))
+        write(Path(name), Recording(size, 0, t, 1, lambda events=events: iter([events])))
+    before = {path.name for path in Path().iterdir()}
+    result = run(*arguments)
+    assert result.exit_code == exit_code and sentence in result.stderr, result.output
+    assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
+    assert {path.name for path in Path().iterdir()} == before
+
+
+def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reformat(recording, "out.csv")
+    before = Path("out.csv").read_bytes()
+
+    def full(path: Path, recording: Recording) -> None:
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    kind = format_named("csv")
+    monkeypatch.setattr("vid2ev.reformat.format_named", lambda name: type(kind)(**{**vars(kind), "write": full}))
+    result = run(str(recording), "out.csv", "--format", "csv", "--overwrite")
+    assert result.exit_code == 1 and "No space left" in result.stderr
+    assert Path("out.csv").read_bytes() == before and {path.name for path in Path().iterdir()} == {
+        "whole.h5",
+        "out.csv",
+    }
+
+
+def test_every_format_that_is_read_can_be_named() -> None:
+    assert all(format_named(name).open for name in FORMATS)
+    assert open_events.__doc__

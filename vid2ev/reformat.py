@@ -1,0 +1,131 @@
+"""Event files of one format into another: every event, at its own microsecond."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import FORMATS, check_holds, format_named, open_events, survey
+from vid2ev.formats.event_file import Format, Recording
+from vid2ev.recording.disk import sync
+from vid2ev.stream.events import Events
+from vid2ev.views.window import beginning_us, window
+
+KEPT = ("labels", "frames")  # what events may have beside t, x, y, p
+
+Report = Callable[[Recording, int], object]
+
+
+def reformat(
+    source: str | Path,
+    target: str | Path,
+    name: str | None = None,
+    *,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    overwrite: bool = False,
+    report: Report | None = None,
+) -> dict[str, Any]:
+    """Write an event file anew in another format; `target` is there as a whole or not at all.
+
+    source           an event file of any format, or a recording's folder
+    target           the file to make; DAT makes more of them where one cannot hold the times
+    name             of the format; by default what the suffix of target says
+    start_s, stop_s  the part to take [s after the beginning]
+    report           called with the recording and the number of events done
+
+    Returns what was made, ready for JSON.  Raises UsageError for what a format cannot hold and for a target that is
+    taken, DataError for a source that cannot be read and a target that cannot be written.
+    """
+    target = Path(target)
+    kind = format_named(name) if name else format_of_suffix(target)
+    if kind.write is None:
+        raise UsageError(f"format '{kind.name}' is only read; expected one of {', '.join(writable())}")
+    if target.exists() and not overwrite:
+        raise UsageError(f"{target} exists; --overwrite replaces it")
+    file = open_events(source)
+    recording = survey(file) if start_s is None and stop_s is None else _part(file, start_s, stop_s)
+    check_holds(kind, recording.size, recording.duration_us)
+    made = _write(target, kind, _reported(recording, report), overwrite)
+    had = {"labels": recording.labelled, "frames": recording.frames is not None}
+    lost = [what for what in KEPT if had[what] and what not in kind.keeps]
+    return {
+        "source": str(source),
+        "path": str(target),
+        "format": kind.name,
+        "files": [str(path) for path in made],
+        "events": recording.count,
+        "size": list(recording.size),
+        "size_stated": file.size is not None,
+        "start_us": recording.start_us,
+        "duration_us": recording.duration_us,
+        "bytes": sum(path.stat().st_size for path in made),
+        "warnings": file.warnings + [f"{kind.name} does not hold {what}; they are left out" for what in lost],
+    }
+
+
+def writable() -> list[str]:
+    """The names of formats that are written."""
+    return [name for name in FORMATS if format_named(name).write]
+
+
+def format_of_suffix(path: Path) -> Format:
+    """The format that a file's name asks for: the first of that suffix; raises UsageError."""
+    kinds = [format_named(name) for name in writable()]
+    for kind in kinds:
+        if kind.suffix == path.suffix.lower():
+            return kind
+    raise UsageError(f"{path}: '{path.suffix}' is the suffix of no format; give one of {', '.join(writable())}")
+
+
+def _part(file: Any, start_s: float | None, stop_s: float | None) -> Recording:
+    first_us = beginning_us(file)
+    start_us = first_us + round(1e6 * (start_s or 0))
+    stop_us = None if stop_s is None else first_us + round(1e6 * stop_s)
+    if stop_us is not None and stop_us <= start_us:
+        raise UsageError(f"stop {stop_s} s: expected a time after the start at {start_s or 0} s")
+    return window(file, start_us, stop_us)
+
+
+def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) -> list[Path]:
+    """The files of a recording, made beside their place and moved there when they are whole."""
+    assert kind.write is not None
+    beside = target.with_name(f".{target.name}.new")
+    try:
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir(parents=True)
+        kind.write(beside / target.name, recording)
+        made = sorted(beside.iterdir())
+        taken = [path.name for path in made if (target.parent / path.name).exists()]
+        if taken and not overwrite:
+            raise UsageError(f"{target.parent / taken[0]} exists; --overwrite replaces it")
+        for path in made:
+            sync(path)
+        places = [path.replace(target.parent / path.name) for path in made]
+        sync(target.absolute().parent)
+    except OSError as error:
+        if isinstance(error, DataError):
+            raise
+        reason = error.strerror or str(error)
+        raise DataError(f"{target} cannot be written: {reason}; make room or access there") from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return places
+
+
+def _reported(recording: Recording, report: Report | None) -> Recording:
+    """The recording, telling how many events were taken from it."""
+
+    def blocks() -> Iterator[Events]:
+        done = 0
+        for events in recording.blocks():
+            yield events
+            done += len(events)
+            if report is not None:
+                report(recording, done)
+
+    return replace(recording, blocks=blocks)
