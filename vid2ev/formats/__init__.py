@@ -35,6 +35,7 @@ FORMATS = {
     "hdf5": "vid2ev.formats.hdf5",
     "aedat4": "vid2ev.formats.aedat4",
     "aedat3": "vid2ev.formats.aedat3",
+    "ros1": "vid2ev.formats.ros1",
     "evt3": "vid2ev.formats.evt3",
     "evt2": "vid2ev.formats.evt2",
     "dat": "vid2ev.formats.dat",

@@ -30,8 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.aedat4_writer import EVENT, MAGIC, PACKET, START, write_events
-from vid2ev.formats.blocks import in_blocks
-from vid2ev.formats.event_file import BLOCK, Format, Picture, within
+from vid2ev.formats.event_file import BLOCK, Format, Picture, regrouped, within
 from vid2ev.formats.flatbuffers import Table
 from vid2ev.stream.events import Events
 
@@ -85,7 +84,7 @@ class Aedat4Events:
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         """The events with start_us <= t < stop_us."""
-        yield from within(in_blocks(map(_columns, self._raw_events()), block), start_us, stop_us)
+        return regrouped(within(map(_columns, self._raw_events()), start_us, stop_us), block)
 
     def frames(self) -> Iterator[Picture]:
         """The frames; those of more than 8 bits are cut to 8."""

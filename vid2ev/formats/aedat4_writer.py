@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.formats.event_file import Picture, Recording
+from vid2ev.formats.event_file import Picture, Recording, promised
 
 MAGIC = b"#!AER-DAT4.0\r\n"
 EVENT = np.dtype(
@@ -58,23 +58,17 @@ def write_events(path: Path, recording: Recording) -> None:
 def _by_time(recording: Recording, pictures: Iterator[Picture]) -> Iterator[np.ndarray | Picture]:
     """The events, as they are stored, and the pictures, each picture after the last event up to its instant."""
     picture = next(pictures, None)
-    count, last_us = 0, recording.start_us
-    for block in recording.blocks():
-        if len(block) and (block.t[0] < last_us or np.any(block.t[1:] < block.t[:-1])):
-            raise ValueError(f"events out of order of time after event {count}")
+    for _, block in promised(recording):
         stored = np.zeros(len(block), EVENT)
         for name in "txyp":
             stored[name] = getattr(block, name)
         at = 0
-        while picture is not None and len(block) and picture.t_us < block.t[-1]:
+        while picture is not None and picture.t_us < block.t[-1]:
             until = int(np.searchsorted(block.t, picture.t_us, side="right"))
             yield stored[at:until]
             yield picture
             at, picture = until, next(pictures, None)
         yield stored[at:]
-        count, last_us = count + len(block), int(block.t[-1]) if len(block) else last_us
-    if count != recording.count:
-        raise ValueError(f"{count} events, {recording.count} announced")
     while picture is not None:
         yield picture
         picture = next(pictures, None)

@@ -1,0 +1,210 @@
+"""The events of a bag of ROS, of whichever version: what is in which message, and at what time.
+
+Of topics with events the first is read.  Times of `dvs_msgs/EventArray` are absolute.  In an `EventPacket` they are
+those of the sensor, as its encoding says:
+
+    evt3     words of EVT3 (`evt3_words.py`); time_base means nothing, times count from the first wrap of the words
+    mono     uint64: [0:32] t [ns] from time_base, [32:48] x, [48:63] y, [63] p
+    libcaer  uint32: [1] p, [2:17] y, [17:32] x; int32 t [us] from time_base [ns]
+
+What is written is an EventArray for each 10 ms with events.  The stamp of the first is the instant from which the
+recording counts; that of the others is their first event.  Cameras stamp as they like: a stamp after the first event,
+or more than a day before it, is not taken for that instant, but the first event is.
+
+Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_codecs
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.event_file import BLOCK, Picture, Recording, promised, regrouped, stretch, within
+from vid2ev.formats.evt_state import Left, State
+from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
+from vid2ev.formats.rosbag import Topic
+from vid2ev.stream.events import Events
+
+EVENTS_TOPIC, IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"
+WINDOW_US = 10_000  # of a message
+DAY_US = 24 * 3600 * 10**6
+LAST_US = 10**6 << 31  # stamps of ROS 2 end in 2038
+
+
+class Bag(Protocol):
+    """A bag, of whichever version."""
+
+    cdr: bool  # how its messages are stored
+    topics: list[Topic]
+    warnings: list[str]
+
+    def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes]]:
+        """The messages of topics, each with its topic's name, in the order in which they were recorded."""
+
+
+class RosEvents:
+    """The events and images of a bag.
+
+    Raises DataError for a file that is not there, has no topic of events, or is damaged.
+    """
+
+    labelled = False
+
+    def __init__(self, path: Path, open_bag: Callable[[Path], Bag]):
+        self.path = path
+        with self._readable():
+            self._bag = open_bag(path)
+            self.warnings = self._bag.warnings
+            events = [topic for topic in self._bag.topics if KINDS.get(topic.type) in ("array", "packet")]
+            if not events:
+                raise DataError(f"{path} has no topic of events; expected one of type dvs_msgs/EventArray or the like")
+            if len(events) > 1:
+                self.warnings.append(f"{path} has {len(events)} topics of events; only {events[0].name} is read")
+            self._topic = events[0]
+            self._images = _nearest([t for t in self._bag.topics if KINDS.get(t.type) == "image"], self._topic)
+            self.has_frames = self._images is not None
+            self.size: tuple[int, int] | None = None
+            self._encoding: str | None = None
+            self.start_us = 0
+            self._look()
+
+    def describe(self) -> dict[str, Any]:
+        """Topics and encoding."""
+        images = self._images.name if self._images else None
+        return {"topic": self._topic.name, "type": self._topic.type, "encoding": self._encoding, "images": images}
+
+    def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
+        """The events with start_us <= t < stop_us."""
+        return regrouped(within(self._decoded(), start_us, stop_us), block)
+
+    def frames(self) -> Iterator[Picture]:
+        """The images of the topic next to that of the events."""
+        with self._readable():
+            for _, content in self._bag.messages([self._images.name] if self._images else []):
+                yield image(content, self._bag.cdr)
+
+    def _look(self) -> None:
+        """Size, start and encoding, from the first messages."""
+        stamp_us = None
+        for message in self._messages():
+            self.size = self.size or (message.size if min(message.size) > 0 else None)
+            if isinstance(message, EventPacket):
+                self._encoding = message.encoding
+                break
+            stamp_us = message.stamp_us if stamp_us is None else stamp_us
+            if len(message.events):
+                break
+        if self._encoding == "evt3":
+            return
+        first = next((int(events.t[0]) for events in self._decoded() if len(events)), stamp_us or 0)
+        near = stamp_us is not None and first - DAY_US <= stamp_us <= first
+        self.start_us = stamp_us if near and stamp_us is not None else first
+
+    def _messages(self) -> Iterator[EventArray | EventPacket]:
+        decode = event_array if KINDS[self._topic.type] == "array" else event_packet
+        for _, content in self._bag.messages([self._topic.name]):
+            yield decode(content, self._bag.cdr)
+
+    def _decoded(self) -> Iterator[Events]:
+        with self._readable():
+            decoder = _Evt3(self.size or (1 << 11, 1 << 11))
+            for message in self._messages():
+                if isinstance(message, EventArray):
+                    yield message.events
+                elif message.encoding == "evt3":
+                    yield decoder.events(message.content)
+                else:
+                    yield _unpacked(message, self.path)
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Every way in which the bag is not one becomes a DataError."""
+        try:
+            yield
+        except DataError:
+            raise
+        except (OSError, ValueError, MemoryError) as error:
+            raise DataError(
+                f"{self.path} cannot be read as a bag: it is cut short or damaged; make it again or get another copy"
+            ) from error
+
+
+def _nearest(images: list[Topic], events: Topic) -> Topic | None:
+    """The topic whose name begins like that of the events."""
+    beside = [topic for topic in images if topic.name.split("/")[:-1] == events.name.split("/")[:-1]]
+    return (beside or images or [None])[0]  # type: ignore[list-item]
+
+
+class _Evt3:
+    """Words of EVT3, decoded from packet to packet."""
+
+    def __init__(self, size: tuple[int, int]):
+        self.size = size
+        self.state = np.full(len(State), -1, np.int64)
+        self.left = np.zeros(len(Left), np.int64)
+
+    def events(self, content: bytes) -> Events:
+        from vid2ev.formats.evt3_words import decode
+
+        words = np.frombuffer(content, "<u2", len(content) // 2)
+        room = 12 * len(words) + 12
+        t, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
+        p = np.empty(room, np.uint8)
+        _, found = decode(self.state, self.left, 0, words, *self.size, t, x, y, p)
+        return Events(t[:found].copy(), x[:found].copy(), y[:found].copy(), p[:found].copy())
+
+
+def _unpacked(packet: EventPacket, path: Path) -> Events:
+    """The events of a packet of 8 bytes each."""
+    words = np.frombuffer(packet.content, "<u8", len(packet.content) // 8)
+    low, high = words & 0xFFFFFFFF, words >> 32
+    if packet.time_base_ns >> 63:
+        raise ValueError("a time beyond 2262")
+    if packet.encoding == "mono":
+        t = (packet.time_base_ns + low.astype(np.int64)) // 1000
+        return Events(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
+    if packet.encoding == "libcaer":
+        after = high.astype(np.int64)
+        # The time of libcaer has 31 bits: where it goes back, it has begun anew.
+        after[1:] += np.cumsum(after[1:] < after[:-1]) << 31
+        return Events(packet.time_base_ns // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
+    raise DataError(
+        f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, mono or libcaer, so convert it with"
+        " event_camera_tools first"
+    )
+
+
+def outgoing(recording: Recording) -> Iterator[EventArray | Picture]:
+    """What a bag of a recording holds, in order of time.  Raises UsageError for what no message can hold."""
+    end_us = recording.start_us + recording.duration_us
+    if recording.start_us < 0 or end_us >= LAST_US:
+        raise UsageError(f"times from {recording.start_us} to {end_us} us: ROS has 0 to 2^31 s; choose --format hdf5")
+    pictures = recording.frames() if recording.frames else iter(())
+    picture = next(pictures, None)
+    stamp_us: int | None = recording.start_us
+    for events in _windows(recording):
+        while picture is not None and picture.t_us <= events.t[-1]:
+            yield picture
+            picture = next(pictures, None)
+        yield EventArray(recording.size, int(events.t[0]) if stamp_us is None else stamp_us, events)
+        stamp_us = None
+    if stamp_us is not None:
+        yield EventArray(recording.size, stamp_us, Events.empty())
+    while picture is not None:
+        yield picture
+        picture = next(pictures, None)
+
+
+def _windows(recording: Recording) -> Iterator[Events]:
+    """The events of each 10 ms that have any."""
+    for t, events in promised(recording):
+        window = t // WINDOW_US
+        cuts = [0, *(np.flatnonzero(np.diff(window)) + 1).tolist(), len(events)]
+        for first, last in pairwise(cuts):
+            yield stretch(events, first, last)

@@ -1,0 +1,264 @@
+"""Bags of ROS 1: the container, whatever its messages are.
+
+    #ROSBAG V2.0 LF
+    record    uint32 length, header, uint32 length, data; a header is fields of uint32 length, name, "=", value
+    op  3     of the bag: index_pos (0: it was never closed), conn_count, chunk_count; padded to 4096 bytes
+        5     chunk: compression (none, bz2, lz4), size; its data are records 7 and 2
+        7     connection: conn, topic; its data is a header again: type, md5sum, message_definition
+        2     message: conn, time; its data is the message
+        4, 6  where messages are in the chunk before it, and where chunks are
+    At index_pos all connections stand again, and then all records 6.
+
+A bag is read and written from front to back, one chunk at a time: memory does not grow with its length, and a bag whose
+recording was interrupted is read up to there.  (rosbags, which keeps an entry for each message, does neither.)
+
+Source: https://wiki.ros.org/Bags/Format/2.0
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+MAGIC = b"#ROSBAG V2.0\n"
+BAG, CHUNK, CONNECTION, MESSAGE, INDEX, CHUNK_INFO = 3, 5, 7, 2, 4, 6
+HEADER_SIZE = 4096  # bytes of the bag's own record
+CHUNK_SIZE = 768 << 10  # bytes of messages after which a chunk is written, as `rosbag record` does
+LARGEST = 1 << 28  # bytes of a chunk
+FIRST = 64  # chunks in which connections are looked for where there is no index
+U32 = struct.Struct("<I")
+
+Header = dict[bytes, bytes]
+Record = tuple[int, Header, bytes]  # op, header, data
+
+
+@dataclass(frozen=True)
+class Topic:
+    """What messages of which type are published under."""
+
+    name: str
+    type: str
+    md5: str = ""
+    definition: str = ""
+
+
+class BagReader:
+    """A bag and its messages.  Whatever is wrong with it is an OSError or a ValueError."""
+
+    cdr = False
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.warnings: list[str] = []
+        self._index_at = -1
+        with open(path, "rb") as file:
+            self._index_at = _number(self._start(file), b"index_pos", 8)
+            if self._index_at:
+                file.seek(self._index_at)
+                found = list(self._records(file))
+            else:
+                chunks = (record for record in self._records(file) if record[0] == CHUNK)
+                found = [inner for _, header, data in islice(chunks, FIRST) for inner in _inside(header, data)]
+        self.topics = list(dict.fromkeys(_topic(header, data) for op, header, data in found if op == CONNECTION))
+
+    def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes]]:
+        """The messages of topics, each with its topic's name, in the order in which they were recorded."""
+        wanted: dict[int, str] = {}
+        with open(self.path, "rb") as file:
+            self._start(file)
+            for kind, outer, content in self._records(file):
+                for op, header, data in _inside(outer, content) if kind == CHUNK else ():
+                    number = _number(header, b"conn", 4)
+                    if op == CONNECTION and (name := _topic(header, data).name) in names:
+                        wanted[number] = name
+                    elif op == MESSAGE and number in wanted:
+                        yield wanted[number], data
+
+    def _start(self, file: BinaryIO) -> Header:
+        """The record of the bag, after which the file stands."""
+        if file.read(len(MAGIC)) != MAGIC:
+            raise ValueError("no bag of version 2.0")
+        op, header, _ = next(self._records(file), (0, {}, b""))
+        if op != BAG:
+            raise ValueError("a bag without its header")
+        return header
+
+    def _records(self, file: BinaryIO) -> Iterator[Record]:
+        """The records from here on; the data of those that are no chunks or connections are passed over."""
+        at = file.tell()
+        left = file.seek(0, 2) - at
+        file.seek(at)
+        try:
+            while left > 0:
+                header = _fields(file.read(length := _length(file.read(4), left - 4)))
+                left -= 4 + length
+                length = _length(file.read(4), left - 4)
+                left -= 4 + length
+                op = _number(header, b"op", 1)
+                data = file.read(length) if op in (CHUNK, CONNECTION) else b""
+                file.seek(0 if data else length, 1)
+                yield op, header, data
+        except EOFError:
+            if self._index_at:
+                raise ValueError("a record leaves the bag") from None
+            text = f"{self.path}: the recording was interrupted; {left} bytes at its end are left out"
+            self.warnings += [] if text in self.warnings else [text]
+
+
+def _length(stored: bytes, most: int) -> int:
+    """The length that is stored; raises EOFError if so much is not there."""
+    length = int.from_bytes(stored, "little")
+    if len(stored) < 4 or length > most:
+        raise EOFError
+    if length > LARGEST:
+        raise ValueError("a record is too large")
+    return length
+
+
+def _fields(stored: bytes) -> Header:
+    """The fields of a header."""
+    found, at = {}, 0
+    while at < len(stored):
+        length = int.from_bytes(stored[at : at + 4], "little")
+        name, is_field, value = stored[at + 4 : at + 4 + length].partition(b"=")
+        if not is_field or at + 4 + length > len(stored):
+            raise ValueError("a header that has no fields")
+        found[name] = value
+        at += 4 + length
+    return found
+
+
+def _number(header: Header, name: bytes, length: int) -> int:
+    value = header.get(name, b"")
+    if len(value) != length:
+        raise ValueError(f"a record without its {name.decode()}")
+    return int.from_bytes(value, "little")
+
+
+def _topic(header: Header, data: bytes) -> Topic:
+    inner = _fields(data)
+    name, kind = header.get(b"topic", b""), inner.get(b"type", b"")
+    return Topic(name.decode("utf-8", "replace"), kind.decode("utf-8", "replace"))
+
+
+def _inside(header: Header, data: bytes) -> Iterator[Record]:
+    """The records of a chunk."""
+    content = _decompressed(header, data)
+    at = 0
+    while at < len(content):
+        parts = []
+        for _ in range(2):
+            length = int.from_bytes(content[at : at + 4], "little")
+            parts.append(content[at + 4 : at + 4 + length])
+            at += 4 + length
+        if at > len(content):
+            raise ValueError("a record leaves its chunk")
+        inner = _fields(parts[0])
+        yield _number(inner, b"op", 1), inner, parts[1]
+
+
+def _decompressed(header: Header, data: bytes) -> bytes:
+    compression, size = header.get(b"compression"), _number(header, b"size", 4)
+    if size > LARGEST:
+        raise ValueError("a chunk is too large")
+    if compression == b"bz2":
+        data = bz2.BZ2Decompressor().decompress(data, size + 1)
+    elif compression == b"lz4":
+        import lz4.frame
+
+        try:
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+        except (RuntimeError, EOFError) as error:
+            raise ValueError("a chunk cannot be decompressed") from error
+    elif compression != b"none":
+        raise ValueError(f"compression {compression!r}")
+    if len(data) != size:
+        raise ValueError("a chunk of another size than it says")
+    return data
+
+
+class BagWriter:
+    """A bag that is being written; `close` makes it whole."""
+
+    def __init__(self, path: Path, topics: Sequence[Topic]):
+        self._file = open(path, "wb")  # noqa: SIM115 (closed in `close`)
+        self._topics = topics
+        self._chunk = bytearray()
+        self._places: dict[int, list[tuple[bytes, int]]] = {}  # of each connection's messages in the chunk
+        self._infos: list[bytes] = []
+        self._file.write(MAGIC + self._bag_record(0))
+
+    def write(self, topic: Topic, t_ns: int, message: bytes) -> None:
+        """Add a message; times never go back."""
+        number, time = self._topics.index(topic), struct.pack("<II", *divmod(t_ns, 10**9))
+        if not self._chunk and not self._infos:
+            self._chunk += b"".join(map(self._connection, range(len(self._topics))))
+        self._places.setdefault(number, []).append((time, len(self._chunk)))
+        self._chunk += _record(MESSAGE, {"conn": U32.pack(number), "time": time}, message)
+        if len(self._chunk) > CHUNK_SIZE:
+            self._write_chunk()
+
+    def close(self) -> None:
+        """Write what is left, the index, and where it is."""
+        if self._chunk:
+            self._write_chunk()
+        index_at = self._file.tell()
+        for number in range(len(self._topics)):
+            self._file.write(self._connection(number))
+        self._file.writelines(self._infos)
+        self._file.seek(len(MAGIC))
+        self._file.write(self._bag_record(index_at))
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
+        self._file.close()
+
+    def _write_chunk(self) -> None:
+        chunk_at, times = (
+            self._file.tell(),
+            [struct.unpack("<II", time) for at in self._places.values() for time, _ in at],
+        )
+        self._file.write(_record(CHUNK, {"compression": b"none", "size": U32.pack(len(self._chunk))}, self._chunk))
+        for number, places in self._places.items():
+            header = {"ver": U32.pack(1), "conn": U32.pack(number), "count": U32.pack(len(places))}
+            self._file.write(_record(INDEX, header, b"".join(time + U32.pack(at) for time, at in places)))
+        counts = b"".join(struct.pack("<II", number, len(places)) for number, places in self._places.items())
+        header = {
+            "ver": U32.pack(1),
+            "chunk_pos": struct.pack("<Q", chunk_at),
+            "start_time": struct.pack("<II", *min(times)),
+            "end_time": struct.pack("<II", *max(times)),
+            "count": U32.pack(len(self._places)),
+        }
+        self._infos.append(_record(CHUNK_INFO, header, counts))
+        self._chunk, self._places = bytearray(), {}
+
+    def _connection(self, number: int) -> bytes:
+        topic = self._topics[number]
+        inner = {"topic": topic.name, "type": topic.type, "md5sum": topic.md5, "message_definition": topic.definition}
+        data = _header({name: value.encode() for name, value in inner.items()})
+        return _record(CONNECTION, {"conn": U32.pack(number), "topic": topic.name.encode()}, data)
+
+    def _bag_record(self, index_at: int) -> bytes:
+        header = {
+            "index_pos": struct.pack("<Q", index_at),
+            "conn_count": U32.pack(len(self._topics) if index_at else 0),
+            "chunk_count": U32.pack(len(self._infos)),
+        }
+        return _record(BAG, header, b" " * (HEADER_SIZE - len(_record(BAG, header, b""))))
+
+
+def _header(fields: dict[str, bytes]) -> bytes:
+    stored = (name.encode() + b"=" + value for name, value in fields.items())
+    return b"".join(U32.pack(len(field)) + field for field in stored)
+
+
+def _record(op: int, header: dict[str, bytes], data: bytes | bytearray) -> bytes:
+    stored = _header({"op": bytes([op]), **header})
+    return b"".join([U32.pack(len(stored)), stored, U32.pack(len(data)), data])
