@@ -36,6 +36,7 @@ FORMATS = {
     "aedat4": "vid2ev.formats.aedat4",
     "aedat3": "vid2ev.formats.aedat3",
     "ros1": "vid2ev.formats.ros1",
+    "ros2": "vid2ev.formats.ros2",
     "evt3": "vid2ev.formats.evt3",
     "evt2": "vid2ev.formats.evt2",
     "dat": "vid2ev.formats.dat",
@@ -170,9 +171,10 @@ def _opened(path: str | Path) -> tuple[Format, EventFile]:
 
 
 def _within(folder: Path) -> Path:
-    """The event file of a recording's folder: the first of `FORMATS` that is there."""
+    """The event file of a recording's folder: the first of `FORMATS` that is there; or what tells a bag of ROS 2."""
     for name in FORMATS:
         path = folder / f"events{format_named(name).suffix}"
         if path.exists():
             return path
-    return folder / "events.h5"
+    bag = folder / "metadata.yaml"
+    return bag if bag.exists() else folder / "events.h5"

@@ -1,7 +1,8 @@
 """Bags of ROS 1: events as dvs_msgs/EventArray on /dvs/events, frames as sensor_msgs/Image on /dvs/image_raw.
 
-`rosbag.py` has the container, `ros_messages.py` the messages, `ros_events.py` what is in which message.  Bags are
-written without compression, as `rosbag record` does; the time of a message is that of its last event.
+`rosbag.py` and `rosbag_writer.py` have the container, `ros_messages.py` has the messages, `ros_events.py` says what is in
+which message.  Bags are written without compression, as `rosbag record` does; the time of a message is that of its last
+event.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from pathlib import Path
 from vid2ev.formats.event_file import Format, Picture, Recording
 from vid2ev.formats.ros_events import EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
 from vid2ev.formats.ros_messages import event_array_bytes, image_bytes
-from vid2ev.formats.rosbag import MAGIC, BagReader, BagWriter, Topic
+from vid2ev.formats.rosbag import MAGIC, BagReader, Topic
+from vid2ev.formats.rosbag_writer import BagWriter
 
 HEADER = "std_msgs/Header header\n"
 RULE = "=" * 80 + "\n"
