@@ -1,8 +1,8 @@
 """Bags of ROS 1: events as dvs_msgs/EventArray on /dvs/events, frames as sensor_msgs/Image on /dvs/image_raw.
 
-`rosbag.py` and `rosbag_writer.py` have the container, `ros_messages.py` has the messages, `ros_events.py` says what is in
-which message.  Bags are written without compression, as `rosbag record` does; the time of a message is that of its last
-event.
+`rosbag.py` and `rosbag_writer.py` have the container, `ros_messages.py` has the messages, `ros_events.py` says what is
+in which message.  Bags are written without compression, as `rosbag record` does; the time of a message is that of its
+last event.
 """
 
 from __future__ import annotations
