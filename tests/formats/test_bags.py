@@ -171,7 +171,7 @@ def test_what_a_camera_recorded_is_read(name: str) -> None:
 
 
 def packet_bag(folder: Path, kind: str, encoding: str, packets: list[tuple[int, bytes]], topics: int = 1) -> Path:
-    """A bag of event_camera_msgs by rosbags: (time base [ns], content) of each packet."""
+    """A bag of event_camera_msgs by rosbags: (time base, content) of each packet."""
     types, name = types_of(kind), "event_camera_msgs/msg/EventPacket"
     time, header, packet = (types.types[key] for key in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", name))
     path = folder / ("camera.bag" if kind == "ros1" else "camera")
@@ -179,11 +179,11 @@ def packet_bag(folder: Path, kind: str, encoding: str, packets: list[tuple[int, 
     with bag:
         connections = [bag.add_connection(f"/cam{k}/events", name, typestore=types) for k in range(topics)]
         for connection in connections:
-            for number, (base_ns, content) in enumerate(packets):
+            for number, (base, content) in enumerate(packets):
                 head = {"seq": number} if kind == "ros1" else {}
                 stamp = header(**head, stamp=time(sec=5, nanosec=6), frame_id="camera")
                 data = np.frombuffer(content, np.uint8)
-                message = packet(stamp, 480, 640, number, base_ns, encoding, False, data)
+                message = packet(stamp, 480, 640, number, base, encoding, False, data)
                 serialise: Callable = types.serialize_ros1 if kind == "ros1" else types.serialize_cdr
                 bag.write(connection, 10**9 + number, bytes(serialise(message, name)))
     return path
@@ -207,6 +207,17 @@ def test_the_time_of_libcaer_begins_anew_within_a_packet(tmp_path: Path, kind: s
     (events,) = read_events(path)
     assert (events.t - 10**6).tolist() == [2**31 - 1, 2**31, 2**31 + 9]
     assert (events.x.tolist(), events.y.tolist(), events.p.tolist()) == ([7] * 3, [5] * 3, [1, 0, 1])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_words_of_libcaer_begin_anew_in_time_but_not_in_place(tmp_path: Path, kind: str) -> None:
+    first = np.array([0x0001, 0x1002, 0x2003, 0x3804, 0x1005, 0x480A, 0x5081, 0x5001, 0x6FFF], "<u2")
+    second = np.array([0x1001, 0x3005, 0x5080], "<u2")
+    path = packet_bag(tmp_path, kind, "libcaer_cmp", [(10**6, first.tobytes()), (2 * 10**6, second.tobytes())])
+    events = Events.concatenate(read_events(path))
+    assert events.t.tolist() == [1_004_098, 1_004_101, 1_004_101, 1_004_101, 2_000_001, 2_000_001]
+    assert (events.x.tolist(), events.y.tolist()) == ([3] * 6, [4, 10, 17, 18, 5, 33])
+    assert events.p.tolist() == [1, 1, 1, 1, 0, 1]
 
 
 @pytest.mark.parametrize("kind", KINDS)

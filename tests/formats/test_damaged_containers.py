@@ -57,3 +57,29 @@ def test_ten_thousand_damaged_copies_of_what_a_camera_recorded(tmp_path: Path, n
     if not (EVENT_FILES / name).exists():
         pytest.skip(f"needs {name} of the shared data")
     read_damaged(EVENT_FILES / name, tmp_path, 10_000, seed=3)
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from container_recordings import events_at, recording_of, times_us
+from vid2ev.formats import format_named
+recording, write = recording_of(events_at(times_us()["dense"]), 0), format_named(sys.argv[1]).write
+write(Path(sys.argv[3]), recording)
+for limit in (0, 1, 100, 5000, 100_000, 1_000_000):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        write(Path(sys.argv[3]), recording)
+    except OSError as error:
+        print(error.errno)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")
+@pytest.mark.parametrize("name", ["aedat4", "ros1", "ros2"])
+def test_a_full_disk_is_an_error_and_not_a_crash(tmp_path: Path, name: str) -> None:
+    command = [sys.executable, "-c", FULL_DISK, name, str(PROGRAM.parent), str(tmp_path / "full")]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env={"PYTHONPATH": str(ROOT)})
+    assert (done.returncode, done.stderr, done.stdout.split()) == (0, "", ["27"] * 6)  # EFBIG, as ENOSPC would be
+    assert [path.name for path in tmp_path.iterdir()] == ["full"]  # and nothing beside it

@@ -3,9 +3,10 @@
 Of topics with events the first is read.  Times of `dvs_msgs/EventArray` are absolute.  In an `EventPacket` they are
 those of the sensor, as its encoding says:
 
-    evt3     words of EVT3 (`evt3_words.py`); time_base means nothing, times count from the first wrap of the words
-    mono     uint64: [0:32] t [ns] from time_base, [32:48] x, [48:63] y, [63] p
-    libcaer  uint32: [1] p, [2:17] y, [17:32] x; int32 t [us] from time_base [ns]
+    evt3         words of EVT3 (`evt3_words.py`); time_base means nothing, times count from the words' first wrap
+    libcaer_cmp  words from time_base [us] on (`libcaer_words.py`)
+    libcaer      uint32: [1] p, [2:17] y, [17:32] x; int32 t [us] from time_base [ns]
+    mono         uint64: [0:32] t [ns] from time_base, [32:48] x, [48:63] y, [63] p
 
 What is written is an EventArray for each 10 ms with events.  The stamp of the first is the instant from which the
 recording counts; that of the others is their first event.  Cameras stamp as they like: a stamp after the first event,
@@ -113,12 +114,12 @@ class RosEvents:
 
     def _decoded(self) -> Iterator[Events]:
         with self._readable():
-            decoder = _Evt3(self.size or (1 << 11, 1 << 11))
+            words = _Words(self.size or (1 << 11, 1 << 11))
             for message in self._messages():
                 if isinstance(message, EventArray):
                     yield message.events
-                elif message.encoding == "evt3":
-                    yield decoder.events(message.content)
+                elif message.encoding in ("evt3", "libcaer_cmp"):
+                    yield words.events(message)
                 else:
                     yield _unpacked(message, self.path)
 
@@ -141,22 +142,26 @@ def _nearest(images: list[Topic], events: Topic) -> Topic | None:
     return (beside or images or [None])[0]  # type: ignore[list-item]
 
 
-class _Evt3:
-    """Words of EVT3, decoded from packet to packet."""
+class _Words:
+    """Words, decoded from packet to packet: what they mean depends on those before."""
 
     def __init__(self, size: tuple[int, int]):
         self.size = size
         self.state = np.full(len(State), -1, np.int64)
         self.left = np.zeros(len(Left), np.int64)
+        self.place = np.zeros(3, np.int64)
 
-    def events(self, content: bytes) -> Events:
-        from vid2ev.formats.evt3_words import decode
+    def events(self, packet: EventPacket) -> Events:
+        from vid2ev.formats import evt3_words, libcaer_words
 
-        words = np.frombuffer(content, "<u2", len(content) // 2)
+        words = np.frombuffer(packet.content, "<u2", len(packet.content) // 2)
         room = 12 * len(words) + 12
         t, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
         p = np.empty(room, np.uint8)
-        _, found = decode(self.state, self.left, 0, words, *self.size, t, x, y, p)
+        if packet.encoding == "evt3":
+            _, found = evt3_words.decode(self.state, self.left, 0, words, *self.size, t, x, y, p)
+        else:
+            found = libcaer_words.decode(words, packet.time_base & (1 << 62) - 1, self.place, t, x, y, p)
         return Events(t[:found].copy(), x[:found].copy(), y[:found].copy(), p[:found].copy())
 
 
@@ -164,19 +169,19 @@ def _unpacked(packet: EventPacket, path: Path) -> Events:
     """The events of a packet of 8 bytes each."""
     words = np.frombuffer(packet.content, "<u8", len(packet.content) // 8)
     low, high = words & 0xFFFFFFFF, words >> 32
-    if packet.time_base_ns >> 63:
+    if packet.time_base >> 63:
         raise ValueError("a time beyond 2262")
     if packet.encoding == "mono":
-        t = (packet.time_base_ns + low.astype(np.int64)) // 1000
+        t = (packet.time_base + low.astype(np.int64)) // 1000
         return Events(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
     if packet.encoding == "libcaer":
         after = high.astype(np.int64)
         # The time of libcaer has 31 bits: where it goes back, it has begun anew.
         after[1:] += np.cumsum(after[1:] < after[:-1]) << 31
-        return Events(packet.time_base_ns // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
+        return Events(packet.time_base // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
     raise DataError(
-        f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, mono or libcaer, so convert it with"
-        " event_camera_tools first"
+        f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, libcaer_cmp, libcaer or mono, so"
+        " convert it with event_camera_tools first"
     )
 
 

@@ -53,7 +53,7 @@ class EventPacket:
     """Events as a camera's driver packed them."""
 
     size: tuple[int, int]
-    time_base_ns: int
+    time_base: int  # in the unit of the encoding
     encoding: str
     content: bytes
 
@@ -130,10 +130,10 @@ def event_packet(content: bytes, cdr: bool) -> EventPacket:
     fields.header()
     size = fields.size()
     fields.number("Q")
-    time_base_ns, encoding, big = fields.number("Q"), fields.text(), fields.number("B")
+    time_base, encoding, big = fields.number("Q"), fields.text(), fields.number("B")
     if big:
         raise ValueError("a big-endian packet")
-    return EventPacket(size, time_base_ns, encoding, fields.take(fields.number("I")))
+    return EventPacket(size, time_base, encoding, fields.take(fields.number("I")))
 
 
 def image(content: bytes, cdr: bool) -> Picture:

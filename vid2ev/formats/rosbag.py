@@ -62,20 +62,22 @@ class BagReader:
             else:
                 chunks = (record for record in self._records(file) if record[0] == CHUNK)
                 found = [inner for _, header, data in islice(chunks, FIRST) for inner in _inside(header, data)]
-        self.topics = list(dict.fromkeys(_topic(header, data) for op, header, data in found if op == CONNECTION))
+        connections = [(header, data) for op, header, data in found if op == CONNECTION]
+        self._names = {_number(header, b"conn", 4): _topic(header, data).name for header, data in connections}
+        self.topics = list(dict.fromkeys(_topic(header, data) for header, data in connections))
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes]]:
         """The messages of topics, each with its topic's name, in the order in which they were recorded."""
-        wanted: dict[int, str] = {}
+        found = dict(self._names)
         with open(self.path, "rb") as file:
             self._start(file)
             for kind, outer, content in self._records(file):
                 for op, header, data in _inside(outer, content) if kind == CHUNK else ():
                     number = _number(header, b"conn", 4)
-                    if op == CONNECTION and (name := _topic(header, data).name) in names:
-                        wanted[number] = name
-                    elif op == MESSAGE and number in wanted:
-                        yield wanted[number], data
+                    if op == CONNECTION:
+                        found[number] = _topic(header, data).name
+                    elif op == MESSAGE and (name := found.get(number)) in names:
+                        yield str(name), data
 
     def _start(self, file: BinaryIO) -> Header:
         """The record of the bag, after which the file stands."""
