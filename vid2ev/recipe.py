@@ -17,7 +17,7 @@ from vid2ev.recording.manifest import identity, versions
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sources import Source, open_source
+from vid2ev.sources import OPTIONS, Source, open_source
 from vid2ev.sources.eight_bits import srgb_codes
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -64,9 +64,6 @@ class Recipe:
         video: str | Path,
         sensor: str | Path | DvsSpec = "paper",
         overrides: Sequence[str] = (),
-        *,
-        transfer: str = "auto",
-        fps: float | None = None,
         **rest: Any,
     ) -> Recipe:
         """The recipe for a video and a sensor, with everything checked that can be before the first frame.
@@ -74,7 +71,7 @@ class Recipe:
         video      a video file, a folder of images, an array file, or `synthetic:NAME`
         sensor     a preset, a TOML file, or a specification
         overrides  `key=value` texts that change a preset or file
-        transfer, fps as for `open_source`; the rest are the fields above.  Raises UsageError, DataError.
+        The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
         """
         if isinstance(sensor, DvsSpec) and overrides:
             raise UsageError(
@@ -85,7 +82,8 @@ class Recipe:
         seed = rest.get("seed", 0)
         if not 0 <= seed < 1 << 64:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
-        recipe = cls(str(video), open_source(video, transfer=transfer, fps=fps), spec, name, **rest)
+        source = open_source(video, **{key: rest.pop(key) for key in OPTIONS if key in rest})
+        recipe = cls(str(video), source, spec, name, **rest)
         recipe.upsampler()  # (refuses what cannot be)
         if recipe.cuts not in CUTS:
             raise UsageError(f"cuts '{recipe.cuts}': expected one of {', '.join(CUTS)}")

@@ -77,6 +77,23 @@ class Auto(click.ParamType):
     metavar="RATE",
     help="Frames per second, instead of the source's own times.",
 )
+@click.option("--start", type=float, metavar="S", help="Begin at this second of the source's own clock.")
+@click.option("--stop", type=float, metavar="S", help="End there.")
+@click.option(
+    "--slowdown",
+    type=click.FloatRange(0, min_open=True),
+    metavar="F",
+    help="The footage plays F times slower than the world went: 8 for 240 fps that play at 30.",
+)
+@click.option("--crop", metavar="WxH+X+Y", help="Part of the picture; WxH is the middle.")
+@click.option(
+    "--size", metavar="W|WxH|WxH!", help="Pixels to bring it to: the largest part of that shape, or with ! all of it."
+)
+@click.option(
+    "--motion",
+    metavar="MOTION",
+    help="Move a camera over a photograph: pan, saccade, zoom (pan:speed=200,angle=30) or a file PATH.csv.",
+)
 @click.option(
     "--seed",
     type=Auto("random", 0, "seed"),
@@ -122,8 +139,9 @@ def convert(
 ) -> None:
     """Turn each VIDEO into the recording of an event camera.
 
-    VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy array, synthetic:NAME, or a folder
-    of videos.  A recording is a folder with events.h5, preview.mp4 and manifest.json.
+    VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy or .npz array, a photograph (with
+    --motion), - for standard input, camera:0, synthetic:NAME, or a folder of videos.  A recording is a folder with
+    events.h5, preview.mp4 and manifest.json.
 
     Of several videos, one that fails does not stop the others; with --resume, those that are done are left as they are.
     """

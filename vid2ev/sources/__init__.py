@@ -1,6 +1,9 @@
-"""Where frames come from: videos, folders of images, arrays, synthetic clips; all linear light with exact times.
+"""Where frames come from: videos, images, arrays, a photograph in motion, a camera, synthetic clips; all linear light
+with exact times.
 
-A new kind of source is a class that satisfies `Source` and a line in `open_source`.
+    source -> cut (start, stop) -> slowed -> cropped, brought to a size
+
+A new kind of source is a class that satisfies `Source` and a line in `_opened`.
 """
 
 from __future__ import annotations
@@ -11,12 +14,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from vid2ev.errors import UsageError
-from vid2ev.stream.frames import Frame
+from vid2ev.stream.frames import Colour, Frame
 
-__all__ = ["Source", "open_source"]
+__all__ = ["OPTIONS", "Source", "open_source"]
 
-SYNTHETIC_PREFIX = "synthetic:"
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp")
+SYNTHETIC_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "camera:", "-"
+OPTIONS = ("transfer", "fps", "colour", "slowdown", "start", "stop", "crop", "size", "motion")  # of `open_source`
 
 
 class Source(Protocol):
@@ -34,50 +37,144 @@ class Source(Protocol):
         """How many frames there should be, by the header; in some formats an estimate, None if there is no telling."""
 
     @property
+    def duration_expected_s(self) -> float | None:
+        """From the first frame to the end [s], by the header; None if there is no telling."""
+
+    @property
+    def rewindable(self) -> bool:
+        """Whether it can be read again; standard input and cameras cannot, and a second `frames` raises UsageError."""
+
+    @property
     def warnings(self) -> list[str]:
         """What a person should know, one sentence each; more may come while the frames are read to their end."""
 
     def describe(self) -> dict[str, Any]:
-        """What the source is and how its codes were taken, ready for JSON."""
+        """What the source is, how its codes were taken and how it was edited, ready for JSON."""
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on, in order of presentation, with strictly increasing times."""
 
 
-def open_source(path: str | Path, *, transfer: str = "auto", fps: float | Fraction | None = None) -> Source:
-    """The source behind a path: a folder of images, a .npy file, `synthetic:NAME`, and otherwise a video.
+def open_source(
+    path: str | Path,
+    *,
+    transfer: str = "auto",
+    fps: float | Fraction | None = None,
+    colour: Colour = "luminance",
+    slowdown: float | Fraction | None = None,
+    start: float | Fraction | None = None,
+    stop: float | Fraction | None = None,
+    crop: str | None = None,
+    size: str | None = None,
+    motion: str | None = None,
+) -> Source:
+    """The source behind a path: a folder of images, a TIFF with pages, a .npy or .npz, `synthetic:NAME`, `-` for
+    standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
 
-    transfer  what codes mean: "srgb", "bt709", "linear" or "gamma:G"; "auto" is the tag of a video, BT.709 without
-              one, sRGB for images, linear light for floating point, and a refusal for integer arrays, which say nothing
-    fps       frames per second; it overrules the times of the source; images and arrays without times need it
+    transfer     what codes mean: "srgb", "bt709", "pq", "hlg", "linear", "gamma:G" and others; "auto" is the tag of a
+                 video, BT.709 without one, sRGB for images, linear light for floating point, and a refusal for integer
+                 arrays, which say nothing
+    fps          frames per second; it overrules the times of the source; images and arrays without times need it
+    colour       "luminance" gives frames [H, W], "rgb" [H, W, 3] (see `Frame`)
+    start, stop  the part to read [s on the source's own clock], both ends included
+    slowdown     the footage plays so many times slower than the world went: its times are divided by it
+    crop, size   as in `framing.py`, such as "640x480+0+60" and "346x260"
+    motion       makes a clip of a photograph: "pan", "saccade", "zoom" or a .csv file, as in `motion.py`
 
     Raises UsageError for a path that does not exist and for options that cannot be meant, DataError for content that
     cannot be read.
     """
-    if str(path).startswith(SYNTHETIC_PREFIX):
-        return _synthetic(str(path), transfer, fps)
-    path = Path(path)
+    if colour not in ("luminance", "rgb"):
+        raise UsageError(f"colour '{colour}': expected luminance or rgb")
+    if motion is None:
+        source = _opened(str(path), transfer, fps, colour)
+    else:
+        source = _in_motion(Path(path), motion, transfer=transfer, fps=fps, colour=colour, crop=crop, size=size)
+        crop = size = None
+    if start is not None or stop is not None:
+        from vid2ev.sources.cut import Cut
+
+        source = Cut(source, start, stop)
+    if slowdown is not None:
+        from vid2ev.sources.cut import Slowed
+
+        source = Slowed(source, slowdown)
+    if crop is not None or size is not None:
+        from vid2ev.sources.framing import Framed
+
+        source = Framed(source, crop, size)
+    return source
+
+
+def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
+    """The source of a name, unedited."""
+    if name.startswith(SYNTHETIC_PREFIX):
+        return _synthetic(name, transfer, fps, colour)
+    if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
+        from vid2ev.sources.live import open_camera, open_standard_input
+        from vid2ev.sources.video import Video
+
+        live = open_standard_input() if name == STANDARD_INPUT else open_camera(name.removeprefix(CAMERA_PREFIX))
+        return Video(live, transfer=transfer, fps=fps, colour=colour)
+    path = _existing(Path(name))
     if path.is_dir():
-        from vid2ev.sources.images import ImageFolder
+        from vid2ev.sources.images import Images
 
-        return ImageFolder(path, transfer=transfer, fps=fps)
-    if not path.exists():
-        raise UsageError(f"{path}: no such file or folder; give a video, a folder of images or a .npy array")
-    if path.suffix.lower() in PICTURE_SUFFIXES:
-        raise UsageError(f"{path}: a single picture; give the folder that holds the sequence")
-    if path.suffix.lower() == ".npy":
-        from vid2ev.sources.arrays import ArrayStack
-
-        return ArrayStack(path, transfer=transfer, fps=fps)
-    from vid2ev.sources.video import Video
-
-    return Video(path, transfer=transfer, fps=fps)
+        return Images(path, transfer=transfer, fps=fps, colour=colour)
+    return _file(path, transfer, fps, colour)
 
 
-def _synthetic(text: str, transfer: str, fps: float | Fraction | None) -> Source:
+def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
+    from vid2ev.sources.recognise import recognise
+
+    match recognise(path):
+        case "picture":
+            from vid2ev.sources.images import Images
+            from vid2ev.sources.picture_files import pages_of
+
+            if pages_of(path) == 1:
+                raise UsageError(
+                    f"{path}: a single picture; give the folder that holds the sequence, or let a camera move over it"
+                    " with --motion pan"
+                )
+            return Images(path, transfer=transfer, fps=fps, colour=colour)
+        case "array":
+            from vid2ev.sources.arrays import ArrayStack
+
+            return ArrayStack(path, transfer=transfer, fps=fps, colour=colour)
+        case "arrays":
+            from vid2ev.sources.arrays import ArrayStack
+            from vid2ev.sources.stacks import NpzStack
+
+            return ArrayStack(path, NpzStack(path), transfer=transfer, fps=fps, colour=colour)
+        case _:
+            from vid2ev.sources.footage import VideoFile
+            from vid2ev.sources.video import Video
+
+            return Video(VideoFile(path), transfer=transfer, fps=fps, colour=colour)
+
+
+def _in_motion(path: Path, motion: str, **options: Any) -> Source:
+    from vid2ev.sources.photograph import Photograph
+    from vid2ev.sources.recognise import recognise
+
+    if _existing(path).is_dir() or recognise(path) != "picture":
+        raise UsageError(f"{path}: motion '{motion}' is for a photograph, such as a PNG, JPEG or EXR; leave it out")
+    return Photograph(path, motion, **options)
+
+
+def _synthetic(text: str, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
+    from vid2ev.sources.edit import Grey
     from vid2ev.sources.synthetic import parse_synthetic
 
     if transfer not in ("auto", "linear"):
         raise UsageError(f"{text}: transfer '{transfer}' for light that is linear already; leave it out")
     name = text.removeprefix(SYNTHETIC_PREFIX)
-    return parse_synthetic(name if fps is None else f"{name},fps={float(fps)}")
+    clip = parse_synthetic(name if fps is None else f"{name},fps={float(fps)}")
+    return clip if colour == "luminance" else Grey(clip)
+
+
+def _existing(path: Path) -> Path:
+    if not path.exists():
+        raise UsageError(f"{path}: no such file or folder; give a video, a folder of images or a .npy array")
+    return path

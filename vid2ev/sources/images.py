@@ -1,7 +1,9 @@
-"""A folder of images: 8- or 16-bit PNG, TIFF, JPEG, BMP, PGM or PPM, grey or colour, in natural order (2 before 10).
+"""Images as a clip: a folder of them in natural order (2 before 10), or the pages of a TIFF.
 
-Times come from `timestamps.txt` in the folder (`times.py` has the rule for its unit), or from fps.  Codes are sRGB
-unless a transfer is given, 16-bit ones too; floating-point TIFF is linear light.  Transparency is ignored.
+8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
+Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
+rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB unless
+a transfer is given, 16-bit ones too; floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
 """
 
 from __future__ import annotations
@@ -15,42 +17,52 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.pictures import TYPES, PictureReader
-from vid2ev.sources.times import Clock, parse_fps, read_timestamps
-from vid2ev.stream.frames import Frame
+from vid2ev.sources.picture_files import pages_of, read_picture
+from vid2ev.sources.pictures import PictureReader
+from vid2ev.sources.recognise import PICTURE_SUFFIXES
+from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, stamps_beside
+from vid2ev.stream.frames import Colour, Frame
 
-SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm")
 TIMESTAMPS = "timestamps.txt"
 
 
-class ImageFolder:
-    """Frames of a folder, one per image.
+class Images:
+    """Frames of a folder of images, or of a TIFF with pages.
 
-    fps   if given, image k is at k / fps; needed where there is no timestamps.txt
+    fps   if given, image k is at k / fps; needed where there are no times
 
-    Raises UsageError without times, DataError if there is no image, if timestamps.txt does not match, and for
-    an image that cannot be read or has another size than the first (the message names it).
+    Raises UsageError without times, DataError if there is no image, if the times do not match, and for
+    an image that cannot be read or has another size or kind of pixel than the first (the message names it).
     """
 
-    def __init__(self, path: str | Path, *, transfer: str = "auto", fps: float | Fraction | None = None):
+    rewindable = True
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        transfer: str = "auto",
+        fps: float | Fraction | None = None,
+        colour: Colour = "luminance",
+    ):
         self.path = Path(path)
         self.warnings: list[str] = []
-        found = [file for file in self.path.iterdir() if file.suffix.lower() in SUFFIXES]
-        self._files = sorted(found, key=lambda file: natural(file.name))
-        if not self._files:
-            raise DataError(f"{self.path}: no images in this folder; expected {', '.join(SUFFIXES)}")
+        self._places = _places(self.path)
+        if not self._places:
+            raise DataError(f"{self.path}: no images in this folder; expected {', '.join(PICTURE_SUFFIXES)}")
         self._fps = None if fps is None else parse_fps(fps)
         self._stamps: list[Fraction] = []
         self._unit: str | None = None
         if fps is None:
             self._stamps, self._unit = self._read_stamps()
-        first = self._read(self._files[0])
+        first = read_picture(*self._places[0]).pixels
         self.size = (first.shape[1], first.shape[0])
-        self.frames_expected: int | None = len(self._files)
+        self.frames_expected: int | None = len(self._places)
+        self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         if transfer == "auto":
             transfer = "linear" if first.dtype.kind == "f" else "srgb"
-        self._reader = PictureReader(transfer)
-        self._dtype = str(first.dtype)
+        self._reader = PictureReader(transfer, colour)
+        self._dtype = first.dtype
 
     def describe(self) -> dict[str, Any]:
         """Facts about the folder, for the manifest."""
@@ -58,7 +70,7 @@ class ImageFolder:
             "kind": "images",
             "path": str(self.path),
             "size": list(self.size),
-            "type": self._dtype,
+            "type": str(self._dtype),
             "transfer": self._reader.transfer,
             "fps": None if self._fps is None else str(self._fps),
             "timestamps_unit": self._unit,
@@ -67,55 +79,58 @@ class ImageFolder:
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on; earlier images are not read."""
+        return self.frames_between(None, None, start)
+
+    def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
+        """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
         clock, index = Clock(self._fps), 0
-        stamps: Sequence[Fraction | None] = self._stamps or [None] * len(self._files)
-        for file, stamp in zip(self._files, stamps, strict=True):
+        stamps: Sequence[Fraction | None] = self._stamps or [None] * len(self._places)
+        for (file, page), stamp in zip(self._places, stamps, strict=True):
             t_ns = clock.next(stamp)
-            if t_ns is None:
+            if t_ns is None or (since_ns is not None and t_ns < since_ns):
                 continue
+            if until_ns is not None and t_ns > until_ns:
+                return
             if index >= start:
-                yield Frame(self._light(file), t_ns)
+                yield Frame(self._light(file, page), t_ns)
             index += 1
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
-    def _light(self, file: Path) -> np.ndarray:
-        picture = self._read(file)
-        if (picture.shape[1], picture.shape[0]) != self.size:
+    def _light(self, file: Path, page: int) -> np.ndarray:
+        pixels, primaries = read_picture(file, page)
+        if (pixels.shape[1], pixels.shape[0]) != self.size:
             width, height = self.size
             raise DataError(
-                f"{file}: {picture.shape[1]}x{picture.shape[0]} pixels, expected {width}x{height} like the first image;"
+                f"{file}: {pixels.shape[1]}x{pixels.shape[0]} pixels, expected {width}x{height} like the first image;"
                 " bring them to one size"
             )
-        return self._reader.light(picture)
+        if (pixels.dtype.kind == "f") != (self._dtype.kind == "f"):
+            raise DataError(f"{file}: {pixels.dtype} pixels, expected {self._dtype} like those of the first image")
+        return self._reader.light(pixels, primaries)
 
     def _read_stamps(self) -> tuple[list[Fraction], str]:
+        if not self.path.is_dir():
+            return stamps_beside(self.path, len(self._places))
         file = self.path / TIMESTAMPS
         if not file.exists():
             raise UsageError(
                 f"{self.path}: images without times; give --fps, or a {TIMESTAMPS} with one line per image"
             )
         stamps, unit = read_timestamps(file)
-        if len(stamps) != len(self._files):
-            raise DataError(f"{file}: {len(stamps)} times for {len(self._files)} images; expected one per image")
+        if len(stamps) != len(self._places):
+            raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
         return stamps, unit
-
-    @staticmethod
-    def _read(file: Path) -> np.ndarray:
-        """Image as [H, W] or [H, W, 3] red, green, blue."""
-        import cv2
-
-        try:
-            picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-        except cv2.error:
-            picture = None
-        if picture is None:
-            raise DataError(f"{file}: not an image that can be read; remove it or write it anew")
-        if picture.dtype not in (np.uint8, np.uint16) and picture.dtype.kind != "f":
-            raise DataError(f"{file}: pixels of type {picture.dtype}, expected {TYPES}")
-        return picture if picture.ndim == 2 else picture[..., 2::-1]
 
 
 def natural(name: str) -> list[tuple[int, str]]:
     """Sort key by which `frame2` comes before `frame10`."""
     parts = re.split(r"(\d+)", name)
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts] + [(-2, name)]
+
+
+def _places(path: Path) -> list[tuple[Path, int]]:
+    """Where each image is: a file, and the page in it."""
+    if not path.is_dir():
+        return [(path, page) for page in range(pages_of(path))]
+    found = [file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != "."]
+    return [(file, 0) for file in sorted(found, key=lambda file: natural(file.name))]

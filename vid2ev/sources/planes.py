@@ -47,7 +47,7 @@ def upright(light: np.ndarray, orientation: tuple[bool, bool, bool]) -> np.ndarr
     transposed, mirrored, flipped = orientation
     if not any(orientation):
         return light
-    light = light.T if transposed else light
+    light = light.swapaxes(0, 1) if transposed else light
     return np.ascontiguousarray(light[:: -1 if flipped else 1, :: -1 if mirrored else 1])
 
 

@@ -44,6 +44,16 @@ class SyntheticClip(ABC):
         """Light [float32, H x W] at an instant."""
 
     @property
+    def rewindable(self) -> bool:
+        """A formula can be asked again."""
+        return True
+
+    @property
+    def duration_expected_s(self) -> float:
+        """From the first frame to the last [s]."""
+        return float((self.frames_expected - 1) / parse_fps(self.fps))
+
+    @property
     def frames_expected(self) -> int:
         """The number of frames."""
         return math.floor(Fraction(str(self.duration_s)) * parse_fps(self.fps)) + 1

@@ -85,6 +85,25 @@ class Clock:
         return remarks
 
 
+def expected_duration_s(stamps: Sequence[Fraction], fps: Fraction | None, frames: int) -> float:
+    """From the first frame to the last [s]."""
+    return float((frames - 1) / fps) if fps else float(max(stamps) - stamps[0])
+
+
+def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
+    """Stamps [s] of `NAME_timestamps.npy` or `NAME_timestamps.txt` beside the file `NAME`, and their unit.
+
+    Raises UsageError if there is neither, DataError if they are not as many as the frames.
+    """
+    binary, text = (path.with_name(f"{path.stem}_timestamps{suffix}") for suffix in (".npy", ".txt"))
+    if not binary.exists() and not text.exists():
+        raise UsageError(f"{path}: frames without times; give --fps, or put {binary.name} beside it")
+    stamps, unit = read_timestamp_array(binary) if binary.exists() else read_timestamps(text)
+    if len(stamps) != frames:
+        raise DataError(f"{path}: {len(stamps)} times beside it for {frames} frames; expected one each")
+    return stamps, unit
+
+
 def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
     unit, words = None, []
@@ -116,10 +135,15 @@ def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
         stamps = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise DataError(f"{path}: cannot be read as a .npy array ({error}); write it with numpy.save") from error
+    return stamps_of_array(stamps, path)
+
+
+def stamps_of_array(stamps: np.ndarray, path: Path, unit: str | None = None) -> tuple[list[Fraction], str]:
+    """Stamps [s] of an array in `unit`; without one, floating point is seconds, whole numbers by the rule above."""
     if stamps.ndim != 1 or stamps.dtype.kind not in "iuf" or not np.all(np.isfinite(stamps)):
         raise DataError(f"{path}: {stamps.dtype} of shape {stamps.shape}, expected one finite time per frame")
     values = stamps.tolist()
-    unit = "s" if stamps.dtype.kind == "f" else unit_of_integers(values)
+    unit = unit or ("s" if stamps.dtype.kind == "f" else unit_of_integers(values))
     return _in_seconds([Fraction(value) for value in values], unit, path), unit
 
 

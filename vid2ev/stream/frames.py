@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+
+Colour = Literal["luminance", "rgb"]
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
     """The light of a scene at one instant.
 
-    `light` is float32 [H, W], linear luminance; 1.0 is diffuse white and brighter light goes on unclipped.
+    `light` is float32 and linear; 1.0 is diffuse white and brighter light goes on unclipped.  It is luminance [H, W]
+    or, from a source opened with colour "rgb", red, green, blue [H, W, 3] of the primaries of BT.709; a colour that
+    these cannot mix has a negative component, so that 0.2126 R + 0.7152 G + 0.0722 B is the luminance of any colour.
     `t_ns` is the instant in nanoseconds on the clock of the source.  `original` is True for a frame of the
     source, False for one made between two of them.  `cut` is True where a new shot begins: what was seen
     before has nothing to do with it.

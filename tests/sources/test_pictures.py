@@ -1,0 +1,252 @@
+"""Files of pictures, read as other libraries read them; the content decides, not the name."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenEXR
+import pytest
+import tifffile
+from PIL import Image, ImageOps
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources import open_source
+from vid2ev.sources.picture_files import read_picture
+from vid2ev.sources.recognise import recognise
+from vid2ev.sources.tags import BT709_WEIGHTS
+from vid2ev.sources.transfer import code_table
+
+
+def codes(shape: tuple[int, ...], dtype: type = np.uint8) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return rng.integers(0, np.iinfo(dtype).max + 1, shape).astype(dtype)
+
+
+# ---------------------------------------------------------------------------------------------------------- upright
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif", "webp"])
+def test_exif_turns_a_picture_as_viewers_do(tmp_path: Path, orientation: int, suffix: str) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    scene = np.kron(codes((3, 4, 3)), np.ones((8, 8, 1), np.uint8))
+    path = tmp_path / f"a.{suffix}"
+    options = {"jpg": {"quality": 95}, "webp": {"lossless": True}}.get(suffix, {})
+    Image.fromarray(scene).save(path, exif=exif, **options)
+    with Image.open(path) as shown:
+        expected = np.asarray(ImageOps.exif_transpose(shown).convert("RGB"))
+    pixels = read_picture(path).pixels
+    assert pixels.shape == expected.shape
+    np.testing.assert_allclose(pixels.astype(int), expected, atol=2 if suffix == "jpg" else 0)
+
+
+# ---------------------------------------------------------------------------------------------------------- kinds
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "P", "1", "RGB", "RGBA"])
+def test_png_of_every_mode(tmp_path: Path, mode: str) -> None:
+    picture = Image.fromarray(codes((6, 8, 3))).convert(mode)
+    picture.save(tmp_path / "a.png")
+    expected = np.asarray(picture.convert("L" if mode in ("L", "LA", "1") else "RGB"))
+    pixels = read_picture(tmp_path / "a.png").pixels
+    if pixels.ndim > expected.ndim:
+        expected = np.repeat(expected[..., None], 3, axis=-1)
+    np.testing.assert_array_equal(pixels, expected)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(6, 8), (6, 8, 3)])
+@pytest.mark.parametrize("compression", [None, "zlib"])
+def test_tiff_by_another_writer(tmp_path: Path, dtype, shape: tuple[int, ...], compression: str | None) -> None:
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0, 9, shape).astype(dtype) if dtype in (np.float32, np.float64) else codes(shape, dtype)
+    photometric = "rgb" if len(shape) == 3 else "minisblack"
+    tifffile.imwrite(tmp_path / "a.tif", picture, compression=compression, photometric=photometric)
+    pixels = read_picture(tmp_path / "a.tif").pixels
+    np.testing.assert_array_equal(pixels, picture)
+    source = open_source(tmp_path, fps=1)
+    assert source.describe()["transfer"] == ("linear" if pixels.dtype.kind == "f" else "srgb")
+
+
+def test_a_tiff_with_pages_is_a_clip(tmp_path: Path) -> None:
+    stack = codes((5, 6, 8), np.uint16)
+    path = tmp_path / "stack.tif"
+    tifffile.imwrite(path, stack, photometric="minisblack")
+    with pytest.raises(UsageError, match=r"--fps.*stack_timestamps\.npy"):
+        open_source(path)
+    frames = list(open_source(path, fps=100).frames())
+    assert [frame.t_ns for frame in frames] == [10_000_000 * k for k in range(5)]
+    for frame, page in zip(frames, stack, strict=True):
+        np.testing.assert_array_equal(frame.light, code_table("srgb", 16)[page])
+    (tmp_path / "stack_timestamps.txt").write_text("# unit: ms\n0\n1\n5\n6\n7\n")
+    source = open_source(path)
+    assert [frame.t_ns for frame in source.frames(2)] == [5_000_000, 6_000_000, 7_000_000]
+    assert source.duration_expected_s == 0.007
+
+
+@pytest.mark.parametrize("suffix", ["hdr", "pfm"])
+def test_radiance_and_pfm_are_light_as_they_stand(tmp_path: Path, suffix: str) -> None:
+    light = np.random.default_rng(0).uniform(1, 3, (6, 8, 3)).astype(np.float32)
+    cv2.imwrite(str(tmp_path / f"a.{suffix}"), light[..., ::-1])
+    source = open_source(tmp_path, fps=1, colour="rgb")
+    tolerance = 1 / 64 if suffix == "hdr" else 0  # RGBE has 8 bits of mantissa
+    np.testing.assert_allclose(next(source.frames()).light, light, rtol=tolerance)
+    assert source.describe()["transfer"] == "linear"
+
+
+def test_a_folder_of_codes_and_light_is_refused(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), codes((4, 4)))
+    cv2.imwrite(str(tmp_path / "1.tif"), np.ones((4, 4), np.float32))
+    with pytest.raises(DataError, match=r"1\.tif: float32 pixels, expected uint8"):
+        list(open_source(tmp_path, fps=1).frames())
+
+
+def test_hidden_files_are_no_images(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), codes((4, 4)))
+    (tmp_path / "._0.png").write_bytes(b"resource fork")
+    assert open_source(tmp_path, fps=1).frames_expected == 1
+
+
+# ---------------------------------------------------------------------------------------------------------- names lie
+
+
+def test_the_content_decides_in_a_folder(tmp_path: Path) -> None:
+    picture = np.kron(codes((3, 4)), np.ones((8, 8), np.uint8))
+    cv2.imwrite(str(tmp_path / "a.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, 100])
+    (tmp_path / "a.jpg").rename(tmp_path / "0.png")
+    cv2.imwrite(str(tmp_path / "b.tif"), picture)
+    (tmp_path / "b.tif").rename(tmp_path / "1.jpg")
+    OpenEXR.File({}, {"Y": np.full(picture.shape, 0.5, np.float32)}).write(str(tmp_path / "2.exr"))
+    first, second = open_source(tmp_path, fps=1, stop=1).frames()
+    np.testing.assert_allclose(first.light, code_table("srgb", 8)[picture], atol=0.02)
+    np.testing.assert_array_equal(second.light, code_table("srgb", 8)[picture])
+    (tmp_path / "2.exr").rename(tmp_path / "2.png")
+    assert read_picture(tmp_path / "2.png").pixels[0, 0] == 0.5
+
+
+def test_the_content_decides_for_a_file(tmp_path: Path, encode) -> None:
+    film = encode("a.mkv", [codes((16, 16))] * 2)
+    np.save(tmp_path / "b.npy", np.zeros((3, 4, 5), np.float32))
+    np.savez(tmp_path / "c.npz", frames=np.zeros((4, 4, 5), np.float32), fps=10)
+    aliases = [("a.mkv", "x.npy", 2), ("b.npy", "y.mp4", 3), ("c.npz", "z.npy", 4), ("a.mkv", "w.png", 2)]
+    for original, alias, count in aliases:
+        shutil.copy(tmp_path / original, tmp_path / alias)
+        options = {"fps": 5} if original == "b.npy" else {}
+        assert len(list(open_source(tmp_path / alias, **options).frames())) == count
+    assert recognise(film) == "video"
+
+
+@pytest.mark.parametrize("name", ["photo.png", "photo.mp4", "photo"])
+def test_a_single_picture_says_what_can_be_done(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(cv2.imencode(".jpg", codes((16, 16)))[1].tobytes())
+    with pytest.raises(UsageError, match=r"single picture.*--motion"):
+        open_source(tmp_path / name)
+
+
+def test_an_animation_is_a_video(tmp_path: Path) -> None:
+    first, second = (Image.fromarray(np.full((16, 16, 3), level, np.uint8)) for level in (30, 200))
+    first.save(tmp_path / "a.png", save_all=True, append_images=[second], duration=40)
+    dark, bright = (frame.light.mean() for frame in open_source(tmp_path / "a.png").frames())
+    assert bright > 5 * dark
+    (tmp_path / "b.png").write_bytes(cv2.imencode(".jpg", codes((16, 16)))[1].tobytes())
+
+
+def test_motion_jpeg_goes_by_its_name(tmp_path: Path) -> None:
+    jpeg = cv2.imencode(".jpg", codes((16, 16)))[1].tobytes()
+    (tmp_path / "a.mjpg").write_bytes(jpeg * 5)
+    assert len(list(open_source(tmp_path / "a.mjpg", fps=10).frames())) == 5
+
+
+# ---------------------------------------------------------------------------------------------------------- OpenEXR
+
+
+def write_exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
+    OpenEXR.File(header, dict(channels)).write(str(path))  # (it changes what it is given)
+    return path
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("letters", ["RGB", "RGBA", "Y", "YA"])
+def test_exr_is_light_as_it_stands(tmp_path: Path, dtype, letters: str) -> None:
+    rng = np.random.default_rng(0)
+    channels = {letter: rng.uniform(0, 300, (6, 8)).astype(dtype) for letter in letters}
+    write_exr(tmp_path / "a.exr", channels)
+    grey, colour = (next(open_source(tmp_path, fps=1, colour=kind).frames()).light for kind in ("luminance", "rgb"))
+    planes = [channels[c].astype(np.float64) for c in ("RGB" if "R" in letters else "YYY")]
+    np.testing.assert_allclose(colour, np.dstack(planes), rtol=1e-6)
+    np.testing.assert_allclose(
+        grey, np.dstack(planes) @ np.array(BT709_WEIGHTS), rtol=1e-6 if dtype == np.float32 else 2e-3
+    )
+
+
+def test_half_floats_keep_their_precision_in_the_sum(tmp_path: Path) -> None:
+    channels = {
+        letter: np.full((4, 4), level, np.float16) for letter, level in zip("RGB", (1000, 0.01, 0.3), strict=True)
+    }
+    write_exr(tmp_path / "a.exr", channels)
+    light = next(open_source(tmp_path, fps=1).frames()).light[0, 0]
+    expected = sum(float(channels[c][0, 0]) * w for c, w in zip("RGB", BT709_WEIGHTS, strict=True))
+    assert light == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_first_part_with_colour_counts(tmp_path: Path) -> None:
+    depth, red = np.full((6, 8), 7, np.float32), np.full((6, 8), 0.25, np.float32)
+    parts = [OpenEXR.Part({"name": "depth"}, {"Z": depth}), OpenEXR.Part({"name": "beauty"}, dict.fromkeys("RGB", red))]
+    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
+    assert np.all(read_picture(tmp_path / "a.exr").pixels == 0.25)
+    write_exr(tmp_path / "b.exr", {"Layer.Depth.Z": depth} | {f"Layer.Combined.{c}": red for c in "RGBA"})
+    assert np.all(read_picture(tmp_path / "b.exr").pixels == 0.25)
+    write_exr(tmp_path / "c.exr", {"Z": depth})
+    with pytest.raises(DataError, match=r"c\.exr: EXR with the channels Z"):
+        read_picture(tmp_path / "c.exr")
+
+
+def test_the_display_window_is_what_is_seen(tmp_path: Path) -> None:
+    light = np.random.default_rng(0).uniform(1, 2, (6, 8)).astype(np.float32)
+    windows = {
+        "dataWindow": (np.array([2, -1], np.int32), np.array([9, 4], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([7, 9], np.int32)),
+    }
+    write_exr(tmp_path / "a.exr", {"Y": light}, **windows)
+    expected = np.zeros((10, 8), np.float32)
+    expected[0:5, 2:8] = light[1:, :6]
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.exr").pixels, expected)
+
+
+def test_chromaticities_hold(tmp_path: Path) -> None:
+    """ACEScg green in BT.709, against the matrix published with ACES (Bradford, D60 to D65)."""
+    ap1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+    zero, one = np.zeros((4, 4), np.float32), np.ones((4, 4), np.float32)
+    write_exr(tmp_path / "a.exr", {"R": zero, "G": one, "B": zero}, chromaticities=ap1)
+    (frame,) = open_source(tmp_path, fps=1, colour="rgb").frames()
+    np.testing.assert_allclose(frame.light[0, 0], [-0.62179, 1.14080, -0.12897], atol=2e-3)
+
+
+def test_without_the_package_exr_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_exr(tmp_path / "a.exr", {"Y": np.ones((4, 4), np.float32)})
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    with pytest.raises(UsageError, match=r"a\.exr: EXR needs .*pip install 'vid2ev\[formats\]'"):
+        open_source(tmp_path, fps=1)
+
+
+@pytest.mark.parametrize("length", [4, 30, 200, 1500])
+def test_a_cut_off_exr_is_refused(tmp_path: Path, length: int) -> None:
+    path = write_exr(tmp_path / "a.exr", {"Y": np.random.default_rng(0).uniform(size=(40, 40)).astype(np.float32)})
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(DataError, match=r"a\.exr: "):
+        open_source(tmp_path, fps=1)
+
+
+def test_real_hdr_photographs() -> None:
+    folder = Path(__file__).parents[2] / ".." / "shared" / "data" / "hdr"
+    if not folder.is_dir():
+        pytest.skip("the HDR photographs are not here (../shared/data/hdr)")
+    for name, size, brightest in (("Desk.exr", (874, 644), 202), ("adams_place_bridge_1k.hdr", (512, 1024), 111)):
+        pixels = read_picture(folder / name).pixels
+        assert pixels.shape[:2] == size and pixels.dtype.kind == "f"
+        assert float((pixels.astype(np.float64) @ BT709_WEIGHTS).max()) == pytest.approx(brightest, rel=0.01)

@@ -1,0 +1,189 @@
+"""Where decoded pictures come from: a video file, which can be read again, or a stream, which passes once.
+
+Both give PyAV's pictures in order of presentation, and what is damaged costs no more than it has to.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import Any, Protocol
+
+import av
+
+from vid2ev.errors import DataError, UsageError
+
+REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
+SEEKABLE = ("mp4", "matroska")  # containers with an index, and a presentation time for every picture
+STEPS_BACK_S = (0, 2, 10)  # how far before the place a key frame is looked for
+
+
+class Footage(Protocol):
+    """Pictures of one clip, and what is known of it before the first."""
+
+    name: str
+    kind: str
+    rewindable: bool
+    codec: str
+    rate: Fraction | None  # nominal, frames per second
+    planned: int  # frames by the header, 0 if it does not say
+    end_s: Fraction | None  # by the header
+    first: Any  # the first picture
+
+    def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
+        """The pictures; some of those before `since_s` may be left out.  `remarks` is told what could not be read."""
+
+
+class VideoFile:
+    """The first video stream of a file."""
+
+    kind = "video"
+    rewindable = True
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        self.name = str(path)
+        with self._opened() as (container, stream):
+            self.rate = stream.average_rate or stream.guessed_rate
+            self.planned: int = stream.frames
+            self.end_s = announced_end_s(container, stream)
+            self.codec: str = stream.codec_context.name
+            self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
+            self.first = next(_decoded(container, stream, self.planned, []), None)
+        if self.first is None:
+            raise DataError(f"{self.path}: no frame in it can be decoded; {REMEDY}")
+
+    def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
+        """The pictures from the first one on, or from a key frame before `since_s`, where such a one is known."""
+        if since_s is not None and self._indexed:
+            for back_s in STEPS_BACK_S:
+                with self._opened() as (container, stream):
+                    yet: list[str] = []
+                    found = _sought(container, stream, since_s - back_s, since_s, yet)
+                    if found is not None:
+                        yield from found
+                        remarks += yet
+                        return
+        with self._opened() as (container, stream):
+            yield from _decoded(container, stream, self.planned, remarks)
+
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[Any, Any]]:
+        try:
+            # `file:` and the whitelist keep playlists and odd file names from opening anything but local files
+            container = av.open(f"file:{self.path}", options={"protocol_whitelist": "file"})
+        except (av.FFmpegError, ValueError) as error:
+            raise DataError(f"{self.path}: not a video that can be read ({reason(error)}); {REMEDY}") from error
+        with container:
+            if container.format.name.endswith("_pipe") or container.format.name == "image2":
+                raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
+            yield container, video_stream(container, self.name)
+
+
+class LiveStream:
+    """A video that passes once: an open container (standard input, a camera), read only as its pictures are taken."""
+
+    rewindable = False
+    planned = 0
+    end_s: Fraction | None = None
+
+    def __init__(self, container: Any, name: str, kind: str):
+        self.name, self.kind = name, kind
+        stream = video_stream(container, name)
+        self.rate = stream.average_rate or stream.guessed_rate
+        self.codec: str = stream.codec_context.name
+        self._remarks: list[str] = []
+        self._coming: Iterator[Any] | None = _decoded(container, stream, 0, self._remarks)
+        self._container = container  # (closed with the last reference to it)
+        self.first = next(self._coming, None)
+        if self.first is None:
+            raise DataError(f"{name}: no frame in it can be decoded; pipe a video into it, such as Y4M, MKV or MPEG-TS")
+
+    def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
+        """The pictures, the first one too; a second time raises UsageError."""
+        coming, self._coming = self._coming, None
+        if coming is None:
+            raise UsageError(f"{self.name}: can be read once only; save it as a file to read it again")
+        yield from chain([self.first], coming)
+        remarks += self._remarks
+
+
+def video_stream(container: Any, name: str) -> Any:
+    """The first video stream that is no cover picture.  Raises DataError."""
+    streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
+    if not streams or container.format.name == "tty":  # (FFmpeg draws text files as video)
+        raise DataError(f"{name}: holds no video stream; {REMEDY}")
+    streams[0].thread_type = "AUTO"
+    return streams[0]
+
+
+def stamp_of(picture: Any) -> Fraction | None:
+    """Presentation time [s] of a picture."""
+    return None if picture.pts is None else picture.pts * Fraction(picture.time_base)
+
+
+def announced_end_s(container: Any, stream: Any) -> Fraction | None:
+    """Where the stream ends [s] by the header: its tag (Matroska), or the duration if the file holds nothing else."""
+    tag = re.fullmatch(r"(\d+):(\d+):(\d+(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
+    if tag:
+        hours, minutes, seconds = map(Fraction, tag.groups())
+        return 3600 * hours + 60 * minutes + seconds
+    if container.duration and len(container.streams) == 1:
+        return Fraction(container.duration, 10**6)
+    return None
+
+
+def reason(error: Exception) -> str:
+    """What FFmpeg says of an error."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _sought(
+    container: Any, stream: Any, target_s: Fraction, since_s: Fraction, remarks: list[str]
+) -> Iterator[Any] | None:
+    """The pictures from a key frame at or before `since_s` on; None if the file does not lead to one."""
+    try:
+        container.seek(int(target_s // stream.time_base), stream=stream, backward=True)
+    except av.FFmpegError:
+        return None
+    coming = _decoded(container, stream, 0, remarks)
+    first = next(coming, None)
+    stamp = None if first is None else stamp_of(first)
+    if first is None or stamp is None or not first.key_frame or stamp > since_s:
+        return None
+    return chain([first], coming)
+
+
+def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
+    """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
+    whole = broken = 0
+    for packet in _packets(container, stream, remarks):
+        if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
+            broken += 1
+            continue
+        whole += packet.size > 0
+        try:
+            pictures = packet.decode()
+        except av.FFmpegError:
+            broken += 1
+            continue
+        yield from pictures
+    if broken:
+        remarks.append(f"damaged packets of the file left out: {broken}")
+    if whole + broken < planned:
+        remarks.append(f"truncated: the file holds {whole} of the {planned} frames it announces")
+
+
+def _packets(container: Any, stream: Any, remarks: list[str]) -> Iterator[Any]:
+    """The packets of a stream as far as the file can be read, the last one empty: for it a decoder gives its rest."""
+    try:
+        yield from container.demux(stream)
+    except av.FFmpegError as error:
+        remarks.append(f"the file cannot be read to its end ({reason(error)})")
+        rest = av.Packet()
+        rest.stream, rest.time_base = stream, stream.time_base
+        yield rest

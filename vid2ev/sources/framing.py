@@ -1,0 +1,112 @@
+"""Crop and size of the pictures of a source.
+
+    crop   WxH+X+Y: the part of W x H pixels whose upper left corner is at column X, row Y;  WxH: the one in the middle
+    size   W: that wide, as high as the shape asks;  WxH: the largest part in the middle that has this shape, made
+           this large;  WxH!: all of it, stretched to this size
+
+The crop comes first.  What happens to the light is in `resample.py`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.sources.edit import Edit
+from vid2ev.sources.resample import Taps, resampled, taps_of
+from vid2ev.stream.frames import Frame
+
+if TYPE_CHECKING:
+    from vid2ev.sources import Source
+
+LARGEST = 1 << 15  # pixels along a side
+
+
+class Box(NamedTuple):
+    """A part of a picture: its upper left corner, its width and height [px]."""
+
+    x: Fraction
+    y: Fraction
+    width: Fraction
+    height: Fraction
+
+
+def crop_box(text: str, size: tuple[int, int]) -> Box:
+    """The part that a crop means in a picture of `size`.  Raises UsageError."""
+    found = re.fullmatch(r"(\d{1,9})x(\d{1,9})(?:\+(\d{1,9})\+(\d{1,9}))?", text)
+    if not found:
+        raise UsageError(
+            f"crop '{text}': expected WIDTHxHEIGHT+X+Y, or WIDTHxHEIGHT for the middle, such as 640x480+0+60"
+        )
+    width, height = int(found[1]), int(found[2])
+    x, y = (size[0] - width) // 2, (size[1] - height) // 2
+    if found[3] is not None:
+        x, y = int(found[3]), int(found[4])
+    if min(width, height) < 1 or min(x, y) < 0 or x + width > size[0] or y + height > size[1]:
+        raise UsageError(f"crop '{text}': expected a part of the picture, which has {size[0]}x{size[1]} pixels")
+    return Box(Fraction(x), Fraction(y), Fraction(width), Fraction(height))
+
+
+def parse_size(text: str, shape: tuple[int, int]) -> tuple[int, int, bool]:
+    """Width, height and whether to stretch, of a size for pictures of the shape (width, height).  Raises UsageError."""
+    found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9})(!)?)?", text)
+    if not found:
+        raise UsageError(f"size '{text}': expected WIDTH, WIDTHxHEIGHT or WIDTHxHEIGHT!, such as 346x260")
+    width = int(found[1])
+    height = int(found[2]) if found[2] else max(1, round(Fraction(width * shape[1], shape[0])))
+    if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
+        raise UsageError(f"size '{text}': {width}x{height} pixels; expected 1 to {LARGEST} along each side")
+    return width, height, bool(found[3])
+
+
+def of_shape(box: Box, shape: tuple[int, int]) -> Box:
+    """The largest part in the middle of a box that has the shape of (width, height)."""
+    width = min(box.width, box.height * shape[0] / shape[1])
+    height = min(box.height, box.width * shape[1] / shape[0])
+    return Box(box.x + (box.width - width) / 2, box.y + (box.height - height) / 2, width, height)
+
+
+class Framed(Edit):
+    """A source whose pictures are cropped, then brought to a size.  Raises UsageError."""
+
+    def __init__(self, source: Source, crop: str | None, size: str | None):
+        super().__init__(source)
+        whole = (source.size[0], source.size[1])
+        self._box = crop_box(crop, whole) if crop else Box(Fraction(0), Fraction(0), *map(Fraction, whole))
+        self._size = (int(self._box.width), int(self._box.height))
+        self._taps: tuple[Taps, Taps] | None = None
+        if size is not None:
+            width, height, stretched = parse_size(size, self._size)
+            self._size = (width, height)
+            self._box = self._box if stretched else of_shape(self._box, self._size)
+            if (self._box.width, self._box.height) == self._size:  # (whole pixels stay as they are)
+                self._box = Box(*(Fraction(math.floor(side)) for side in self._box))
+            else:
+                rows = taps_of(whole[1], self._box.y, self._box.height, height)
+                self._taps = rows, taps_of(whole[0], self._box.x, self._box.width, width)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self._size
+
+    def edits(self) -> dict[str, Any]:
+        """The part taken [px: x, y, width, height], and the size it is brought to."""
+        return {"part": [float(side) for side in self._box], "resized": self._taps is not None}
+
+    def frames(self, start: int = 0) -> Iterator[Frame]:
+        """The frames from index `start` on."""
+        for frame in self.source.frames(start):
+            yield Frame(self._framed(frame.light), frame.t_ns)
+
+    def _framed(self, light: np.ndarray) -> np.ndarray:
+        if self._taps is not None:
+            return resampled(light, *self._taps)
+        x, y, width, height = map(int, self._box)
+        return np.ascontiguousarray(light[y : y + height, x : x + width])

@@ -1,0 +1,123 @@
+"""Files of pictures: pixels, and which colours red, green and blue are in them.
+
+OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says;
+the package OpenEXR reads EXR.  Transparency is left out.  Of an EXR with several parts or layers the first with colour
+counts: R, G, B or else Y.  Its data window is set into its display window, black around, and its chromaticities hold.
+
+Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources.pictures import TYPES
+from vid2ev.sources.primaries import Primaries, primaries_at
+from vid2ev.sources.recognise import EXR, TIFF, head_of
+
+
+class Picture(NamedTuple):
+    """Pixels [H, W] or [H, W, 3 (red, green, blue)]; the primaries are those of BT.709 if the file names no others."""
+
+    pixels: np.ndarray
+    primaries: Primaries | None = None
+
+
+def pages_of(path: Path) -> int:
+    """How many pictures the file holds: the pages of a TIFF, otherwise one."""
+    import cv2
+
+    return max(1, cv2.imcount(str(path))) if head_of(path).startswith(TIFF) else 1
+
+
+def read_picture(path: Path, page: int = 0) -> Picture:
+    """A picture, upright.  Raises DataError for a file that holds none, UsageError for an EXR without the package."""
+    head = head_of(path)
+    picture = _read_exr(path) if head.startswith(EXR) else Picture(_read(path, page, head))
+    pixels = picture.pixels
+    if pixels.dtype not in (np.uint8, np.uint16) and pixels.dtype.kind != "f":
+        raise DataError(f"{path}: pixels of type {pixels.dtype}, expected {TYPES}")
+    return picture
+
+
+def _read(path: Path, page: int, head: bytes) -> np.ndarray:
+    import cv2
+
+    flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)
+    try:
+        if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
+            found = cv2.imreadmulti(str(path), page, 1, flags=flags)[1]
+            pixels = found[0] if found else None
+        else:
+            pixels = cv2.imread(str(path), flags)
+    except cv2.error:
+        pixels = None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+    if pixels is None:
+        raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
+    return pixels if pixels.ndim == 2 else pixels[..., 2::-1]
+
+
+def _read_exr(path: Path) -> Picture:
+    try:
+        import OpenEXR
+    except ImportError as error:
+        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+    try:
+        # (one thread: pictures are read in turn with work that has threads of its own)
+        file = OpenEXR.File(str(path), separate_channels=True, num_threads=0)
+        parts = [(part.header, part.channels) for part in file.parts]
+    except Exception as error:  # (the library raises RuntimeError, ValueError and more)
+        raise DataError(f"{path}: not an EXR that can be read ({str(error).splitlines()[0]})") from error
+    for header, channels in parts:
+        names = _colour_channels(list(channels))
+        if names and all(channels[name].xSampling == channels[name].ySampling == 1 for name in names):
+            planes = [channels[name].pixels for name in names]
+            pixels = planes[0] if len(planes) == 1 else np.dstack(planes)
+            return Picture(_in_display_window(pixels, header), _primaries(header, path))
+    found = ", ".join(name for _, channels in parts for name in channels)
+    raise DataError(f"{path}: EXR with the channels {found}; expected R, G, B or Y")
+
+
+def _colour_channels(names: list[str]) -> list[str]:
+    """The channels of the first layer with R, G, B, or else with Y; the layer without a name comes first."""
+    layers = sorted({name.rpartition(".")[0] for name in names}, key=lambda layer: (bool(layer), layer))
+    for wanted in ("RGB", "Y"):
+        for layer in layers:
+            found = [f"{layer}.{letter}".lstrip(".") for letter in wanted]
+            if all(name in names for name in found):
+                return found
+    return []
+
+
+def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray:
+    (x0, y0), _ = (np.asarray(corner).tolist() for corner in header["dataWindow"])
+    (left, top), (right, bottom) = (np.asarray(corner).tolist() for corner in header["displayWindow"])
+    width, height = right - left + 1, bottom - top + 1
+    if (x0, y0) == (left, top) and pixels.shape[:2] == (height, width):
+        return pixels
+    shown = np.zeros((height, width, *pixels.shape[2:]), pixels.dtype)
+    rows = slice(max(y0, top), min(y0 + pixels.shape[0], bottom + 1))
+    columns = slice(max(x0, left), min(x0 + pixels.shape[1], right + 1))
+    if rows.start < rows.stop and columns.start < columns.stop:
+        part = pixels[rows.start - y0 : rows.stop - y0, columns.start - x0 : columns.stop - x0]
+        shown[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left] = part
+    return shown
+
+
+def _primaries(header: dict[str, Any], path: Path) -> Primaries | None:
+    values = header.get("chromaticities")
+    if values is None:
+        return None
+    numbers = [float(value) for value in np.ravel(np.array(values))]
+    try:
+        return primaries_at(list(zip(numbers[::2], numbers[1::2], strict=True)))
+    except ValueError as error:
+        raise DataError(f"{path}: {error}; correct the attribute 'chromaticities'") from error

@@ -1,0 +1,69 @@
+"""What a file is, by its content: names lie.
+
+    picture   PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000, OpenEXR, Radiance HDR
+    array     .npy
+    arrays    .npz, a ZIP archive of .npy files
+    video     everything else, and animated PNG
+
+A file of JPEGs one after the other (Motion JPEG) begins like a JPEG; there the name decides, `.mjpg` or `.mjpeg`.
+
+Sources: PNG section 5.2 and its `acTL`; TIFF 6.0 page 13; ITU-T T.81 B.1.1.3; Radiance `filefmts`; OpenEXR file layout;
+numpy NEP 1.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+from typing import Literal
+
+from vid2ev.errors import DataError
+
+Kind = Literal["picture", "array", "arrays", "video"]
+
+PICTURE_SUFFIXES = (
+    ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pfm", ".webp", ".jp2", ".exr", ".hdr", ".pic",
+)  # fmt: skip
+MOTION_JPEG_SUFFIXES = (".mjpg", ".mjpeg")
+
+NUMPY = b"\x93NUMPY"
+EXR = b"\x76\x2f\x31\x01"
+PNG = b"\x89PNG\r\n\x1a\n"
+JPEG = b"\xff\xd8\xff"
+TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+PICTURES = (EXR, PNG, JPEG, *TIFF, b"BM", b"\0\0\0\x0cjP  ", b"#?RADIANCE", b"#?RGBE")
+NETPBM = re.compile(rb"P[1-7Ff]\s")
+HEAD = 4096
+
+
+def recognise(path: Path) -> Kind:
+    """What the file is.  Raises DataError if it cannot be opened."""
+    head = head_of(path)
+    if head.startswith(NUMPY):
+        return "array"
+    if head.startswith(b"PK\x03\x04") and _holds_arrays(path):
+        return "arrays"
+    if head.startswith(PNG) and b"acTL" in head:
+        return "video"
+    if head.startswith(JPEG) and path.suffix.lower() in MOTION_JPEG_SUFFIXES:
+        return "video"
+    webp = head.startswith(b"RIFF") and head[8:12] == b"WEBP"
+    return "picture" if webp or head.startswith(PICTURES) or NETPBM.match(head) else "video"
+
+
+def head_of(path: Path) -> bytes:
+    """The first bytes of a file.  Raises DataError."""
+    try:
+        with open(path, "rb") as file:
+            return file.read(HEAD)
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _holds_arrays(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return path.suffix.lower() == ".npz"
