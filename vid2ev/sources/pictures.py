@@ -45,11 +45,12 @@ class PictureReader:
 
     def _light_of_signal(self, picture: np.ndarray, weights: object, to_bt709: np.ndarray) -> np.ndarray:
         light = picture if self.transfer == "linear" else self._curve.to_light(picture)
-        if light.ndim == 2:
-            return self._grey(np.array(light, np.float32, order="C"))
         light = light if light.dtype.itemsize > 2 else light.astype(np.float32)  # (half floats would round the sum)
-        mix = np.asarray(weights if self.colour == "luminance" else to_bt709.T, light.dtype)
-        return np.array(light @ mix, np.float32, order="C")
+        with np.errstate(over="ignore", invalid="ignore"):  # (infinite light is counted, too)
+            if light.ndim == 2:
+                return self._grey(np.array(light, np.float32, order="C"))
+            mix = np.asarray(weights if self.colour == "luminance" else to_bt709.T, light.dtype)
+            return np.array(light @ mix, np.float32, order="C")
 
     def _grey(self, light: np.ndarray) -> np.ndarray:
         return light if self.colour == "luminance" else np.repeat(light[..., None], 3, axis=-1)

@@ -96,8 +96,11 @@ class NpzStack:
 
                 def read(k: int) -> np.ndarray:
                     try:
-                        member.seek(offset + k * size)
+                        if member.tell() != offset + k * size:
+                            member.seek(offset + k * size)
                         codes = np.frombuffer(member.read(size), self.dtype)
+                        if k == self.shape[0] - 1:
+                            member.read()  # (at the end the checksum is compared)
                         return codes.reshape(self.shape[1:])
                     except BROKEN as error:
                         raise DataError(f"{self.path}: cannot be read beyond frame {k}; write it anew") from error
