@@ -196,6 +196,19 @@ def test_a_path_goes_through_its_rows(tmp_path: Path) -> None:
             np.testing.assert_allclose(np.array(centroid(frame.light)) - (30, 25), np.negative(place), atol=0.4)
 
 
+def test_a_large_photograph_made_smaller_in_advance_shows_the_same(tmp_path: Path, monkeypatch) -> None:
+    from vid2ev.sources import photograph as module
+
+    rng = np.random.default_rng(0)
+    large = cv2.GaussianBlur(rng.uniform(0, 1, (603, 805)).astype(np.float32), (0, 0), 6)
+    path = photograph(tmp_path, large)
+    quick = list(open_source(path, motion="pan:speed=30,angle=20", size="60x40", fps=4).frames())
+    monkeypatch.setattr(module, "FINENESS", 1e9)
+    slow = list(open_source(path, motion="pan:speed=30,angle=20", size="60x40", fps=4).frames())
+    for a, b in zip(quick, slow, strict=True):
+        np.testing.assert_allclose(a.light, b.light, atol=0.02 * np.ptp(b.light))
+
+
 def test_parts_of_a_motion(tmp_path: Path) -> None:
     path = photograph(tmp_path)
     whole = list(open_source(path, motion="saccade", fps=100).frames())

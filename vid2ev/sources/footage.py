@@ -117,6 +117,8 @@ def video_stream(container: Any, name: str) -> Any:
     streams = [s for s in container.streams.video if not s.disposition & s.disposition.attached_pic]
     if not streams or container.format.name == "tty":  # (FFmpeg draws text files as video)
         raise DataError(f"{name}: holds no video stream; {REMEDY}")
+    if streams[0].codec_context is None:
+        raise DataError(f"{name}: its video is in a codec that is not known; convert it to H.264 or FFV1")
     streams[0].thread_type = "AUTO"
     return streams[0]
 

@@ -23,6 +23,7 @@ from vid2ev.sources.framing import crop_box, parse_size
 from vid2ev.sources.motion import Motion, parse_motion
 from vid2ev.sources.picture_files import read_picture
 from vid2ev.sources.pictures import PictureReader
+from vid2ev.sources.resample import resampled, taps_of
 from vid2ev.sources.spline import seen
 from vid2ev.sources.times import parse_fps, round_ns
 from vid2ev.stream.frames import Colour, Frame
@@ -30,6 +31,7 @@ from vid2ev.stream.frames import Colour, Frame
 LARGEST = (1280, 720)  # of the pictures made, if no size is given; on edge for upright photographs
 SLOWEST_FPS = 30
 STEP_PX = 0.5  # the most that anything moves from frame to frame
+FINENESS = 2  # pixels of the photograph, at least, for each that is seen, when a large one is made smaller in advance
 BORDER_PX = 2  # which the picture keeps from the border of the photograph
 
 
@@ -71,6 +73,8 @@ class Photograph:
         self.size, self._scale = self._fitted(size)
         if self._scale > 1 and not self._motion.scale:
             self.warnings.append(f"the photograph is enlarged {self._scale:.3g} times; a smaller --size would not be")
+        self._factor, self._corner = 1, (0, 0)
+        self._shrink()
         speed = self.speed()
         self._fps = parse_fps(max(SLOWEST_FPS, math.ceil(speed / STEP_PX * 1.01))) if fps is None else parse_fps(fps)
         if speed > self._fps:
@@ -118,11 +122,25 @@ class Photograph:
     def _frame(self, k: int) -> Frame:
         t = self._begin + k / self._fps
         x, y, angle, zoom = (float(value[0]) for value in self._motion.at(np.array([float(t)])))
-        centre = (self._whole[0] / 2 + x / self._scale, self._whole[1] / 2 + y / self._scale)
-        return Frame(seen(self._light, self.size, centre, angle, self._scale * zoom), self._time_ns(k))
+        place = (self._whole[0] / 2 + x / self._scale, self._whole[1] / 2 + y / self._scale)
+        centre = ((place[0] - self._corner[0]) / self._factor, (place[1] - self._corner[1]) / self._factor)
+        return Frame(seen(self._light, self.size, centre, angle, self._scale * zoom * self._factor), self._time_ns(k))
 
     def _time_ns(self, k: int) -> int:
         return round_ns(self._begin + k / self._fps)
+
+    def _shrink(self) -> None:
+        """Make one pixel of many, as long as two of them are left for each pixel that is seen at the closest."""
+        closest = self._scale * float(np.max(self._motion.at(self._motion.instants()).zoom))
+        self._factor = max(1, math.floor(1 / (FINENESS * closest)))
+        if self._factor > 1:
+            columns, rows = (side // self._factor for side in self._whole)
+            self._corner = (self._whole[0] % self._factor // 2, self._whole[1] % self._factor // 2)
+            self._light = resampled(
+                self._light,
+                taps_of(self._whole[1], Fraction(self._corner[1]), Fraction(rows * self._factor), rows),
+                taps_of(self._whole[0], Fraction(self._corner[0]), Fraction(columns * self._factor), columns),
+            )
 
     def _fitted(self, text: str | None) -> tuple[tuple[int, int], float]:
         """The size of the pictures, and output pixels per pixel of the photograph."""

@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,7 +31,9 @@ Read = Callable[[int], np.ndarray]
 
 FRAMES = ("frames", "images", "video", "light", "arr_0")
 TIMES = re.compile(r"(?:t|times|timestamps)(?:_(s|ms|us|ns))?")
-BROKEN = (OSError, ValueError, EOFError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
+BROKEN = (  # what numpy and zipfile raise for damaged files
+    OSError, ValueError, EOFError, KeyError, RuntimeError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 class Stack(Protocol):

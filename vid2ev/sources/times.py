@@ -21,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
@@ -133,7 +134,7 @@ def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a one-dimensional .npy: floating point is seconds, whole numbers by their spacing (rule above)."""
     try:
         stamps = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, SyntaxError, TokenError) as error:
         raise DataError(f"{path}: cannot be read as a .npy array ({error}); write it with numpy.save") from error
     return stamps_of_array(stamps, path)
 
