@@ -41,9 +41,9 @@ def open_events(path: Path) -> RosEvents:
 
 def write_events(path: Path, recording: Recording) -> None:
     """Write a recording.  Raises OSError where the disk cannot take it, UsageError for times that ROS does not have."""
-    bag = BagWriter(path, [EVENTS, IMAGES] if recording.frames else [EVENTS])
     counts = {EVENTS: 0, IMAGES: 0}
-    try:
+    with open(path, "wb") as file:
+        bag = BagWriter(file, [EVENTS, IMAGES] if recording.frames else [EVENTS])
         for part in outgoing(recording):
             if isinstance(part, Picture):
                 topic, t_us, message = IMAGES, part.t_us, image_bytes(part, counts[IMAGES], cdr=False)
@@ -53,9 +53,7 @@ def write_events(path: Path, recording: Recording) -> None:
             # ROS has no time 0.
             bag.write(topic, max(t_us * 1000, 1), message)
             counts[topic] += 1
-        bag.close()
-    finally:
-        bag.abandon()
+        bag.finish()
 
 
 FORMAT = Format(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from pathlib import Path
+from typing import BinaryIO
 
 from vid2ev.formats.rosbag import BAG, CHUNK, CONNECTION, MAGIC, MESSAGE, Topic
 
@@ -15,10 +15,10 @@ U32 = struct.Struct("<I")
 
 
 class BagWriter:
-    """A bag that is being written; `close` makes it whole."""
+    """A bag that is being written to a file; `finish` makes it whole."""
 
-    def __init__(self, path: Path, topics: Sequence[Topic]):
-        self._file = open(path, "wb")  # noqa: SIM115 (closed in `close`)
+    def __init__(self, file: BinaryIO, topics: Sequence[Topic]):
+        self._file = file
         self._topics = topics
         self._chunk = bytearray()
         self._places: dict[int, list[tuple[bytes, int]]] = {}  # of each connection's messages in the chunk
@@ -35,7 +35,7 @@ class BagWriter:
         if len(self._chunk) > CHUNK_SIZE:
             self._write_chunk()
 
-    def close(self) -> None:
+    def finish(self) -> None:
         """Write what is left, the index, and where it is."""
         if self._chunk:
             self._write_chunk()
@@ -45,11 +45,6 @@ class BagWriter:
         self._file.writelines(self._infos)
         self._file.seek(len(MAGIC))
         self._file.write(self._bag_record(index_at))
-        self._file.close()
-
-    def abandon(self) -> None:
-        """Close the file as it is."""
-        self._file.close()
 
     def _write_chunk(self) -> None:
         chunk_at, times = (
