@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
@@ -95,7 +95,7 @@ def convert(
     threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole
     resume     go on where an interrupted conversion was; a finished one is left as it is
-    report     called at every source frame
+    report     called at every source frame; if it returns True, the recording ends there
     piece      pixel-steps between two checkpoints
     What is written is said by the fields of `Outputs`: formats, preview, frames, frames_by, frames_as.  Everything else
     is as for `Recipe.of`.
@@ -109,7 +109,9 @@ def convert(
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
-    outputs.check(recipe.source.size, None)
+    outputs.check(recipe.source.size, expected_us(recipe))
+    if resume and not recipe.source.rewindable:
+        raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()}
     growing = [FRAME_US]
     with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=growing) as folder:
@@ -130,6 +132,8 @@ def convert(
 
 def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
+    if str(video) == "-":
+        return Path("events")
     path = Path(os.path.abspath(str(video).removeprefix("synthetic:").partition(",")[0]))
     return Path(f"{path.name if path.is_dir() else path.stem}_events")
 
@@ -137,6 +141,12 @@ def default_directory(video: str | Path) -> Path:
 def usable_cores() -> int:
     """The cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def expected_us(recipe: Recipe) -> int | None:
+    """How long the recording should become, if there is any telling."""
+    seconds = recipe.source.duration_expected_s
+    return None if seconds is None else round(1e6 * seconds)
 
 
 def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int, report: Report | None) -> Progress:
@@ -163,8 +173,9 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
             done.add(frame, events)
             done.limited, done.seconds = limited_before + limited, time.monotonic() - began
             work += max(STEP, frame.light.size)
-            if frame.original and report:
-                report(recipe, done)
+            if frame.original and report and report(recipe, done) is True:
+                done.warnings.append(f"ended by hand after {done.frames} frames")
+                break
             if frame.original and work >= piece:
                 _checkpoint(folder, dvs, film, done)
                 work = 0
@@ -173,7 +184,7 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
         folder.append(held_back)
         film.finish(held_back)
     done.count(held_back)
-    done.finished, done.warnings = True, list(recipe.source.warnings)
+    done.finished, done.warnings = True, [*done.warnings, *recipe.source.warnings]
     _checkpoint(folder, dvs, film, done)
     return done
 
@@ -211,7 +222,7 @@ def _recording(folder: Folder, recipe: Recipe, done: Progress, want_frames: bool
         done.events,
         lambda: folder.events(BLOCK),
         recipe.labels,
-        recipe.pictures if want_frames else None,
+        recipe.pictures if want_frames and recipe.source.rewindable else None,
         np.fromfile(folder.written(FRAME_US), np.int64),
     )
 

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 
 from vid2ev.errors import UsageError
 from vid2ev.formats.event_file import Picture
+from vid2ev.physics.bayer import check_pattern, mosaic
 from vid2ev.recording.manifest import identity, versions
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
@@ -45,6 +46,7 @@ class Recipe:
     seed           of the sensor, 0 ... 2**64 - 1
     labels         give each event its cause
     cuts           "restart": the sensor starts afresh after a cut, and "keep": it sees a step of light
+    bayer          the pattern of colour filters before the pixels; None for none: they see luminance
     """
 
     video: str
@@ -57,6 +59,7 @@ class Recipe:
     seed: int = 0
     labels: bool = False
     cuts: Literal["restart", "keep"] = "restart"
+    bayer: str | None = None
 
     @classmethod
     def of(
@@ -82,6 +85,8 @@ class Recipe:
         seed = rest.get("seed", 0)
         if not 0 <= seed < 1 << 64:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
+        if rest.get("bayer"):
+            rest["colour"], rest["bayer"] = "rgb", check_pattern(rest["bayer"].upper())
         source = open_source(video, **{key: rest.pop(key) for key in OPTIONS if key in rest})
         recipe = cls(str(video), source, spec, name, **rest)
         recipe.upsampler()  # (refuses what cannot be)
@@ -110,7 +115,10 @@ class Recipe:
             for interval in intervals:
                 limited += interval.limited
                 for frame in interval:
-                    yield frame, limited
+                    yield self._filtered(frame), limited
+
+    def _filtered(self, frame: Frame) -> Frame:
+        return frame if self.bayer is None else replace(frame, light=mosaic(frame.light, self.bayer))
 
     def _intervals(self, start: int) -> Generator[Interval]:
         """The frame `start` by itself, and each interval after it."""
@@ -153,6 +161,7 @@ class Recipe:
                         "size": [width, height],
                         "parameters": self.spec.model_dump(mode="json"),
                         "effects": self.spec.effects(),
+                        "bayer": self.bayer,
                     },
                     "seed": self.seed,
                     "labels": self.labels,

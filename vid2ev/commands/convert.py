@@ -107,6 +107,10 @@ class Auto(click.ParamType):
     metavar="N",
     help="Changes nothing but the time it takes.  [default: all cores]",
 )
+@click.option(
+    "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False),
+    help="Colour filters before the pixels.  [default: none, they see luminance]",
+)  # fmt: skip
 @click.option("--labels", is_flag=True, help="Store the cause of each event (signal, shot, leak, hot).")
 @click.option(
     "--format", "formats", multiple=True, default=["hdf5"], show_default=True, metavar="NAME[,NAME...]",
@@ -171,7 +175,8 @@ def _one(
         click.echo(_plan(video, directory, dict(options)))
     if dry_run:
         return None
-    with kept(directory), heard() as check, bar(quiet, check) as report:
+    live = video == "-" or video.startswith("camera:")
+    with kept(directory), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
@@ -181,6 +186,7 @@ def _one(
 
 def _plan(video: str, directory: Path, options: dict[str, Any]) -> str:
     """What a conversion would do; raises what it would raise before its first frame."""
+    from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.outputs import Outputs
     from vid2ev.recipe import Recipe
@@ -189,7 +195,7 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> str:
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
     overwrite, resume = options.pop("overwrite"), options.pop("resume")
     recipe = Recipe.of(video, seed=seed or 0, **options)
-    outputs.check(recipe.source.size, None)
+    outputs.check(recipe.source.size, conversion.expected_us(recipe))
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(outputs.names())}")]

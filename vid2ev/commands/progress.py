@@ -44,18 +44,23 @@ def kept(directory: Path) -> Iterator[None]:
 
 
 @contextmanager
-def heard() -> Iterator[Callable[[], None]]:
-    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew."""
-    asked = False
+def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
+    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew.
+
+    `gently` lets it return True for the first Ctrl-C instead: a camera has no other end.
+    """
+    asked = 0
 
     def note(*_: Any) -> None:
         nonlocal asked
-        asked = True
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if asked:
+        asked += 1
+        if asked > gently:
             raise KeyboardInterrupt
+
+    def check() -> bool:
+        if asked > gently:
+            raise KeyboardInterrupt
+        return asked > 0
 
     def tell(lost: Any) -> None:
         if lost.exc_type is not KeyboardInterrupt:  # that one is not lost
@@ -74,21 +79,21 @@ def heard() -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def bar(quiet: bool, check: Callable[[], None]) -> Iterator[Callable[[Recipe, Progress], None]]:
+def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Progress], bool]]:
     """A progress bar on a terminal: frames, time left, events per second, and speed against real time."""
     from tqdm import tqdm
 
     shown: tqdm | None = None
 
-    def report(recipe: Recipe, done: Progress) -> None:
+    def report(recipe: Recipe, done: Progress) -> bool:
         nonlocal shown
-        check()
         if shown is None:
             total, first = recipe.source.frames_expected, done.frames - 1
             shown = tqdm(total=total, initial=first, bar_format=FRAMES, leave=False, disable=quiet or None)
         speed, video_s = done.seconds or 1.0, (done.end_ns - done.start_ns) / 1e9
         shown.set_postfix_str(f"{done.events / speed:,.0f} events/s, {video_s / speed:.2g} x real time", refresh=False)
         shown.update(done.frames - shown.n)
+        return check()
 
     try:
         yield report

@@ -88,10 +88,8 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(("time", f"{first} ... {last} us ({spread:.6f} s), counted from {facts['start_us']} us"))
     if facts["times_going_back"]:
         found.append(("order", f"times go back at {facts['times_going_back']:,} places"))
-    stored = [
-        facts["format"],
-        *(f"{key.replace('_', ' ')} {value}" for key, value in facts["stored"].items() if not isinstance(value, dict)),
-    ]
+    said = {key.replace("_", " "): value for key, value in facts["stored"].items() if value is not None}
+    stored = [facts["format"], *(f"{key} {value}" for key, value in said.items() if not isinstance(value, dict))]
     stored += [f"{facts['bytes'] / count:.2f} bytes per event"] if count else []
     stored += [f"with {name}" for name in ("labels", "frames") if facts[name]]
     return [*found, ("stored", ", ".join(stored)), *(("warning", text) for text in facts["warnings"])]

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 Colour = Literal["luminance", "rgb"]
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of red, green, blue: Rec. ITU-R BT.709-6 item 3.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,3 +27,8 @@ class Frame:
     t_ns: int
     original: bool = True
     cut: bool = False
+
+    @property
+    def luminance(self) -> np.ndarray:
+        """Luminance [H, W]; `light` itself where it is that."""
+        return self.light if self.light.ndim == 2 else self.light @ LUMINANCE

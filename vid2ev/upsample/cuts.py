@@ -45,8 +45,8 @@ class CutDetector:
 
     def begins_shot(self, a: Frame, b: Frame) -> bool:
         """Whether there is a cut between a and b; to be asked for each pair of frames, in order."""
-        before = self._seen[1] if self._seen and self._seen[0] is a else reduced(a.light)
-        after = reduced(b.light)
+        before = self._seen[1] if self._seen and self._seen[0] is a else reduced(a.luminance)
+        after = reduced(b.luminance)
         was_related, related = self._related, likeness(before, after, self.threshold, self._dis)
         self._seen, self._related, self.unrelated = (b, after), related, related < UNRELATED
         return self.unrelated and was_related > RELATED

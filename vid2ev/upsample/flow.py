@@ -67,7 +67,7 @@ class FlowUpsampling:
         """The frames after a up to and including b."""
         if self.subframes == 1 or b.t_ns - a.t_ns <= 1:
             return Interval(iter([b]))
-        motion = self._motion(a.light, b.light)
+        motion = self._motion(a.luminance, b.luminance)
         asked = steps_for(motion.shift_px, (b.t_ns - a.t_ns) * 1e-9)
         steps = min(asked, self.max_subframes) if self.subframes == "auto" else self.subframes
         limited = self.subframes == "auto" and asked > self.max_subframes
@@ -93,15 +93,21 @@ class FlowUpsampling:
 
 def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
     """The frames after a up to and including b, in even steps of time."""
-    before, after = with_margin(a.light), with_margin(b.light)
-    moving = np.empty((3, *a.light.shape), np.float32)
+    before, after = (list(map(with_margin, channels_of(frame.light))) for frame in (a, b))
+    moving = np.empty((3, *a.light.shape[:2]), np.float32)
     for t_ns in instants(a.t_ns, b.t_ns, steps):
         time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
-        light = np.empty(a.light.shape, np.float32)
         motion_at(motion, time, moving)
-        carry(before, after, moving, time, light)
-        yield Frame(light, t_ns, original=False)
+        channels = [np.empty(a.light.shape[:2], np.float32) for _ in before]
+        for pair in zip(before, after, channels, strict=True):
+            carry(*pair[:2], moving, time, pair[2])
+        yield Frame(channels[0] if a.light.ndim == 2 else np.stack(channels, axis=-1), t_ns, original=False)
     yield b
+
+
+def channels_of(light: np.ndarray) -> list[np.ndarray]:
+    """Luminance, or red, green and blue, each [H, W]."""
+    return [light] if light.ndim == 2 else [np.ascontiguousarray(light[..., channel]) for channel in range(3)]
 
 
 def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes: float) -> np.ndarray:
