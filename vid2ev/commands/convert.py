@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from vid2ev.commands.source_options import source_options
+
 
 class Auto(click.ParamType):
     """A whole number from `least`, or one word."""
@@ -64,36 +66,7 @@ class Auto(click.ParamType):
     "--cuts", type=click.Choice(["restart", "keep"]), default="restart", show_default=True,
     help="After a cut the sensor starts afresh, or sees a step of light.",
 )  # fmt: skip
-@click.option(
-    "--transfer",
-    default="auto",
-    show_default=True,
-    metavar="CURVE",
-    help="Codes to light: auto, srgb, bt709, pq, hlg, gamma:G, linear or another curve of the standards.",
-)
-@click.option(
-    "--fps",
-    type=click.FloatRange(0, min_open=True),
-    metavar="RATE",
-    help="Frames per second, instead of the source's own times.",
-)
-@click.option("--start", type=float, metavar="S", help="Begin at this second of the source's own clock.")
-@click.option("--stop", type=float, metavar="S", help="End there.")
-@click.option(
-    "--slowdown",
-    type=click.FloatRange(0, min_open=True),
-    metavar="F",
-    help="The footage plays F times slower than the world went: 8 for 240 fps that play at 30.",
-)
-@click.option("--crop", metavar="WxH+X+Y", help="Part of the picture; WxH is the middle.")
-@click.option(
-    "--size", metavar="W|WxH|WxH!", help="Pixels to bring it to: the largest part of that shape, or with ! all of it."
-)
-@click.option(
-    "--motion",
-    metavar="MOTION",
-    help="Move a camera over a photograph: pan, saccade, zoom (pan:speed=200,angle=30) or a file PATH.csv.",
-)
+@source_options
 @click.option(
     "--seed",
     type=Auto("random", 0, "seed"),

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import click
+
+from vid2ev.commands.source_options import source_options
 
 
 @click.command(short_help="Say what a recording, an event file or a video holds.")
 @click.argument("file")
+@source_options
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
-def info(file: str, as_json: bool) -> None:
-    """Say what FILE holds: a folder that `vid2ev convert` wrote, an event file (events.h5), or a source of frames.
+def info(file: str, as_json: bool, **options: Any) -> None:
+    """Say what FILE holds: a folder that `vid2ev convert` wrote, an event file (events.h5), or a source of frames, read
+    as the other options say.
 
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
@@ -36,7 +41,7 @@ def info(file: str, as_json: bool) -> None:
     else:
         from vid2ev.sources import open_source
 
-        source = open_source(file)
+        source = open_source(file, **options)
         found = {"path": file} | source.describe()
         facts = [("source", summary.source_text(found)), *(("warning", text) for text in source.warnings)]
     click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))

@@ -55,7 +55,8 @@ class Cut(Edit):
         whole, whole_s = super().frames_expected, super().duration_expected_s
         if whole is None or not whole_s or self._duration_s is None:
             return None
-        return max(1, min(whole, round(whole * self._duration_s / whole_s)))
+        both_ends = self._stop is not None
+        return max(1, min(whole, round(whole * self._duration_s / whole_s) + both_ends))
 
     @property
     def duration_expected_s(self) -> float | None:

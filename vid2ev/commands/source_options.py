@@ -1,0 +1,50 @@
+"""The options that say how a source is read, the same for every command that reads one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+SOURCE_OPTIONS = (
+    click.option(
+        "--transfer",
+        default="auto",
+        show_default=True,
+        metavar="CURVE",
+        help="Codes to light: auto, srgb, bt709, pq, hlg, gamma:G, linear or another curve of the standards.",
+    ),
+    click.option(
+        "--fps",
+        type=click.FloatRange(0, min_open=True),
+        metavar="RATE",
+        help="Frames per second, instead of the source's own times.",
+    ),
+    click.option("--start", type=float, metavar="S", help="Begin at this second of the source's own clock."),
+    click.option("--stop", type=float, metavar="S", help="End there."),
+    click.option(
+        "--slowdown",
+        type=click.FloatRange(0, min_open=True),
+        metavar="F",
+        help="The footage plays F times slower than the world went: 8 for 240 fps that play at 30.",
+    ),
+    click.option("--crop", metavar="WxH+X+Y", help="Part of the picture; WxH is the middle."),
+    click.option(
+        "--size",
+        metavar="W|WxH|WxH!",
+        help="Pixels to bring it to: the largest part of that shape, or with ! all of it.",
+    ),
+    click.option(
+        "--motion",
+        metavar="MOTION",
+        help="Move a camera over a photograph: pan, saccade, zoom (pan:speed=200,angle=30) or a file PATH.csv.",
+    ),
+)
+
+
+def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command with the options of `open_source`, in this order."""
+    for option in reversed(SOURCE_OPTIONS):
+        command = option(command)
+    return command
