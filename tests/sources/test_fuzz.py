@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+import tifffile
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import open_source
@@ -133,6 +134,11 @@ def make_npz(folder: Path, encode: Callable[..., Path]) -> Path:
     return folder / "a.npz"
 
 
+def make_pages(folder: Path, encode: Callable[..., Path]) -> Path:
+    tifffile.imwrite(folder / "a.tif", np.stack(noise(6)), photometric="minisblack", compression="zlib")
+    return folder / "a.tif"
+
+
 MAKERS: dict[str, Make] = {
     "h264-mp4": make_film("a.mp4", "libx264"),
     "h264-fragments": make_film("a.mp4", "libx264", container_options={"movflags": "frag_keyframe+empty_moov"}),
@@ -149,6 +155,7 @@ MAKERS: dict[str, Make] = {
     "y4m": make_film("a.y4m", "rawvideo"),
     "npy": make_npy,
     "npz": make_npz,
+    "pages": make_pages,
 } | {suffix: make_picture(suffix) for suffix in ("png", "jpg", "tif", "webp", "bmp", "ppm", "pfm", "hdr", "exr", "jp2")}
 PICTURES = ("png", "jpg", "tif", "webp", "bmp", "ppm", "pfm", "hdr", "exr", "jp2")
 
@@ -163,7 +170,7 @@ def fuzz(kind: str, folder: Path, encode: Callable[..., Path], count: int, seed:
         path = place / made.name
         path.write_bytes(damaged(data, rng))
         paths.append(place if kind in PICTURES else path)
-    options: dict[str, object] = {"fps": 25} if kind in (*PICTURES, "npy") else {}
+    options: dict[str, object] = {"fps": 25} if kind in (*PICTURES, "npy", "pages") else {}
     made.unlink()
     if kind not in PICTURES:
         paths = [path.rename(path.parent.with_suffix(path.suffix)) for path in paths]

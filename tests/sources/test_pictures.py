@@ -14,7 +14,7 @@ import tifffile
 from PIL import Image, ImageOps
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources import open_source
+from vid2ev.sources import open_source, picture_files
 from vid2ev.sources.picture_files import read_picture
 from vid2ev.sources.recognise import recognise
 from vid2ev.sources.tags import BT709_WEIGHTS
@@ -87,6 +87,34 @@ def test_a_tiff_with_pages_is_a_clip(tmp_path: Path) -> None:
     source = open_source(path)
     assert [frame.t_ns for frame in source.frames(2)] == [5_000_000, 6_000_000, 7_000_000]
     assert source.duration_expected_s == 0.007
+
+
+def test_pages_of_other_kinds_are_refused(tmp_path: Path) -> None:
+    for second, said in ((np.zeros((6, 8), np.int32), "type int32"), (np.zeros((6, 9), np.uint8), "9x6 pixels")):
+        with tifffile.TiffWriter(tmp_path / "a.tif") as writer:
+            for page in (codes((6, 8)), second):
+                writer.write(page, photometric="minisblack")
+        with pytest.raises(DataError, match=said):
+            list(open_source(tmp_path / "a.tif", fps=1).frames())
+
+
+def test_pages_are_read_some_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stack = codes((11, 6, 8))
+    tifffile.imwrite(tmp_path / "stack.tif", stack, photometric="minisblack")
+    read, calls = picture_files._read, []
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return read(*arguments)
+
+    monkeypatch.setattr(picture_files, "AHEAD", 4 * 48)
+    monkeypatch.setattr(picture_files, "_read", counted)
+    source = open_source(tmp_path / "stack.tif", fps=1)
+    calls.clear()
+    for frame, page in zip(source.frames(), stack, strict=True):
+        np.testing.assert_array_equal(frame.light, code_table("srgb", 8)[page])
+    assert len(calls) == 2 * 3
+    assert [f.t_ns for f in source.frames(9)] == [9 * 10**9, 10 * 10**9]
 
 
 @pytest.mark.parametrize("suffix", ["hdr", "pfm"])

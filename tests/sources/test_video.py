@@ -175,6 +175,14 @@ def test_packed_and_semi_planar_formats_are_taken_apart_without_loss(make_pictur
             np.testing.assert_array_equal(got, expected)
 
 
+@pytest.mark.parametrize("pixel_format", ["y210be", "grayf32le", "bayer_rggb8"])
+def test_formats_that_cannot_be_taken_apart_are_refused(pixel_format: str) -> None:
+    from vid2ev.sources.planes import planar
+
+    with pytest.raises(DataError, match=f"pixel format {pixel_format} is not supported"):
+        planar(av.VideoFrame(16, 16, pixel_format), "clip")
+
+
 @pytest.mark.parametrize(("tags", "transfer"), [
     ({}, "bt709"),
     ({"color_trc": 1}, "bt709"),

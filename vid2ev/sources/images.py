@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.picture_files import pages_of, read_picture
+from vid2ev.sources.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.sources.pictures import PictureReader
 from vid2ev.sources.recognise import PICTURE_SUFFIXES
 from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, stamps_beside
@@ -83,7 +83,7 @@ class Images:
 
     def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
         """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
-        clock, index = Clock(self._fps), 0
+        clock, index, pages = Clock(self._fps), 0, None if self.path.is_dir() else PageReader(self.path)
         stamps: Sequence[Fraction | None] = self._stamps or [None] * len(self._places)
         for (file, page), stamp in zip(self._places, stamps, strict=True):
             t_ns = clock.next(stamp)
@@ -92,12 +92,12 @@ class Images:
             if until_ns is not None and t_ns > until_ns:
                 return
             if index >= start:
-                yield Frame(self._light(file, page), t_ns)
+                yield Frame(self._light(file, pages.read(page) if pages else read_picture(file)), t_ns)
             index += 1
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
-    def _light(self, file: Path, page: int) -> np.ndarray:
-        pixels, primaries = read_picture(file, page)
+    def _light(self, file: Path, picture: Picture) -> np.ndarray:
+        pixels, primaries = picture
         if (pixels.shape[1], pixels.shape[0]) != self.size:
             width, height = self.size
             raise DataError(

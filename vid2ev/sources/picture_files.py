@@ -19,6 +19,8 @@ from vid2ev.sources.pictures import TYPES
 from vid2ev.sources.primaries import Primaries, primaries_at
 from vid2ev.sources.recognise import EXR, TIFF, head_of
 
+AHEAD = 1 << 25  # bytes of pages that are read at once
+
 
 class Picture(NamedTuple):
     """Pixels [H, W] or [H, W, 3 (red, green, blue)]; the primaries are those of BT.709 if the file names no others."""
@@ -37,14 +39,34 @@ def pages_of(path: Path) -> int:
 def read_picture(path: Path, page: int = 0) -> Picture:
     """A picture, upright.  Raises DataError for a file that holds none, UsageError for an EXR without the package."""
     head = head_of(path)
-    picture = _read_exr(path) if head.startswith(EXR) else Picture(_read(path, page, head))
-    pixels = picture.pixels
-    if pixels.dtype not in (np.uint8, np.uint16) and pixels.dtype.kind != "f":
-        raise DataError(f"{path}: pixels of type {pixels.dtype}, expected {TYPES}")
+    return _checked(_read_exr(path) if head.startswith(EXR) else Picture(_read(path, page, head)[0]), path)
+
+
+class PageReader:
+    """Reads the pages of a TIFF, some at a time: to find one, OpenCV walks through all before it."""
+
+    def __init__(self, path: Path):
+        self._path, self._first = path, 0
+        self._pages: list[np.ndarray] = []
+
+    def read(self, page: int) -> Picture:
+        """A page; quick for pages in order."""
+        if not self._first <= page < self._first + len(self._pages):
+            self._first, self._pages = page, []
+            one = read_picture(self._path, page).pixels
+            self._pages = [one] if one.nbytes > AHEAD else _read(self._path, page, TIFF[0], AHEAD // one.nbytes)
+        return _checked(Picture(self._pages[page - self._first]), self._path)
+
+
+def _checked(picture: Picture, path: Path) -> Picture:
+    dtype = picture.pixels.dtype
+    if dtype not in (np.uint8, np.uint16) and dtype.kind != "f":
+        raise DataError(f"{path}: pixels of type {dtype}, expected {TYPES}")
     return picture
 
 
-def _read(path: Path, page: int, head: bytes) -> np.ndarray:
+def _read(path: Path, page: int, head: bytes, count: int = 1) -> list[np.ndarray]:
+    """Pictures from a page on, as many as there are up to `count`.  Raises DataError if there is none."""
     import cv2
 
     flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
@@ -52,17 +74,17 @@ def _read(path: Path, page: int, head: bytes) -> np.ndarray:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)
     try:
         if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
-            found = cv2.imreadmulti(str(path), page, 1, flags=flags)[1]
-            pixels = found[0] if found else None
+            found = list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
         else:
-            pixels = cv2.imread(str(path), flags)
+            one = cv2.imread(str(path), flags)
+            found = [] if one is None else [one]
     except cv2.error:
-        pixels = None
+        found = []
     finally:
         cv2.utils.logging.setLogLevel(level)
-    if pixels is None:
+    if not found:
         raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
-    return pixels if pixels.ndim == 2 else pixels[..., 2::-1]
+    return [pixels if pixels.ndim == 2 else pixels[..., 2::-1] for pixels in found]
 
 
 def _read_exr(path: Path) -> Picture:

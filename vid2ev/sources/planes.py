@@ -13,8 +13,9 @@ def planar(picture: Any, path: object) -> Any:
     """The picture in planes of whole codes: as it is, or rearranged without loss (semi-planar, packed, big-endian)."""
     kind = picture.format
     bits = max(component.bits for component in kind.components)
+    unsupported = f"{path}: pixel format {kind.name} is not supported; convert it to 8 to 16 bits of RGB or YUV"
     if bits > 16 or "f16" in kind.name or kind.name.startswith(("bayer", "xyz")):
-        raise DataError(f"{path}: pixel format {kind.name} is not supported; convert it to 8 to 16 bits of RGB or YUV")
+        raise DataError(unsupported)
     depth = "" if bits <= 8 else f"{bits}le"
     if kind.is_rgb or kind.has_palette:
         wanted = f"gbrp{depth}"
@@ -25,7 +26,10 @@ def planar(picture: Any, path: object) -> Any:
         wanted = f"yuv{chroma[halvings_of(kind.chroma_width), halvings_of(kind.chroma_height)]}p{depth}"
     if kind.name.replace("yuvj", "yuv").replace("yuva", "yuv").replace("gbrap", "gbrp") == wanted:
         return picture
-    return picture.reformat(format=wanted)
+    try:
+        return picture.reformat(format=wanted)
+    except OSError as error:  # (swscale cannot read it)
+        raise DataError(unsupported) from error
 
 
 def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
