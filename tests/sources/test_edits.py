@@ -306,3 +306,18 @@ def test_everything_at_once(shared_videos: Path) -> None:
     assert abs(frames[0].t_ns - plain[0].t_ns / 4) <= 1
     assert frames[0].light.mean() == pytest.approx(plain[0].light[:, 160:1120].mean(), rel=5e-3)
     assert set(source.describe()["edits"]) == {"start_s", "stop_s", "slowdown", "part", "resized"}
+
+
+def test_parts_of_a_clip_with_another_rate(encode) -> None:
+    """With --fps the clock counts frames, so that all of them before the part have to be seen."""
+    path = encode("a.mp4", rising(40), codec="libx264", options={"g": "8"})
+    whole = list(open_source(path, fps=100).frames())
+    same(open_source(path, fps=100, start=0.155, stop=0.2).frames(), whole[16:21])
+
+
+@pytest.mark.parametrize("name", ["gopro_karma.mp4", "intel_asl_again.mkv", "nasa_13013.mp4"])
+def test_parts_of_real_clips(shared_videos: Path, name: str) -> None:
+    whole = list(open_source(shared_videos / name, size="40", stop=2.2).frames())
+    since = whole[38].t_ns + 1
+    part = list(open_source(shared_videos / name, size="40", start=Fraction(since, 10**9), stop=2.2).frames())
+    same(part, whole[39:])
