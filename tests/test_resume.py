@@ -49,6 +49,9 @@ OPTIONS = {
     "labels": True,
     "piece": 3 << 18,
     "threads": 1,
+    "probe": ["20,16"],
+    "formats": ["hdf5", "evt3"],
+    "frames": "npz",
 }
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
@@ -69,7 +72,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
 
 
 def assert_same(one: Path, other: Path) -> None:
-    for name in ("events.h5", "preview.mp4"):
+    for name in ("events.h5", "events.raw", "preview.mp4", "probe.csv", "probe.png", "frames.npz"):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
     manifests = [json.loads((directory / "manifest.json").read_text()) for directory in (one, other)]
     for manifest in manifests:

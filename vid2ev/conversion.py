@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import secrets
+import shutil
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -19,16 +20,18 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
+from vid2ev.recording.disk import write_npz
 from vid2ev.recording.folder import Folder, begun_job
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.recording.preview import Preview
+from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
-FRAME_US = "frame_us"  # the file of the instants of the frames
+FRAME_US, PROBE = "frame_us", "probe.csv"  # files that grow: the instants of the frames, the pixels that are probed
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
 
 
@@ -113,18 +116,24 @@ def convert(
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()}
-    growing = [FRAME_US]
+    growing = [FRAME_US, *[PROBE] * bool(outputs.probe)]
     with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=growing) as folder:
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
         dvs = recipe.dvs(threads)
         film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview)
-        done = _record(recipe, dvs, film, folder, piece, report)
+        probe = Probe(outputs.probe, recipe.source.size[0]) if outputs.probe else None
+        done = _record(recipe, dvs, film, probe, folder, piece, report)
         manifest = job | _outcome(done, dvs) | {"run": _run(video, threads, done)}
         with folder.writing():
             outputs.write(folder.whole, _recording(folder, recipe, done, outputs.want_frames))
             film.join(folder.whole / "preview.mp4")
+            if probe:
+                shutil.copyfile(folder.written(PROBE), folder.whole / PROBE)
+                plot(folder.whole / PROBE, folder.whole / "probe.png")
+            if outputs.noise_maps:
+                write_npz(folder.whole / "noise_maps.npz", dvs.maps())
             write_manifest(folder.whole / "manifest.json", manifest)
             folder.publish()
     return manifest
@@ -132,8 +141,8 @@ def convert(
 
 def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
-    if str(video) == "-":
-        return Path("events")
+    if str(video) == "-" or str(video).startswith("camera:"):
+        return Path("stdin_events" if str(video) == "-" else f"{str(video).replace(':', '')}_events")
     path = Path(os.path.abspath(str(video).removeprefix("synthetic:").partition(",")[0]))
     return Path(f"{path.name if path.is_dir() else path.stem}_events")
 
@@ -149,7 +158,9 @@ def expected_us(recipe: Recipe) -> int | None:
     return None if seconds is None else round(1e6 * seconds)
 
 
-def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int, report: Report | None) -> Progress:
+def _record(
+    recipe: Recipe, dvs: Dvs, film: Preview, probe: Probe | None, folder: Folder, piece: int, report: Report | None
+) -> Progress:
     """Events and preview into the folder, from its last checkpoint to the end of the source."""
     done = _take_up(folder, dvs, film)
     if done.finished:
@@ -164,12 +175,16 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
             dvs.step(first[0].light, first[0].t_ns)
             done.frames, done.start_ns, done.end_ns = 1, first[0].t_ns, first[0].t_ns
             _note(folder, first[0])
+            if probe:
+                folder.write(PROBE, HEADER + probe.lines(first[0], Events.empty(), dvs.inside(probe.places)))
         for frame, limited in light:
             events = dvs.see(frame)
             with folder.writing():
                 folder.append(events)
                 film.add(frame, events)
                 _note(folder, frame)
+                if probe:
+                    folder.write(PROBE, probe.lines(frame, events, dvs.inside(probe.places)))
             done.add(frame, events)
             done.limited, done.seconds = limited_before + limited, time.monotonic() - began
             work += max(STEP, frame.light.size)
@@ -183,6 +198,8 @@ def _record(recipe: Recipe, dvs: Dvs, film: Preview, folder: Folder, piece: int,
     with folder.writing():
         folder.append(held_back)
         film.finish(held_back)
+        if probe:
+            folder.write(PROBE, "".join(probe.event_lines(held_back)).encode())
     done.count(held_back)
     done.finished, done.warnings = True, [*done.warnings, *recipe.source.warnings]
     _checkpoint(folder, dvs, film, done)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -23,6 +24,8 @@ class Outputs:
     frames      slices of the events as "npz", "png" or "mp4"; None for none
     frames_by   the slices, as `views.requests.parse_slicing` has them
     frames_as   what they are made into, as `views.requests.parse_representation` has it
+    probe       pixels (x, y) whose state over time goes to probe.csv and probe.png
+    noise_maps  noise_maps.npz: thresholds, hot and cold pixels
     """
 
     formats: tuple[str, ...] = ("hdf5",)
@@ -30,13 +33,20 @@ class Outputs:
     frames: str | None = None
     frames_by: str = "duration:10ms"
     frames_as: str = "counts"
+    probe: tuple[tuple[int, int], ...] = ()
+    noise_maps: bool = False
 
     @classmethod
-    def of(cls, formats: str | Sequence[str] = ("hdf5",), **rest: Any) -> Outputs:
-        """The outputs of these options; several formats may be in one text, with commas.  Raises UsageError."""
+    def of(
+        cls, formats: str | Sequence[str] = ("hdf5",), probe: Sequence[str | tuple[int, int]] = (), **rest: Any
+    ) -> Outputs:
+        """The outputs of these options; several formats may be in one text, with commas, and a pixel be "x,y".
+
+        Raises UsageError.
+        """
         texts = [formats] if isinstance(formats, str) else formats
         names = tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",")))
-        outputs = cls(names, **rest)
+        outputs = cls(names, probe=tuple(map(pixel_of, probe)), **rest)
         for name in names:
             if not format_named(name).write:
                 writable = ", ".join(name for name in FORMATS if format_named(name).write)
@@ -53,7 +63,11 @@ class Outputs:
         return {each.name: options.pop(each.name) for each in fields(cls) if each.name in options}
 
     def check(self, size: tuple[int, int], duration_us: int | None) -> None:
-        """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration if known."""
+        """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration if known, and
+        where a pixel to be probed is not there."""
+        for x, y in self.probe:
+            if not (0 <= x < size[0] and 0 <= y < size[1]):
+                raise UsageError(f"probe {x},{y}: expected a pixel of a sensor of {size[0]}x{size[1]}")
         for kind in self.kinds():
             check_holds(kind, size, duration_us)
 
@@ -81,6 +95,8 @@ class Outputs:
     def names(self) -> list[str]:
         """All files, the manifest among them."""
         frames = [KINDS[self.frames]] if self.frames else []
+        probe = ["probe.csv", "probe.png"] if self.probe else []
+        frames += [*probe, *["noise_maps.npz"] * self.noise_maps]
         return [*self.files().values(), *frames, *["preview.mp4"] * self.preview, "manifest.json"]
 
     def write(self, folder: Path, recording: Recording) -> None:
@@ -92,3 +108,13 @@ class Outputs:
         if self.frames is not None:
             path = folder / KINDS[self.frames]
             write_frames(path, recording, self.frames_as, self.frames_by, kind=self.frames)
+
+
+def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:
+    """The pixel of a text "x,y"; raises UsageError."""
+    if not isinstance(text, str):
+        return text
+    found = re.fullmatch(r"\s*(\d{1,9})\s*,\s*(\d{1,9})\s*", text)
+    if not found:
+        raise UsageError(f"probe '{text}': expected column and row of a pixel, such as 160,120")
+    return int(found[1]), int(found[2])

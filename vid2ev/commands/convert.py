@@ -100,6 +100,10 @@ class Auto(click.ParamType):
     "--frames-as", default="counts", show_default=True, metavar="KIND",
     help="counts, frame:2 (full scale), voxel:5 (bins), time-surface:30ms or sae.",
 )  # fmt: skip
+@click.option(
+    "--probe", multiple=True, metavar="X,Y", help="Write the state of a pixel over time, as CSV and as a plot."
+)
+@click.option("--noise-maps", is_flag=True, help="Write each pixel's thresholds, and which are hot or cold.")
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")
@@ -149,7 +153,7 @@ def _one(
     if dry_run:
         return None
     live = video == "-" or video.startswith("camera:")
-    with kept(directory), heard(gently=live) as check, bar(quiet, check) as report:
+    with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]

@@ -26,14 +26,14 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {
 
 
 @contextmanager
-def kept(directory: Path) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed."""
+def kept(directory: Path, again: bool = True) -> Iterator[None]:
+    """What goes wrong within says so if it can be resumed; `again`: the source can be read again."""
     from vid2ev.recording.folder import partial_of
 
     try:
         yield
     except (DataError, KeyboardInterrupt) as error:
-        kept = (partial_of(directory) / "checkpoint.npz").exists()
+        kept = again and (partial_of(directory) / "checkpoint.npz").exists()
         remedy = (
             "; what is done is kept, the same command with --resume goes on" if kept else "; nothing is left behind"
         )

@@ -14,6 +14,7 @@ from vid2ev.kernels.order import order_keys, unpack
 from vid2ev.kernels.work import new_work
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
+from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.sources.transfer import code_table
@@ -175,6 +176,16 @@ class Dvs:
         self._polarities[...] = state["polarities"]
         if self._frames is not None:
             self._frames.restore(state)
+
+    def inside(self, pixels: np.ndarray) -> Inside:
+        """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""
+        leak = self._numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
+        return inside_of(pixels, self._planes, self._flags, self._numbers, leak)
+
+    def maps(self) -> dict[str, np.ndarray]:
+        """What is frozen in this sensor, each [height, width]: threshold_on and threshold_off [nat], hot, cold, and
+        shading (optical gain)."""
+        return maps_of(self._planes, self._flags, self._numbers, self._bad, self.size)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -1,0 +1,98 @@
+"""probe.csv tells the truth about single pixels, and noise_maps.npz about all of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vid2ev import Dvs, Events, UsageError, convert, load_sensor, read_events
+from vid2ev.outputs import Outputs
+from vid2ev.recording.probe import read_probe
+
+F = np.float32
+CLIP = "synthetic:moving-edge,size=48x32,fps=200,duration_s=0.3"
+PIXEL = (24, 16)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "overrides"),
+    [
+        ("ideal", []),
+        ("paper", ["refractory_us=0"]),
+        ("v2e-clean", []),
+        ("v2e-noisy", ["shot_rate_hz=0", "refractory_us=0"]),
+        ("paper", ["photoreceptor_noise=0.02", "refractory_us=0", "leak_rate_hz=5"]),
+    ],
+)
+def test_the_signal_stays_between_the_levels_and_events_are_those_of_the_pixel(
+    tmp_path: Path, sensor: str, overrides: list[str]
+) -> None:
+    options = {"subframes": 2, "threads": 1, "preview": False, "probe": ["24,16", (3, 5)], "upsample": "linear"}
+    convert(CLIP, tmp_path / "out", sensor, overrides, **options)
+    found = read_probe(tmp_path / "out" / "probe.csv")
+    events = Events.concatenate(read_events(tmp_path / "out"))
+    assert set(found) == {PIXEL, (3, 5)} and (tmp_path / "out" / "probe.png").stat().st_size > 10_000
+    for (x, y), columns in found.items():
+        mine = events.select((events.x == x) & (events.y == y))
+        for p, name in enumerate(("OFF", "ON")):
+            assert columns[name].tolist() == mine.t[mine.p == p].tolist()
+        slack = 1e-5 if "photoreceptor_noise=0.02" not in overrides else 0.2  # (its path between frames is not told)
+        assert np.all(columns["signal_nat"] < columns["level_on_nat"] + slack)
+        assert np.all(columns["signal_nat"] > columns["level_off_nat"] - slack)
+    assert len(found[PIXEL]["ON"]) + len(found[PIXEL]["OFF"]) > 0
+
+
+def test_without_effects_the_signal_is_the_log_of_the_light(tmp_path: Path) -> None:
+    convert(CLIP, tmp_path / "out", "ideal", preview=False, probe=["24,16"], upsample="none", threads=1)
+    columns = read_probe(tmp_path / "out" / "probe.csv")[PIXEL]
+    np.testing.assert_allclose(columns["signal_nat"], np.log(columns["light"] + 1e-3), atol=2e-6)
+    assert len(columns["t_us"]) == 61 and np.all(np.diff(columns["t_us"]) == 5000)
+
+
+def test_leak_lifts_the_signal_above_what_is_filtered() -> None:
+    dvs = Dvs(load_sensor("ideal", ["leak_rate_hz=1"]), (2, 1))
+    light = np.full((1, 2), 0.5, F)
+    for k in range(3):
+        dvs.step(light, k * 10**8)
+    state = dvs.inside(np.array([0, 1]))
+    np.testing.assert_allclose(state.signal - state.filtered, 0.2 * dvs.spec.threshold_on, rtol=1e-6)
+
+
+def test_maps_are_what_the_pixels_do(tmp_path: Path) -> None:
+    """Light that rises by one e-fold in each pixel: events come at multiples of the threshold of the map."""
+    overrides = ["mismatch=0.03", "hot_probability=0.01", "hot_rate_hz=0", "cold_probability=0.02"]
+    spec = load_sensor("ideal", overrides)
+    dvs = Dvs(spec, (40, 30), seed=5)
+    maps = dvs.maps()
+    assert maps["threshold_on"].std() == pytest.approx(0.03, rel=0.1)
+    dvs.step(np.full((30, 40), 1.0, F), 0)
+    events = dvs.step(np.full((30, 40), np.e, F), 10**9)
+    sent = np.zeros((30, 40), int)
+    np.add.at(sent, (events.y, events.x), 1)
+    rise = np.log(np.e + 1e-3) - np.log(1.001)
+    good = ~maps["hot"] & ~maps["cold"]
+    np.testing.assert_array_equal(sent[good], np.floor(rise / maps["threshold_on"][good]).astype(int))
+    assert maps["cold"].any() and not sent[maps["cold"]].any()
+    convert("synthetic:moving-edge,size=40x30", tmp_path / "out", spec, seed=5, noise_maps=True, preview=False)
+    with np.load(tmp_path / "out" / "noise_maps.npz") as written:
+        for name, plane in maps.items():
+            np.testing.assert_array_equal(written[name], plane)
+
+
+def test_shading_is_in_the_maps() -> None:
+    maps = Dvs(load_sensor("ideal", ["shading=[-0.5]"]), (9, 5)).maps()
+    assert maps["shading"][2, 4] == pytest.approx(1) and maps["shading"].min() < 1 and maps["shading"].shape == (5, 9)
+
+
+@pytest.mark.parametrize("text", ["1", "1,2,3", "a,b", "-1,2", "", "1.5,2"])
+def test_what_is_no_pixel_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="160,120"):
+        Outputs.of(probe=[text])
+
+
+def test_a_pixel_outside_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="48x32"):
+        convert(CLIP, tmp_path / "out", probe=["48,0"])
+    assert not any(tmp_path.iterdir())

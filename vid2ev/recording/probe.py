@@ -1,0 +1,103 @@
+"""Single pixels over time: what they saw, what they had inside, what they sent.
+
+probe.csv has a line for every frame, sub-frames too, and every event of each pixel, in order of time:
+
+    t_us           microseconds on the clock of the source, to the nanosecond for frames
+    x, y           the pixel
+    what           frame, ON or OFF
+    light          linear light of the frame
+    filtered_nat   what the photoreceptor makes of it, after the logarithm
+    signal_nat     the same with leak and photoreceptor noise: what the comparator sees
+    level_on_nat, level_off_nat     where the next event of each kind comes
+
+The columns from `light` on are empty for events.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+if TYPE_CHECKING:
+    from vid2ev.sensors.inside import Inside
+
+COLUMNS = ("t_us", "x", "y", "what", "light", "filtered_nat", "signal_nat", "level_on_nat", "level_off_nat")
+HEADER = f"{','.join(COLUMNS)}\n".encode()
+POLARITY = ("OFF", "ON")
+
+
+class Probe:
+    """Writes the lines of some pixels (x, y) of a sensor that is `width` pixels wide."""
+
+    def __init__(self, pixels: Sequence[tuple[int, int]], width: int):
+        self.pixels = tuple(pixels)
+        self._width = width
+        self.places = np.array([y * width + x for x, y in pixels], np.int64)
+
+    def lines(self, frame: Frame, events: Events, inside: Inside) -> bytes:
+        """The events since the frame before, and a frame with what the pixels have inside after it."""
+        lines = self.event_lines(events)
+        t_us = f"{frame.t_ns // 1000}.{frame.t_ns % 1000:03d}"
+        for k, (x, y) in enumerate(self.pixels):
+            state = ",".join(f"{column[k]:.7g}" for column in inside)
+            lines.append(f"{t_us},{x},{y},frame,{frame.light[y, x]:.7g},{state}\n")
+        return "".join(lines).encode()
+
+    def event_lines(self, events: Events) -> list[str]:
+        """The lines of events, those of other pixels left out."""
+        found = np.flatnonzero(np.isin(events.y.astype(np.int64) * self._width + events.x, self.places))
+        return [f"{events.t[k]},{events.x[k]},{events.y[k]},{POLARITY[events.p[k]]},,,,,\n" for k in found]
+
+
+def plot(table: Path, picture: Path) -> None:
+    """Draw a probe.csv: for each pixel its light, and its signal between the levels with the events on it."""
+    from matplotlib.figure import Figure
+
+    pixels = read_probe(table)
+    figure = Figure(figsize=(12, 4 * len(pixels)), layout="constrained")
+    axes = figure.subplots(2 * len(pixels), 1, sharex=True, squeeze=False, height_ratios=[1, 2] * len(pixels))[:, 0]
+    for (name, columns), light, inside in zip(pixels.items(), axes[::2], axes[1::2], strict=True):
+        _draw(columns, light, inside)
+        light.set_title(f"pixel {name[0]}, {name[1]}", loc="left")
+    axes[-1].set_xlabel("time [s]")
+    figure.savefig(picture, dpi=100, metadata={"Software": None})
+
+
+def read_probe(table: Path) -> dict[tuple[int, int], dict[str, np.ndarray]]:
+    """The columns of each pixel of a probe.csv: those of frames, and the times [us] of its ON and OFF events."""
+    found: dict[tuple[int, int], dict[str, list[Any]]] = {}
+    with open(table, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            columns = found.setdefault((int(row["x"]), int(row["y"])), {name: [] for name in (*COLUMNS[4:], "t_us")})
+            if row["what"] != "frame":
+                columns.setdefault(row["what"], []).append(float(row["t_us"]))
+                continue
+            for name in ("t_us", *COLUMNS[4:]):
+                columns[name].append(float(row[name]))
+    empty = {name: np.empty(0) for name in POLARITY}
+    return {
+        pixel: empty | {name: np.array(values) for name, values in columns.items()} for pixel, columns in found.items()
+    }
+
+
+def _draw(columns: dict[str, np.ndarray], light: Any, inside: Any) -> None:
+    t_s = columns["t_us"] / 1e6
+    light.plot(t_s, columns["light"], color="#444444", linewidth=1)
+    light.set_ylabel("light")
+    low, high = columns["level_off_nat"], columns["level_on_nat"]
+    inside.fill_between(t_s, low, high, step="post", color="#dddddd", linewidth=0, label="between the levels")
+    inside.plot(t_s, columns["filtered_nat"], color="#999999", linewidth=1, label="filtered")
+    inside.plot(t_s, columns["signal_nat"], color="black", linewidth=1, label="signal")
+    for name, colour, marker in (("ON", "#e08a00", "^"), ("OFF", "#2070d0", "v")):
+        events_s = columns[name] / 1e6
+        heights = np.interp(events_s, t_s, columns["signal_nat"]) if len(t_s) else events_s
+        inside.plot(events_s, heights, marker, color=colour, markersize=5, linestyle="none", label=name)
+    inside.set_ylabel("nat")
+    inside.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, fontsize="small", frameon=False)
