@@ -29,7 +29,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.event_file import BLOCK, Format, Picture, regrouped, within
+from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
 from vid2ev.stream.events import Events
 
 PACKET = struct.Struct("<hhiiiiii")
@@ -83,7 +83,7 @@ class Aedat3Events:
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         """The events with start_us <= t < stop_us."""
-        return regrouped(within(self._polarity(), start_us, stop_us), block)
+        return regrouped(within(regrouped(self._polarity(), PACKETS), start_us, stop_us), block)
 
     def frames(self) -> Iterator[Picture]:
         """The frames, cut to 8 bits."""

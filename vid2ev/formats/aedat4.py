@@ -30,7 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.aedat4_writer import EVENT, MAGIC, PACKET, START, write_events
-from vid2ev.formats.event_file import BLOCK, Format, Picture, regrouped, within
+from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
 from vid2ev.formats.flatbuffers import Table
 from vid2ev.stream.events import Events
 
@@ -84,7 +84,7 @@ class Aedat4Events:
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         """The events with start_us <= t < stop_us."""
-        return regrouped(within(map(_columns, self._raw_events()), start_us, stop_us), block)
+        return regrouped(within(regrouped(map(_columns, self._raw_events()), PACKETS), start_us, stop_us), block)
 
     def frames(self) -> Iterator[Picture]:
         """The frames; those of more than 8 bits are cut to 8."""

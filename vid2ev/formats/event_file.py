@@ -12,6 +12,7 @@ import numpy as np
 from vid2ev.stream.events import Events
 
 BLOCK = 1 << 20  # events written or read at a time
+PACKETS = 1 << 14  # events to which small packets are joined first, so that few of them wait at a time
 HEAD = 1 << 16  # bytes from which a format is recognised
 
 

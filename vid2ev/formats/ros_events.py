@@ -26,7 +26,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.event_file import BLOCK, Picture, Recording, promised, regrouped, stretch, within
+from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, stretch, within
 from vid2ev.formats.evt_state import Left, State
 from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
 from vid2ev.formats.rosbag import Topic
@@ -82,7 +82,7 @@ class RosEvents:
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         """The events with start_us <= t < stop_us."""
-        return regrouped(within(self._decoded(), start_us, stop_us), block)
+        return regrouped(within(regrouped(self._decoded(), PACKETS), start_us, stop_us), block)
 
     def frames(self) -> Iterator[Picture]:
         """The images of the topic next to that of the events."""
