@@ -11,6 +11,7 @@ import faery
 import numpy as np
 import pytest
 from container_recordings import (
+    EVENT_FILES,
     SIZE,
     START_US,
     assert_same,
@@ -133,6 +134,26 @@ def test_what_dv_wrote_is_read(tmp_path: Path, compression: str) -> None:
     assert found.describe() == {"camera": "CAMERA_7", "compression": compression.split("_")[0].lower()}
     rgb = [Picture(colour.t_us, colour.pixels[..., ::-1]), Picture(START_US + 9001, (deep >> 8).astype(np.uint8))]
     assert_same_pictures(list(found.frames()), [*pictures, *rgb])
+
+
+def test_what_a_camera_recorded_is_read_as_dv_and_faery_read_it() -> None:
+    path = EVENT_FILES / "davis.aedat4"
+    if not path.exists():
+        pytest.skip("needs davis.aedat4 of the shared data")
+    found = open_events(path)
+    events = Events.concatenate(found.events())
+    assert (len(events), int(events.p.sum()), found.size) == (117_667, 72_363, (346, 260))
+    assert_same(events, read_by_dv(path))
+    stored = np.concatenate(list(faery.events_stream_from_file(path)))
+    np.testing.assert_array_equal(stored["t"].astype(np.int64), events.t)
+    camera = dv.io.MonoCameraRecording(str(path))
+    for picture in found.frames():
+        frame = camera.getNextFrame()
+        # dv-processing 2 gives the start of the exposure, the file the middle.
+        middle_us = frame.timestamp + frame.exposure.total_seconds() * 1e6 / 2
+        assert abs(picture.t_us - middle_us) <= 1
+        np.testing.assert_array_equal(frame.image, picture.pixels)
+    assert camera.getNextFrame() is None
 
 
 def test_what_faery_wrote_is_read(tmp_path: Path) -> None:

@@ -137,6 +137,18 @@ def test_the_same_events_give_the_same_bytes(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_what_was_there_is_replaced_and_a_link_is_written_through(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"events{format_named(kind).suffix}"
+    path.write_bytes(b"before")
+    events = events_at(TIMES["sparse"] + START_US)
+    assert_same(Events.concatenate(read_events(written(tmp_path, kind, events))), events)
+    path.rename(tmp_path / "target")
+    path.symlink_to(tmp_path / "target")
+    written(tmp_path, kind, events_at(TIMES["one"] + START_US))
+    assert path.is_symlink() and len(Events.concatenate(read_events(tmp_path / "target"))) == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_recording_that_starts_at_zero_or_long_before_its_events(tmp_path: Path, kind: str) -> None:
     for first_us in (0, 1, 3 * HOUR_US):
         path = written(tmp_path, kind, events_at(np.array([first_us, first_us + 10])), 0)
@@ -149,6 +161,8 @@ def test_a_recording_that_starts_at_zero_or_long_before_its_events(tmp_path: Pat
 def test_times_that_ros_does_not_have_are_refused(tmp_path: Path, kind: str, start_us: int) -> None:
     with pytest.raises(UsageError, match="hdf5"):
         written(tmp_path, kind, events_at(np.array([start_us])), start_us)
+    with pytest.raises(UsageError, match="hdf5"):
+        written(tmp_path, kind, events_at(np.array([5])), 5, pictures_at(np.array([start_us]), 3, 4))
 
 
 def test_definitions_are_those_of_ros() -> None:
@@ -168,6 +182,23 @@ def test_what_a_camera_recorded_is_read(name: str) -> None:
     assert found["stored"]["encoding"] == "evt3"
     one, other = (Events.concatenate(read_events(EVENT_FILES / path)) for path in ("evt3_vga_legs.bag", name))
     assert_same(one, other)
+
+
+@pytest.mark.parametrize(
+    ("name", "rest_ns", "sums"),
+    [
+        ("test_data_evt3_trigger_0.db3", 0, (1_222_326_831_810_000, 42_078_718, 31_656_267, 41_439)),
+        ("test_data_mono_cd_0.db3", 0, (4_950_000, 34_450, 26_450, 50)),
+        ("libcaer_rollover_0.db3", 18, (15_762_826_572_202_229_126, 111_651_612, 82_801_007, 181_908)),
+    ],
+)
+def test_sums_are_those_of_event_camera_codecs(name: str, rest_ns: int, sums: tuple[int, ...]) -> None:
+    """Its own recordings, and what its tests say of them; times are nanoseconds there, modulo 2^64."""
+    if not (EVENT_FILES / name).exists():
+        pytest.skip(f"needs {name} of the shared data")
+    events = Events.concatenate(read_events(EVENT_FILES / name))
+    t_ns = sum(events.t.tolist()) * 1000 + rest_ns * len(events)
+    assert (t_ns % 2**64, *(int(getattr(events, key).sum()) for key in "xyp")) == sums
 
 
 def packet_bag(folder: Path, kind: str, encoding: str, packets: list[tuple[int, bytes]], topics: int = 1) -> Path:

@@ -5,7 +5,8 @@
              are: number, kind (EVTS, FRME; others are passed over), size in pixels, camera
     packets  int32 stream, int32 size [bytes], and compressed (LZ4 or Zstandard frame) EVTS or FRME:
              EVTS   a vector of int64 t [us], int16 x, int16 y, uint8 p, 3 bytes nothing; y = 0 is top
-             FRME   int64 t [us], size, format (OpenCV's type: grey, BGR, BGRA), pixels
+             FRME   int64 t [us] (of cameras the middle of the exposure), size, format (OpenCV's type: grey, BGR,
+                    BGRA), pixels
     table    FTAB: for each packet its place, size, number of events, first and last time [us]
 
 Header, packets and table are FlatBuffers with their size in front (`flatbuffers.py`); the table is compressed as

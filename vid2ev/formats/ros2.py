@@ -13,6 +13,7 @@ Source: https://mcap.dev/spec and https://github.com/ros2/rosbag2
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Collection, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -98,7 +99,9 @@ def write_events(path: Path, recording: Recording) -> None:
     types = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in DEFINITIONS.items():
         types.register(get_types_from_msg(definition, name))
-    with TemporaryDirectory(dir=path.parent) as folder:
+    # A link or a device is written into, any other file that is there is replaced.
+    plain = not path.is_symlink() and (path.is_file() or not path.exists())
+    with TemporaryDirectory(dir=path.parent if plain else None) as folder:
         bag = Writer(Path(folder) / path.stem, version=9, storage_plugin=StoragePlugin.MCAP)
         with bag:
             events = bag.add_connection(EVENTS_TOPIC, EVENT_ARRAY, typestore=types)
@@ -109,7 +112,8 @@ def write_events(path: Path, recording: Recording) -> None:
                     bag.write(events, t_us * 1000, event_array_bytes(part, 0, cdr=True))
                 elif images:
                     bag.write(images, part.t_us * 1000, image_bytes(part, 0, cdr=True))
-        (Path(folder) / path.stem / f"{path.stem}.mcap").replace(path)
+        made = Path(folder) / path.stem / f"{path.stem}.mcap"
+        made.replace(path) if plain else shutil.copyfile(made, path)
 
 
 def _recognises(head: bytes, path: Path) -> bool:

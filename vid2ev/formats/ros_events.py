@@ -187,10 +187,8 @@ def _unpacked(packet: EventPacket, path: Path) -> Events:
 
 def outgoing(recording: Recording) -> Iterator[EventArray | Picture]:
     """What a bag of a recording holds, in order of time.  Raises UsageError for what no message can hold."""
-    end_us = recording.start_us + recording.duration_us
-    if recording.start_us < 0 or end_us >= LAST_US:
-        raise UsageError(f"times from {recording.start_us} to {end_us} us: ROS has 0 to 2^31 s; choose --format hdf5")
-    pictures = recording.frames() if recording.frames else iter(())
+    _check_times(recording.start_us, recording.start_us + recording.duration_us)
+    pictures = _pictures(recording)
     picture = next(pictures, None)
     stamp_us: int | None = recording.start_us
     for events in _windows(recording):
@@ -204,6 +202,17 @@ def outgoing(recording: Recording) -> Iterator[EventArray | Picture]:
     while picture is not None:
         yield picture
         picture = next(pictures, None)
+
+
+def _check_times(first_us: int, last_us: int) -> None:
+    if first_us < 0 or last_us >= LAST_US:
+        raise UsageError(f"times from {first_us} to {last_us} us: ROS has 0 to 2^31 s; choose --format hdf5")
+
+
+def _pictures(recording: Recording) -> Iterator[Picture]:
+    for picture in recording.frames() if recording.frames else ():
+        _check_times(picture.t_us, picture.t_us)
+        yield picture
 
 
 def _windows(recording: Recording) -> Iterator[Events]:
