@@ -180,10 +180,16 @@ def _decompressor(compression: str) -> Callable[[bytes], bytes]:
     """What makes a packet readable; raises ValueError where that cannot be done, or gives more than `LARGEST` bytes."""
     if compression == "none":
         return lambda content: content
-    import lz4.frame
-    from backports import zstd
+    new: Callable[[], Any]
+    failures: tuple[type[Exception], ...] = (RuntimeError, EOFError)
+    if compression == "lz4":
+        import lz4.frame
 
-    new = lz4.frame.LZ4FrameDecompressor if compression == "lz4" else zstd.ZstdDecompressor
+        new = lz4.frame.LZ4FrameDecompressor
+    else:
+        from backports import zstd
+
+        new, failures = zstd.ZstdDecompressor, (zstd.ZstdError, EOFError)
 
     def decompress(content: bytes) -> bytes:
         decompressor = new()
@@ -193,7 +199,7 @@ def _decompressor(compression: str) -> Callable[[bytes], bytes]:
                 parts.append(decompressor.decompress(b"" if parts else content, PART))
                 if decompressor.needs_input:
                     break
-        except (RuntimeError, EOFError, zstd.ZstdError) as error:
+        except failures as error:
             raise ValueError("a packet cannot be decompressed") from error
         if not decompressor.eof:
             raise ValueError("a packet is not whole")
