@@ -82,7 +82,7 @@ def describe_events(path: str | Path) -> dict[str, Any]:
     for events in file.events():
         if not len(events):
             continue
-        backwards += int(np.count_nonzero(events.t[1:] < events.t[:-1])) + (last is not None and events.t[0] < last)
+        backwards += int(np.count_nonzero(np.diff(events.t, prepend=events.t[0] if last is None else last) < 0))
         count, on = count + len(events), on + int(np.count_nonzero(events.p))
         first = int(events.t[0]) if first is None else first
         last = int(events.t[-1])

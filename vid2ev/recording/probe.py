@@ -18,15 +18,12 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-
-if TYPE_CHECKING:
-    from vid2ev.sensors.inside import Inside
 
 COLUMNS = ("t_us", "x", "y", "what", "light", "filtered_nat", "signal_nat", "level_on_nat", "level_off_nat")
 HEADER = f"{','.join(COLUMNS)}\n".encode()
@@ -41,8 +38,9 @@ class Probe:
         self._width = width
         self.places = np.array([y * width + x for x, y in pixels], np.int64)
 
-    def lines(self, frame: Frame, events: Events, inside: Inside) -> bytes:
-        """The events since the frame before, and a frame with what the pixels have inside after it."""
+    def lines(self, frame: Frame, events: Events, inside: Sequence[np.ndarray]) -> bytes:
+        """The events since the frame before, and a frame with what the pixels have inside after it: filtered, signal,
+        level_on and level_off [nat]."""
         lines = self.event_lines(events)
         t_us = f"{frame.t_ns // 1000}.{frame.t_ns % 1000:03d}"
         for k, (x, y) in enumerate(self.pixels):
