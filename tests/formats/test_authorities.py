@@ -1,18 +1,21 @@
-"""faery, which is not ours, reads what is written, and what faery writes is read."""
+"""Libraries that are not ours read what is written, and what faery writes is read."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import h5py
+import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
-from recordings import all_events, assert_same, corner, dense, events_of, long, recording_of, sparse, written
+from recordings import all_events, assert_same, corner, dense, empty, events_of, long, sparse, written
 
 from vid2ev.formats import format_named, open_events, read_events, recognise
 from vid2ev.stream.events import Events
 
 faery = pytest.importorskip("faery")
-CASES = {"dense": dense, "sparse": sparse, "long": long, "corner": lambda: corner((2048, 2048))}
+CASES = {"dense": dense, "sparse": sparse, "long": long, "empty": empty, "corner": lambda: corner((2048, 2048))}
 SIZE = (640, 480)
 
 
@@ -42,10 +45,36 @@ def test_faery_reads_what_is_written(tmp_path: Path, name: str, case: str) -> No
     assert_same(Events(read.t + recording.start_us, read.x, read.y, read.p), events)
 
 
-def test_faery_reads_the_text(tmp_path: Path) -> None:
-    events = events_of(np.arange(0, 30_000, 7), SIZE)
-    path = written(format_named("csv"), recording_of(Events(events.t, events.x, events.y, events.p), SIZE), tmp_path)
-    assert_same(read_by_faery(path, dimensions_fallback=SIZE), events)
+@pytest.mark.parametrize("case", ["dense", "sparse", "long", "empty"])
+def test_faery_reads_the_text(tmp_path: Path, case: str) -> None:
+    recording = CASES[case]()
+    events = all_events(recording)
+    blocks = [Events(events.t, events.x, events.y, events.p)] if len(events) else []
+    path = written(format_named("csv"), replace(recording, blocks=lambda: iter(blocks), labelled=False), tmp_path)
+    assert_same(read_by_faery(path, dimensions_fallback=recording.size), events)
+
+
+@pytest.mark.parametrize("case", ["dense", "sparse", "long", "empty"])
+@pytest.mark.parametrize("name", ["npz", "v2e-hdf5", "hdf5", "rpg"])
+def test_plain_numpy_and_h5py_read_what_is_written(tmp_path: Path, name: str, case: str) -> None:
+    recording = CASES[case]()
+    kind, events = format_named(name), all_events(recording)
+    if recording.duration_us > (kind.longest_us or recording.duration_us):
+        pytest.skip("longer than this format can be")
+    path = written(kind, recording, tmp_path)
+    if name == "npz":
+        with np.load(path) as file:
+            columns = [file[column] for column in "txyp"]
+    elif name == "rpg":
+        table = np.loadtxt(path, skiprows=1, ndmin=2) if len(events) else np.zeros((0, 4))
+        columns = [np.rint(table[:, 0] * 1e6), *table[:, 1:].T]
+    else:
+        with h5py.File(path) as file:
+            table = file["events"]
+            columns = [table[c][:] for c in "txyp"] if name == "hdf5" else list(table[:].reshape(-1, 4).T)
+            columns[0] = columns[0].astype(np.int64) + recording.start_us
+    for column, expected in zip(columns, (events.t, events.x, events.y, events.p), strict=True):
+        np.testing.assert_array_equal(column, expected)
 
 
 @pytest.mark.parametrize(
