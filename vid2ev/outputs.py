@@ -11,8 +11,11 @@ from typing import Any
 from vid2ev.errors import UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
+from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.views.on_disk import KINDS, write_frames
 from vid2ev.views.requests import parse_representation, parse_slicing
+
+FRAME_INDEX = "frame_index.csv"
 
 
 @dataclass(frozen=True)
@@ -94,10 +97,10 @@ class Outputs:
 
     def names(self) -> list[str]:
         """All files, the manifest among them."""
-        frames = [KINDS[self.frames]] if self.frames else []
-        probe = ["probe.csv", "probe.png"] if self.probe else []
-        frames += [*probe, *["noise_maps.npz"] * self.noise_maps]
-        return [*self.files().values(), *frames, *["preview.mp4"] * self.preview, "manifest.json"]
+        files = [*self.files().values(), *([] if "hdf5" in self.formats else [FRAME_INDEX])]
+        files += [KINDS[self.frames]] if self.frames else []
+        files += ["probe.csv", "probe.png"] if self.probe else []
+        return files + ["noise_maps.npz"] * self.noise_maps + ["preview.mp4"] * self.preview + ["manifest.json"]
 
     def write(self, folder: Path, recording: Recording) -> None:
         """Write the files of a recording, but for the preview.  Raises OSError."""
@@ -105,9 +108,25 @@ class Outputs:
         for kind in self.kinds():
             assert kind.write is not None
             kind.write(folder / files[kind.name], recording)
+        if recording.frame_us is not None and "hdf5" not in self.formats:  # (which has it inside)
+            write_frame_index(folder / FRAME_INDEX, recording)
         if self.frames is not None:
             path = folder / KINDS[self.frames]
             write_frames(path, recording, self.frames_as, self.frames_by, kind=self.frames)
+
+
+def write_frame_index(path: Path, recording: Recording) -> None:
+    """The instants of the frames of the source, and the number of events up to each, as CSV: events number a ... b - 1
+    are those of the interval between two frames with counts a and b.  Raises OSError."""
+    assert recording.frame_us is not None
+    index = FrameIndex(recording.frame_us)
+    start = 0
+    for events in recording.blocks():
+        index.add(events.t, start)
+        start += len(events)
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write("t_us,events\n")
+        file.writelines(f"{t_us},{count}\n" for t_us, count in zip(index.frame_us, index.counts, strict=True))
 
 
 def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ CLIPS = {
     ".mts", ".m2ts", ".gif", ".npy", ".npz",
 }  # fmt: skip
 
-Convert = Callable[[str, Path], dict[str, Any] | None]
+Convert = Callable[[str, Path], dict[str, Any]]
 
 
 def sources_in(video: str) -> list[str]:
@@ -49,31 +49,42 @@ def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
     return named
 
 
-def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) -> None:
-    """Convert all videos, whatever happens to some; ends the program with the worst exit code if any failed."""
-    rows, exit_code = [], 0
+def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) -> list[dict[str, Any]]:
+    """Convert all videos, whatever happens to some: for each video, directory, state ("done" or "failed"), and events
+    or error with its exit code."""
+    results = []
     for number, (video, directory) in enumerate(directories.items(), 1):
         if not quiet:
             click.echo(f"[{number}/{len(directories)}] {video} -> {directory}")
+        result: dict[str, Any] = {"video": video, "directory": str(directory)}
         try:
             made = convert(video, directory)
         except Vid2evError as error:
             click.echo(f"error: {error}", err=True)
-            rows.append((video, "failed", str(error)))
-            exit_code = max(exit_code, error.exit_code)
+            result |= {"state": "failed", "error": str(error), "exit_code": error.exit_code}
+        except Exception as error:  # (a mistake of ours in one video does not stop the others either)
+            traceback.print_exc()
+            result |= {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
         else:
-            rows.append((video, "done", f"{made['counts']['events']:,} events" if made else ""))
-    if not quiet:
-        click.echo(_table(rows))
-    if exit_code:
-        sys.exit(exit_code)
+            result |= {"state": "done", "events": made.get("counts", {}).get("events")}
+        results.append(result)
+    return results
 
 
-def _table(rows: list[tuple[str, str, str]]) -> str:
-    failed = sum(state == "failed" for _, state, _ in rows)
-    width = max(len(video) for video, _, _ in rows)
-    lines = [f"{state:<7} {video:<{width}}  {text}".rstrip() for video, state, text in rows]
-    return "\n".join(["", *lines, f"{len(rows) - failed} of {len(rows)} done" + f", {failed} failed" * (failed > 0)])
+def exit_code(results: list[dict[str, Any]]) -> int:
+    """0 if all went well, otherwise the worst."""
+    return max((result.get("exit_code", 0) for result in results), default=0)
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """The results for people."""
+    failed = sum(result["state"] == "failed" for result in results)
+    width = max(len(result["video"]) for result in results)
+    lines = [""]
+    for result in results:
+        events = "" if result.get("events") is None else f"{result['events']:,} events"
+        lines.append(f"{result['state']:<7} {result['video']:<{width}}  {result.get('error', events)}".rstrip())
+    return "\n".join([*lines, f"{len(results) - failed} of {len(results)} done" + f", {failed} failed" * (failed > 0)])
 
 
 def _is_clip(path: Path) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +110,7 @@ class Auto(click.ParamType):
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")
 @click.option("--dry-run", is_flag=True, help="Check everything, say what would be done, do nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the manifests as JSON for programs.")
 @click.option("-v", "--verbose", is_flag=True, help="Say what is going to be done, too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def convert(
@@ -116,6 +119,7 @@ def convert(
     dry_run: bool,
     verbose: bool,
     quiet: bool,
+    as_json: bool,
     **options: Any,
 ) -> None:
     """Turn each VIDEO into the recording of an event camera.
@@ -129,29 +133,40 @@ def convert(
     from vid2ev import conversion
     from vid2ev.commands import batch
 
+    quiet |= as_json
     options["seed"] = None if options["seed"] == "random" else options["seed"]
     found = [source for video in videos for source in batch.sources_in(video)]
     if len(videos) == 1 and found == [videos[0]]:
-        _one(videos[0], output or conversion.default_directory(videos[0]), dry_run, verbose, quiet, options)
+        directory = output or conversion.default_directory(videos[0])
+        made = _one(videos[0], directory, dry_run, verbose, quiet, options)
+        if as_json:
+            click.echo(json.dumps(made, indent=2))
         return
-    directories = batch.directories(found, output or Path())
-    batch.convert_each(
-        directories, lambda video, directory: _one(video, directory, dry_run, verbose, quiet, dict(options)), quiet
+
+    def one(video: str, directory: Path) -> dict[str, Any]:
+        return _one(video, directory, dry_run, verbose, quiet, dict(options))
+
+    results = batch.convert_each(batch.directories(found, output or Path()), one, quiet)
+    click.echo(
+        json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )
+    sys.exit(batch.exit_code(results))
 
 
 def _one(
     video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
-) -> dict[str, Any] | None:
-    """Convert a video; returns the manifest, or None if nothing was to be made."""
+) -> dict[str, Any]:
+    """Convert a video; returns the manifest, of a dry run what it would begin with."""
     from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.commands.progress import bar, heard, kept
 
-    if (dry_run or verbose) and not quiet:
-        click.echo(_plan(video, directory, dict(options)))
-    if dry_run:
-        return None
+    if dry_run or verbose:
+        recipe, plan = _plan(video, directory, dict(options))
+        if not quiet:
+            click.echo(plan)
+        if dry_run:
+            return recipe
     live = video == "-" or video.startswith("camera:")
     with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
@@ -161,8 +176,8 @@ def _one(
     return manifest
 
 
-def _plan(video: str, directory: Path, options: dict[str, Any]) -> str:
-    """What a conversion would do; raises what it would raise before its first frame."""
+def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """What a conversion would do, for programs and for people; raises what it would raise before its first frame."""
     from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.outputs import Outputs
@@ -176,4 +191,5 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> str:
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(outputs.names())}")]
-    return summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
+    text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
+    return described | {"outputs": outputs.describe()}, text

@@ -29,6 +29,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
+from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, is_whole, opened
 from vid2ev.stream.events import Events
 
@@ -91,7 +92,7 @@ def write_events(path: Path, recording: Recording) -> None:
         file["t_offset"] = np.int64(offset_us)
         columns = _columns(file, recording.count, np.uint32 if duration_us < 1 << 32 else np.uint64, recording.labelled)
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
-        frames = None if recording.frame_us is None else _FrameIndex(recording.frame_us - offset_us)
+        frames = None if recording.frame_us is None else FrameIndex(recording.frame_us - offset_us)
         indexed = start = last_us = 0
         for block in recording.blocks():
             t = block.t - offset_us
@@ -109,7 +110,8 @@ def write_events(path: Path, recording: Recording) -> None:
             raise ValueError(f"{start} events, {recording.count} announced")
         _index(index, indexed, len(index), np.empty(0, np.int64), start)
         if frames is not None:
-            frames.write(file)
+            _dataset(file, "frames/t", len(frames.counts), np.int64)[...] = frames.frame_us
+            _dataset(file, "frames/to_idx", len(frames.counts), np.uint64)[...] = frames.counts
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:
@@ -131,26 +133,6 @@ def _index(index: h5py.Dataset, first: int, last: int, t: np.ndarray, start: int
         edges = np.arange(at, min(at + BLOCK, last)) * MS_US
         index[at : at + len(edges)] = start + np.searchsorted(t, edges)
     return max(first, last)
-
-
-class _FrameIndex:
-    """How many events there are up to each frame of the source, counted while the events pass by."""
-
-    def __init__(self, frame_us: np.ndarray):
-        self.frame_us, self.counts, self._known = frame_us, np.zeros(len(frame_us), np.uint64), 0
-
-    def add(self, t: np.ndarray, start: int) -> None:
-        """Count a block of times that begins at event `start`; a frame counts once a later event has come."""
-        known = int(np.searchsorted(self.frame_us, t[-1])) if len(t) else self._known
-        part = slice(self._known, known)
-        self.counts[part] = start + np.searchsorted(t, self.frame_us[part], side="right")
-        self._known = max(self._known, known)
-        self.counts[self._known :] = start + len(t)
-
-    def write(self, file: h5py.File) -> None:
-        """The instants and the counts, as datasets."""
-        _dataset(file, "frames/t", len(self.counts), np.int64)[...] = self.frame_us
-        _dataset(file, "frames/to_idx", len(self.counts), np.uint64)[...] = self.counts
 
 
 def _position(file: h5py.File, t_us: int) -> int:

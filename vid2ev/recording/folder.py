@@ -35,7 +35,7 @@ from vid2ev.stream.events import Events
 
 COLUMNS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}
 FILES = re.compile(  # what a recording holds, and nothing else
-    r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|preview\.mp4|probe\.(csv|png)|noise_maps\.npz|manifest\.json"
+    r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|preview\.mp4|frame_index\.csv|probe\.(csv|png)|noise_maps\.npz|manifest\.json"
 )
 
 

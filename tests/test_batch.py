@@ -1,0 +1,152 @@
+"""Many videos: what fails does not stop the rest, and everything is told at the end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from vid2ev import Events, read_events
+from vid2ev.commands import batch, main
+
+QUICK = ["--upsample", "none", "--threads", "1", "--fps", "100", "--no-preview"]
+
+
+@pytest.fixture(autouse=True)
+def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """clips/: two arrays, a broken video, a folder of pictures, notes; more/: an array of the same name."""
+    monkeypatch.chdir(tmp_path)
+    Path("clips/pictures").mkdir(parents=True)
+    Path("more").mkdir()
+    rng = np.random.default_rng(0)
+    for name in ("clips/a10.npy", "clips/a9.npy", "more/a9.npy"):
+        np.save(name, rng.uniform(0.1, 1, (4, 6, 8)).astype(np.float32))
+    Path("clips/broken.mp4").write_bytes(rng.bytes(5000))
+    Path("clips/notes.txt").write_text("no clip")
+    import cv2
+
+    for k in range(3):
+        cv2.imwrite(f"clips/pictures/{k}.png", rng.integers(0, 255, (6, 8)).astype(np.uint8))
+    return Path("clips")
+
+
+def vid2ev(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["convert", *arguments, *QUICK])
+
+
+def test_a_folder_stands_for_what_is_in_it() -> None:
+    assert batch.sources_in("clips") == [f"clips/{name}" for name in ("a9.npy", "a10.npy", "broken.mp4", "pictures")]
+    assert batch.sources_in("clips/pictures") == ["clips/pictures"]
+    assert batch.sources_in("clips/a9.npy") == ["clips/a9.npy"]
+    Path("bare").mkdir()
+    assert batch.sources_in("bare") == ["bare"]  # (which is refused in words)
+
+
+def test_one_failure_does_not_stop_the_rest() -> None:
+    result = vid2ev("clips", "-o", "out")
+    assert result.exit_code == 1
+    assert {path.name for path in Path("out").iterdir()} == {"a9_events", "a10_events", "pictures_events"}
+    table = result.stdout.splitlines()[-5:]
+    assert table[-1] == "3 of 4 done, 1 failed"
+    assert [line.split()[:2] for line in table[:4]] == [
+        ["done", "clips/a9.npy"],
+        ["done", "clips/a10.npy"],
+        ["failed", "clips/broken.mp4"],
+        ["done", "clips/pictures"],
+    ]
+    assert result.stderr.count("error: ") == 1
+
+
+def test_names_that_occur_twice_get_a_number() -> None:
+    assert vid2ev("clips/a9.npy", "more/a9.npy", "-q", "-o", "out").exit_code == 0
+    one, other = (Events.concatenate(read_events(f"out/{name}")) for name in ("a9_events", "a9_events_2"))
+    assert len(one) and len(other) and one.t.tolist() != other.t.tolist()
+
+
+def test_resume_leaves_what_is_done_and_makes_the_rest() -> None:
+    assert vid2ev("clips/a9.npy", "clips/broken.mp4", "-o", "out").exit_code == 1
+    made = Path("out/a9_events/manifest.json").stat().st_mtime_ns
+    result = vid2ev("clips/a9.npy", "clips/a10.npy", "-o", "out", "--resume")
+    assert result.exit_code == 0 and Path("out/a9_events/manifest.json").stat().st_mtime_ns == made
+    assert Path("out/a10_events/events.h5").exists()
+    again = vid2ev("clips/a9.npy", "clips/a10.npy", "-o", "out")
+    assert again.exit_code == 2 and again.stderr.count("--overwrite") == 2
+
+
+def test_json_for_programs() -> None:
+    result = vid2ev("clips", "-o", "out", "--json")
+    found = json.loads(result.stdout)
+    assert [entry["state"] for entry in found] == ["done", "done", "failed", "done"] and result.exit_code == 1
+    assert "broken.mp4" in found[2]["error"] and found[0]["events"] > 0
+    one = json.loads(vid2ev("clips/a9.npy", "-o", "single", "--json").stdout)
+    assert one["counts"]["events"] == found[0]["events"]
+    plan = json.loads(vid2ev("clips/a9.npy", "-o", "none", "--json", "--dry-run").stdout)
+    assert plan["outputs"]["formats"] == ["hdf5"] and not Path("none").exists()
+
+
+def test_a_mistake_of_the_program_stops_one_video_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    from vid2ev import conversion
+
+    convert = conversion.convert
+
+    def failing(video: str, *arguments: object, **options: object) -> object:
+        return 1 / 0 if "a10" in video else convert(video, *arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(conversion, "convert", failing)
+    result = vid2ev("clips/a10.npy", "clips/a9.npy", "-o", "out")
+    assert result.exit_code == 1 and "ZeroDivisionError" in result.stdout and "1 of 2 done" in result.stdout
+    assert Path("out/a9_events").exists()
+
+
+def test_several_outputs_of_one_conversion_agree() -> None:
+    formats = ["hdf5", "aedat4", "evt2", "evt3", "dat", "npz", "csv", "rpg", "v2e-hdf5", "ros1"]
+    options = ["--format", ",".join(formats[:4]), "--format", ",".join(formats[4:])]
+    assert vid2ev("clips/a9.npy", "-o", "out", "--frames-out", "npz", *options).exit_code == 0
+    expected = Events.concatenate(read_events("out/events.h5"))
+    files = sorted(path for path in Path("out").iterdir() if path.name.startswith("events"))
+    assert len(files) == len(formats)
+    for path in files:
+        found = Events.concatenate(read_events(path))
+        for name in "txyp":
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=str(path))
+    with np.load("out/frames.npz") as frames:
+        assert frames["frames"].sum() == len(expected) == frames["events"].sum()
+
+
+def test_other_formats_have_an_index_of_frames_beside_them() -> None:
+    assert vid2ev("clips/a9.npy", "-o", "out", "--format", "csv").exit_code == 0
+    index = np.loadtxt("out/frame_index.csv", delimiter=",", skiprows=1, dtype=np.int64)
+    t = Events.concatenate(read_events("out")).t
+    assert index[:, 0].tolist() == [0, 10_000, 20_000, 30_000]
+    assert index[:, 1].tolist() == [np.count_nonzero(t <= at) for at in index[:, 0]]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--format", "mp3"], "expected one of"),
+        (["--format", "es"], "only read"),
+        (["--frames-out", "npz", "--frames-by", "week:1"], "expected duration:10ms"),
+        (["--frames-out", "npz", "--frames-as", "cubist"], "expected counts"),
+        (["--probe", "8,0"], "expected a pixel of a sensor of 8x6"),
+        (["--bayer", "rggb", "--cuts", "perhaps"], "perhaps"),
+    ],
+    ids=str,
+)
+def test_outputs_that_cannot_be(options: list[str], sentence: str) -> None:
+    result = vid2ev("clips/a9.npy", "-o", "out", *options)
+    assert result.exit_code == 2 and sentence in result.stderr and not Path("out").exists()
+
+
+def test_a_size_that_a_format_cannot_hold_is_refused_before_converting() -> None:
+    np.save("wide.npy", np.ones((2, 1, 3000), np.float32))
+    result = vid2ev("wide.npy", "-o", "out", "--format", "hdf5,evt3")
+    assert result.exit_code == 2 and "format evt3 cannot hold 3000x1 pixels" in result.stderr
+    np.save("long.npy", np.ones((3, 1, 1), np.float32))
+    Path("long_timestamps.txt").write_text("# unit: s\n0\n100\n5000\n")
+    arguments = ["convert", "long.npy", "-o", "out", "--format", "v2e-hdf5"]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2 and "minutes" in result.stderr and not Path("out").exists()
