@@ -17,6 +17,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
+from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
 
 __all__ = [
@@ -50,6 +51,9 @@ FORMATS = {
 }
 
 
+DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
+
+
 def format_named(name: str) -> Format:
     """The format of a name.  Raises UsageError."""
     if name not in FORMATS:
@@ -77,12 +81,12 @@ def describe_events(path: str | Path) -> dict[str, Any]:
     """What is in an event file: format, counts, times [us], size [pixels] where it is stated.  Raises as `read_events`
     does."""
     kind, file = _opened(path)
-    count = on = backwards = 0
+    count, on, disorder = 0, 0, Disorder()
     first = last = None
     for events in file.events():
         if not len(events):
             continue
-        backwards += int(np.count_nonzero(np.diff(events.t, prepend=events.t[0] if last is None else last) < 0))
+        disorder.add(events.t)
         count, on = count + len(events), on + int(np.count_nonzero(events.p))
         first = int(events.t[0]) if first is None else first
         last = int(events.t[-1])
@@ -97,7 +101,7 @@ def describe_events(path: str | Path) -> dict[str, Any]:
         "start_us": file.start_us,
         "first_us": first,
         "last_us": last,
-        "times_going_back": backwards,
+        "times_going_back": disorder.places,
         "labels": file.labelled,
         "frames": file.has_frames,
         "bytes": file.path.stat().st_size,
@@ -109,30 +113,43 @@ def describe_events(path: str | Path) -> dict[str, Any]:
 def survey(file: EventFile) -> Recording:
     """An event file as a recording to be written anew; reads all of it once.
 
-    Where the file does not state its size, that is the smallest that holds all events.  Raises DataError for events
-    outside of the size stated, or whose times go back.
+    Where the file does not state its size, that is the smallest that holds all events.  Times that go back are put in
+    order, with a warning.  Raises DataError for events outside of the size stated, or minutes out of order.
     """
-    count, last_us, start_us, width, height = 0, file.start_us, file.start_us, 0, 0
+    count, start_us, width, height, disorder = 0, file.start_us, 0, 0, Disorder()
     for events in file.events():
-        if not len(events):
-            continue
-        if events.t[0] < (last_us if count else start_us) or np.any(events.t[1:] < events.t[:-1]):
-            at = "before the start of the file" if not count and events.t[0] < start_us else f"after event {count}"
-            raise DataError(f"{file.path}: times go back {at}; expected events in order of time")
-        width, height = max(width, int(events.x.max()) + 1), max(height, int(events.y.max()) + 1)
-        count, last_us = count + len(events), int(events.t[-1])
+        if len(events):
+            disorder.add(events.t)
+            start_us = min(start_us, int(events.t.min()))
+            width, height = max(width, int(events.x.max()) + 1), max(height, int(events.y.max()) + 1)
+            count += len(events)
     size = file.size or (max(width, 1), max(height, 1))
     if width > size[0] or height > size[1]:
         raise DataError(
             f"{file.path}: an event at column {width - 1} or row {height - 1} of a {size[0]}x{size[1]} sensor;"
             " the file is damaged"
         )
-    frames = file.frames if file.has_frames else None
+    _note_disorder(file, disorder)
     frame_us = getattr(file, "frame_us", None)
-    duration_us = max(last_us, int(frame_us[-1]) if frame_us is not None and len(frame_us) else last_us) - start_us
-    return Recording(
-        size, start_us, duration_us, count, lambda: regrouped(file.events()), file.labelled, frames, frame_us
-    )
+    ends = [start_us, disorder.latest_us or start_us, *(frame_us[-1:].tolist() if frame_us is not None else ())]
+
+    def blocks() -> Iterator[Events]:
+        return regrouped(ordered(file.events(), disorder.depth_us))
+
+    frames = file.frames if file.has_frames else None
+    return Recording(size, start_us, max(ends) - start_us, count, blocks, file.labelled, frames, frame_us)
+
+
+def _note_disorder(file: EventFile, disorder: Disorder) -> None:
+    """Warn of times that go back, or refuse them."""
+    if disorder.depth_us > DEEPEST_US:
+        raise DataError(
+            f"{file.path}: times go back by {disorder.depth_us / 1e6:.6g} s, more than {DEEPEST_US // 10**6} s: it"
+            " holds several recordings, or is damaged; take a part of it"
+        )
+    if disorder.places:
+        said = f"times go back at {disorder.places:,} places, by at most {disorder.depth_us} us: put in order"
+        file.warnings.extend([said] if said not in file.warnings else [])
 
 
 def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:
