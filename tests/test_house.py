@@ -37,12 +37,13 @@ FLOORS = {
     "kernels": 3,
     "sensors": 4,
     "recipe": 5,
-    "outputs": 5,
+    "outputs": 4,
     "reformat": 5,
-    "conversion": 6,
-    "": 7,  # vid2ev/__init__.py: the public names
-    "commands": 8,
-    "__main__": 9,
+    "recorder": 6,
+    "conversion": 7,
+    "": 8,  # vid2ev/__init__.py: the public names
+    "commands": 9,
+    "__main__": 10,
 }
 
 

@@ -71,8 +71,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
     return directory, int(done.stdout)
 
 
+FILES = {"events.h5", "events.raw", "preview.mp4", "probe.csv", "probe.png", "frames.npz"}
+
+
 def assert_same(one: Path, other: Path) -> None:
-    for name in ("events.h5", "events.raw", "preview.mp4", "probe.csv", "probe.png", "frames.npz"):
+    for name in FILES:
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
     manifests = [json.loads((directory / "manifest.json").read_text()) for directory in (one, other)]
     for manifest in manifests:
@@ -84,7 +87,7 @@ def kill_and_resume(whole: Path, out: Path, killed_at: int) -> None:
     """Kill at a step, look at what is left, go on, compare."""
     killed = run(out, killed_at)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
-    assert not out.exists() or {path.name for path in out.iterdir()} == {"events.h5", "preview.mp4", "manifest.json"}
+    assert not out.exists() or {path.name for path in out.iterdir()} == FILES | {"manifest.json"}
     done = run(out, resume=True)
     assert done.returncode == 0, done.stderr
     assert_same(whole, out)

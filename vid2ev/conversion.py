@@ -2,77 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
-import shutil
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
-from vid2ev.recording.disk import write_npz
+from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job
 from vid2ev.recording.manifest import machine, write_manifest
-from vid2ev.recording.preview import Preview
-from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream.events import Events
-from vid2ev.stream.frames import Frame
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
-FRAME_US, PROBE = "frame_us", "probe.csv"  # files that grow: the instants of the frames, the pixels that are probed
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
-
-
-@dataclass
-class Progress:
-    """How far a conversion is."""
-
-    frames: int = 0  # of the source
-    subframes: int = 0  # made between them
-    limited: int = 0  # source intervals that hit max_subframes
-    events: int = 0
-    start_ns: int = 0  # the first frame
-    end_ns: int = 0  # the last frame
-    last_us: int = 0  # the last event
-    cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots
-    seconds: float = 0.0  # of work, in all runs
-    finished: bool = False
-    warnings: list[str] = field(default_factory=list)
-
-    def add(self, frame: Frame, events: Events) -> None:
-        """Count a frame and the events up to it."""
-        self.frames += frame.original
-        self.subframes += not frame.original
-        self.end_ns = frame.t_ns
-        self.cuts_us += [frame.t_ns // 1000] * frame.cut
-        self.count(events)
-
-    def count(self, events: Events) -> None:
-        """Count events."""
-        self.events += len(events)
-        self.last_us = int(events.t[-1]) if len(events) else self.last_us
-
-    @property
-    def offset_us(self) -> int:
-        """The instant from which an event file counts: the first frame."""
-        return self.start_ns // 1000
-
-    @property
-    def duration_us(self) -> int:
-        """From the first frame to the last, or to the last event where the sensor's readout makes it later."""
-        return max(self.end_ns // 1000, self.last_us) - self.offset_us
 
 
 Report = Callable[[Recipe, Progress], object]
@@ -100,8 +49,8 @@ def convert(
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
     piece      pixel-steps between two checkpoints
-    What is written is said by the fields of `Outputs`: formats, preview, frames, frames_by, frames_as.  Everything else
-    is as for `Recipe.of`.
+    What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
+    `Recipe.of`.
 
     Returns the manifest.  The same recipe makes the same bytes in events.h5, with or without interruptions.
     Raises UsageError for what cannot be meant, DataError for a source that cannot be read or a folder that cannot
@@ -116,24 +65,18 @@ def convert(
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()}
-    growing = [FRAME_US, *[PROBE] * bool(outputs.probe)]
-    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=growing) as folder:
+    beside = growing(outputs)
+    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
-        dvs = recipe.dvs(threads)
-        film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview)
-        probe = Probe(outputs.probe, recipe.source.size[0]) if outputs.probe else None
-        done = _record(recipe, dvs, film, probe, folder, piece, report)
-        manifest = job | _outcome(done, dvs) | {"run": _run(video, threads, done)}
+        recorder = Recorder(recipe, recipe.dvs(threads), outputs, folder)
+        recorder.take_up()
+        if not recorder.done.finished:
+            _record(recorder, piece, report)
+        manifest = job | _outcome(recorder.done, recorder.dvs) | {"run": _run(video, threads, recorder.done)}
         with folder.writing():
-            outputs.write(folder.whole, _recording(folder, recipe, done, outputs.want_frames))
-            film.join(folder.whole / "preview.mp4")
-            if probe:
-                shutil.copyfile(folder.written(PROBE), folder.whole / PROBE)
-                plot(folder.whole / PROBE, folder.whole / "probe.png")
-            if outputs.noise_maps:
-                write_npz(folder.whole / "noise_maps.npz", dvs.maps())
+            recorder.write()
             write_manifest(folder.whole / "manifest.json", manifest)
             folder.publish()
     return manifest
@@ -158,90 +101,27 @@ def expected_us(recipe: Recipe) -> int | None:
     return None if seconds is None else round(1e6 * seconds)
 
 
-def _record(
-    recipe: Recipe, dvs: Dvs, film: Preview, probe: Probe | None, folder: Folder, piece: int, report: Report | None
-) -> Progress:
-    """Events and preview into the folder, from its last checkpoint to the end of the source."""
-    done = _take_up(folder, dvs, film)
-    if done.finished:
-        return done
+def _record(recorder: Recorder, piece: int, report: Report | None) -> None:
+    """From the point of the last checkpoint to the end of the source."""
+    recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
     with closing(recipe.light(max(done.frames - 1, 0))) as light:
         first = next(light, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
-        film.begin(first[0])
-        if not done.frames:
-            dvs.step(first[0].light, first[0].t_ns)
-            done.frames, done.start_ns, done.end_ns = 1, first[0].t_ns, first[0].t_ns
-            _note(folder, first[0])
-            if probe:
-                folder.write(PROBE, HEADER + probe.lines(first[0], Events.empty(), dvs.inside(probe.places)))
+        recorder.begin(first[0])
         for frame, limited in light:
-            events = dvs.see(frame)
-            with folder.writing():
-                folder.append(events)
-                film.add(frame, events)
-                _note(folder, frame)
-                if probe:
-                    folder.write(PROBE, probe.lines(frame, events, dvs.inside(probe.places)))
-            done.add(frame, events)
+            recorder.add(frame)
             done.limited, done.seconds = limited_before + limited, time.monotonic() - began
             work += max(STEP, frame.light.size)
             if frame.original and report and report(recipe, done) is True:
                 done.warnings.append(f"ended by hand after {done.frames} frames")
                 break
             if frame.original and work >= piece:
-                _checkpoint(folder, dvs, film, done)
+                recorder.checkpoint()
                 work = 0
-    held_back = dvs.flush()
-    with folder.writing():
-        folder.append(held_back)
-        film.finish(held_back)
-        if probe:
-            folder.write(PROBE, "".join(probe.event_lines(held_back)).encode())
-    done.count(held_back)
-    done.finished, done.warnings = True, [*done.warnings, *recipe.source.warnings]
-    _checkpoint(folder, dvs, film, done)
-    return done
-
-
-def _note(folder: Folder, frame: Frame) -> None:
-    """Note the instant of a frame of the source."""
-    if frame.original:
-        folder.write(FRAME_US, np.int64(frame.t_ns // 1000).tobytes())
-
-
-def _take_up(folder: Folder, dvs: Dvs, film: Preview) -> Progress:
-    """Bring everything to the point of the last checkpoint."""
-    saved = folder.saved()
-    if not saved:
-        return Progress()
-    dvs.restore({name.removeprefix("dvs."): array for name, array in saved.items() if name.startswith("dvs.")})
-    film.restore({name.removeprefix("film."): array for name, array in saved.items() if name.startswith("film.")})
-    return Progress(**json.loads(str(saved["progress"])))
-
-
-def _checkpoint(folder: Folder, dvs: Dvs, film: Preview, done: Progress) -> None:
-    with folder.writing():
-        film.close()
-        state = {f"dvs.{name}": array for name, array in dvs.state().items()}
-        state |= {f"film.{name}": array for name, array in film.state().items()}
-        folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(done)))})
-
-
-def _recording(folder: Folder, recipe: Recipe, done: Progress, want_frames: bool) -> Recording:
-    """What event files are written from."""
-    return Recording(
-        recipe.source.size,
-        done.offset_us,
-        done.duration_us,
-        done.events,
-        lambda: folder.events(BLOCK),
-        recipe.labels,
-        recipe.pictures if want_frames and recipe.source.rewindable else None,
-        np.fromfile(folder.written(FRAME_US), np.int64),
-    )
+    done.warnings += recipe.source.warnings
+    recorder.finish()
 
 
 def _outcome(done: Progress, dvs: Dvs) -> dict[str, Any]:

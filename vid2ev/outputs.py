@@ -85,7 +85,7 @@ class Outputs:
 
     def describe(self) -> dict[str, Any]:
         """The outputs, ready for JSON."""
-        return asdict(self) | {"formats": list(self.formats)}
+        return asdict(self) | {"formats": list(self.formats), "probe": [list(pixel) for pixel in self.probe]}
 
     def files(self) -> dict[str, str]:
         """The file of each format; where two have one suffix, the second has its format's name, too."""

@@ -157,10 +157,14 @@ def reaches(block, scratch, i, flags, num, iv):
 
 @inner
 def turns_at(block, scratch, i, flags):
-    """Whether the slope of either pole changes its sign: only then can y turn within the interval."""
+    """Whether the slope of either pole changes its sign: only then can y turn within the interval.
+
+    In steady light, lags that have died away by its end are 0 there and have lost their sign: y may have turned.
+    """
     e1, new1 = block[LAG1 * PITCH + i], scratch[NEW1 + i]
     if len(flags.poles) > 1:
-        return min(e1 * new1, (block[LAG2 * PITCH + i] - e1) * (scratch[NEW2 + i] - new1)) < F(0.0)
+        start, end = block[LAG2 * PITCH + i] - e1, scratch[NEW2 + i] - new1
+        return (e1 * new1 < F(0.0)) | (start > F(0.0)) & (end <= F(0.0)) | (start < F(0.0)) & (end >= F(0.0))
     return e1 * new1 < F(0.0)
 
 

@@ -55,7 +55,9 @@ def flags_of(spec: DvsSpec, labels: bool) -> Flags:
 def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
     """Numbers of the sensor in the units of the walk."""
     taus = spec.pole_taus_us
-    tau1 = taus[0] * 1e3 if taus else 0.0
+    tau1, tau2 = taus[0] * 1e3 if taus else 0.0, 0.0
+    if len(taus) == 2:
+        tau1, tau2 = separate(tau1, taus[1] * 1e3)
     return Numbers(
         seed=np.uint64(seed),
         camera=camera,
@@ -72,7 +74,7 @@ def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
         hot_rate_hz=spec.hot_rate_hz if spec.hot_probability > 0 else 0.0,
         bandwidth_dark=spec.bandwidth_dark,
         tau1_ns=tau1,
-        tau2_ns=separate(tau1, taus[1] * 1e3) if len(taus) == 2 else 0.0,
+        tau2_ns=tau2,
     )
 
 
