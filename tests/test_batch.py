@@ -128,7 +128,7 @@ def test_other_formats_have_an_index_of_frames_beside_them() -> None:
     ("options", "sentence"),
     [
         (["--format", "mp3"], "expected one of"),
-        (["--format", "es"], "only read"),
+        (["--format", "es"], "cannot be written"),
         (["--frames-out", "npz", "--frames-by", "week:1"], "expected duration:10ms"),
         (["--frames-out", "npz", "--frames-as", "cubist"], "expected counts"),
         (["--probe", "8,0"], "expected a pixel of a sensor of 8x6"),

@@ -144,7 +144,8 @@ def _remarks(done: Progress, dvs: Dvs) -> list[str]:
         remarks.append("one frame only: nothing changes, so there are no events")
     if done.cuts_us:
         remarks.append(
-            f"{len(done.cuts_us)} cuts: the sensor started afresh after each; --cuts keep takes them for steps of light"
+            f"{len(done.cuts_us)} cut{'s' * (len(done.cuts_us) > 1)}: the sensor starts afresh there; --cuts keep takes"
+            " a cut for a step of light"
         )
     if done.limited:
         remarks.append(

@@ -51,9 +51,9 @@ class Outputs:
         names = tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",")))
         outputs = cls(names, probe=tuple(map(pixel_of, probe)), **rest)
         for name in names:
-            if not format_named(name).write:
+            if name not in FORMATS or not format_named(name).write:
                 writable = ", ".join(name for name in FORMATS if format_named(name).write)
-                raise UsageError(f"format '{name}' is only read; expected one of {writable}")
+                raise UsageError(f"format '{name}' cannot be written; expected one of {writable}")
         if outputs.frames is not None and outputs.frames not in KINDS:
             raise UsageError(f"frames as '{outputs.frames}': expected one of {', '.join(KINDS)}")
         parse_slicing(outputs.frames_by)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from vid2ev.errors import UsageError
+from vid2ev.formats import recognise
 from vid2ev.formats.event_file import Picture
 from vid2ev.physics.bayer import check_pattern, mosaic
 from vid2ev.recording.manifest import identity, versions
@@ -87,6 +88,7 @@ class Recipe:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
         if rest.get("bayer"):
             rest["colour"], rest["bayer"] = "rgb", check_pattern(rest["bayer"].upper())
+        refuse_recordings(Path(video))
         source = open_source(video, **{key: rest.pop(key) for key in OPTIONS if key in rest})
         recipe = cls(str(video), source, spec, name, **rest)
         recipe.upsampler()  # (refuses what cannot be)
@@ -168,6 +170,19 @@ class Recipe:
                 }
             )
         )
+
+
+def refuse_recordings(path: Path) -> None:
+    """Raise UsageError for what holds events already, and no frames."""
+    if (path / "manifest.json").is_file():
+        what = "a recording"
+    elif path.is_file() and (kind := recognise(path)):
+        what = f"an event file ({kind.name})"
+    else:
+        return
+    raise UsageError(
+        f"{path} is {what} already; `vid2ev render` shows it, `vid2ev reformat` turns it into another format"
+    )
 
 
 def events_of(

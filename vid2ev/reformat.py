@@ -52,6 +52,7 @@ def reformat(
     check_holds(kind, recording.size, recording.duration_us)
     made = _write(target, kind, _reported(recording, report), overwrite)
     had = {"labels": recording.labelled, "frames": recording.frames is not None}
+    unsaid = [f"the size is not stated; {recording.size[0]}x{recording.size[1]} holds all events"] * (file.size is None)
     lost = [what for what in KEPT if had[what] and what not in kind.keeps]
     return {
         "source": str(source),
@@ -64,7 +65,7 @@ def reformat(
         "start_us": recording.start_us,
         "duration_us": recording.duration_us,
         "bytes": sum(path.stat().st_size for path in made),
-        "warnings": file.warnings + [f"{kind.name} does not hold {what}; they are left out" for what in lost],
+        "warnings": file.warnings + unsaid + [f"{kind.name} does not hold {what}; they are left out" for what in lost],
     }
 
 

@@ -26,7 +26,7 @@ def sources_in(video: str) -> list[str]:
     from vid2ev.sources.images import natural
 
     folder = Path(video)
-    if not folder.is_dir() or _holds_pictures(folder):
+    if video == "-" or not folder.is_dir() or _holds_pictures(folder) or (folder / "manifest.json").exists():
         return [video]
     children = sorted(folder.iterdir(), key=lambda path: natural(path.name))
     found = [str(path) for path in children if _is_clip(path) or (path.is_dir() and _holds_pictures(path))]
@@ -66,7 +66,8 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
             traceback.print_exc()
             result |= {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
         else:
-            result |= {"state": "done", "events": made.get("counts", {}).get("events")}
+            events = made.get("counts", {}).get("events")  # (there are none yet in a dry run)
+            result |= {"state": "planned" if events is None else "done", "events": events}
         results.append(result)
     return results
 
@@ -79,12 +80,14 @@ def exit_code(results: list[dict[str, Any]]) -> int:
 def table(results: list[dict[str, Any]]) -> str:
     """The results for people."""
     failed = sum(result["state"] == "failed" for result in results)
+    verb = "planned" if any(result["state"] == "planned" for result in results) else "done"
     width = max(len(result["video"]) for result in results)
     lines = [""]
     for result in results:
         events = "" if result.get("events") is None else f"{result['events']:,} events"
         lines.append(f"{result['state']:<7} {result['video']:<{width}}  {result.get('error', events)}".rstrip())
-    return "\n".join([*lines, f"{len(results) - failed} of {len(results)} done" + f", {failed} failed" * (failed > 0)])
+    lines.append(f"{len(results) - failed} of {len(results)} {verb}" + f", {failed} failed" * (failed > 0))
+    return "\n".join(lines)
 
 
 def _is_clip(path: Path) -> bool:

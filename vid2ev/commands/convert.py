@@ -36,8 +36,9 @@ class Auto(click.ParamType):
 @click.command(short_help="Turn a video into the recording of an event camera.")
 @click.argument("videos", nargs=-1, required=True, metavar="VIDEO...")
 @click.option(
-    "-o", "--output", type=Path, metavar="DIR",
-    help="Folder to make; of several videos, the folder for their folders.  [default: NAME_events here]",
+    "-o", "--output", metavar="DIR",
+    help="Folder to make; of several videos, or with a slash at its end, the folder for their folders."
+    "  [default: NAME_events here]",
 )  # fmt: skip
 @click.option(
     "--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="`vid2ev sensors` lists them."
@@ -115,7 +116,7 @@ class Auto(click.ParamType):
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def convert(
     videos: tuple[str, ...],
-    output: Path | None,
+    output: str | None,
     dry_run: bool,
     verbose: bool,
     quiet: bool,
@@ -136,8 +137,8 @@ def convert(
     quiet |= as_json
     options["seed"] = None if options["seed"] == "random" else options["seed"]
     found = [source for video in videos for source in batch.sources_in(video)]
-    if len(videos) == 1 and found == [videos[0]]:
-        directory = output or conversion.default_directory(videos[0])
+    if len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/"):
+        directory = Path(output) if output else conversion.default_directory(videos[0])
         made = _one(videos[0], directory, dry_run, verbose, quiet, options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
@@ -146,7 +147,7 @@ def convert(
     def one(video: str, directory: Path) -> dict[str, Any]:
         return _one(video, directory, dry_run, verbose, quiet, dict(options))
 
-    results = batch.convert_each(batch.directories(found, output or Path()), one, quiet)
+    results = batch.convert_each(batch.directories(found, Path(output or "")), one, quiet)
     click.echo(
         json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )

@@ -16,8 +16,8 @@ from vid2ev.commands.source_options import source_options
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 def info(file: str, as_json: bool, **options: Any) -> None:
-    """Say what FILE holds: a folder that `vid2ev convert` wrote, an event file (events.h5), or a source of frames, read
-    as the other options say.
+    """Say what FILE holds: a folder that `vid2ev convert` wrote, an event file of any format, or a source of
+    frames, read as the other options say.
 
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
@@ -42,6 +42,6 @@ def info(file: str, as_json: bool, **options: Any) -> None:
         from vid2ev.sources import open_source
 
         source = open_source(file, **options)
-        found = {"path": file} | source.describe()
+        found = {"path": file} | source.describe() | {"duration_expected_s": source.duration_expected_s}
         facts = [("source", summary.source_text(found)), *(("warning", text) for text in source.warnings)]
     click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))

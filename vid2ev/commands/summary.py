@@ -40,7 +40,8 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Events, duration and warnings, from a manifest."""
     counts = manifest["counts"]
     seconds, (width, height) = manifest["duration_us"] / 1e6, manifest["sensor"]["size"]
-    rate = f", {short(counts['events'] / seconds)}/s, {counts['events'] / seconds / width / height:.3g}/s per pixel"
+    per_s = counts["events"] / seconds if seconds else 0.0
+    rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"
     share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
     return [
         ("events", f"{counts['events']:,}{rate if seconds else ''}{share}"),
@@ -69,6 +70,7 @@ def source_text(source: Mapping[str, Any]) -> str:
     facts = [
         "x".join(map(str, source["size"])) if source.get("size") else "",
         f"{source['frames_expected']} frames" if source.get("frames_expected") else "",
+        f"{source['duration_expected_s']:.6g} s" if source.get("duration_expected_s") else "",
         *(str(source[key]) for key in ("codec", "pixel_format", "transfer") if source.get(key)),
     ]
     return f"{source['path']} ({', '.join(fact for fact in [source.get('kind', ''), *facts] if fact)})"

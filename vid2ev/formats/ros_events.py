@@ -173,16 +173,20 @@ def _unpacked(packet: EventPacket, path: Path) -> Events:
         raise ValueError("a time beyond 2262")
     if packet.encoding == "mono":
         t = (packet.time_base + low.astype(np.int64)) // 1000
-        return Events(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
+        return _columns(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
     if packet.encoding == "libcaer":
         after = high.astype(np.int64)
         # The time of libcaer has 31 bits: where it goes back, it has begun anew.
         after[1:] += np.cumsum(after[1:] < after[:-1]) << 31
-        return Events(packet.time_base // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
+        return _columns(packet.time_base // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
     raise DataError(
         f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, libcaer_cmp, libcaer or mono, so"
         " convert it with event_camera_tools first"
     )
+
+
+def _columns(t: np.ndarray, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> Events:
+    return Events(t, x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8))
 
 
 def outgoing(recording: Recording) -> Iterator[EventArray | Picture]:

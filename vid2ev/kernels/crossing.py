@@ -126,7 +126,7 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
         t_ns = iv.t0_ns + np.int64(when_ns)
         label = np.int64(lanes[LABEL + j]) if len(flags.labels) else np.int64(SIGNAL)
         if len(flags.labels) and len(flags.leak):
-            if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], num):
+            if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], pixel, planes, flags, num):
                 label = np.int64(LEAK)
             t_reset[pixel] = t_ns
         out[n] = key_of(when_ns, pixel, polarity, label, iv)
@@ -141,9 +141,10 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
 
 
 @inner
-def mostly_leak(since_ns, num):
-    """Whether the leak makes more than half of the way to the ON level in this time."""
-    return num.leak_nat_per_ns * np.float64(since_ns) > 0.5 * num.threshold_on
+def mostly_leak(since_ns, pixel, planes, flags, num):
+    """Whether the leak makes more than half of the way to the pixel's mean ON level in this time."""
+    threshold = np.float64(planes.theta[pixel, 0]) if len(flags.mismatch) else num.threshold_on
+    return num.leak_nat_per_ns * np.float64(since_ns) > 0.5 * threshold
 
 
 @inner

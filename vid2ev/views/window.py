@@ -33,7 +33,7 @@ def window(file: EventFile, start_us: int, stop_us: int | None = None) -> Record
 
 def with_frame_times(recording: Recording) -> Recording:
     """The recording with the instants of its frames, if it has any; reads the frames once."""
-    if recording.frames is None:
+    if recording.frames is None or recording.frame_us is not None:
         return recording
     return replace(recording, frame_us=np.array([picture.t_us for picture in recording.frames()], np.int64))
 
@@ -44,7 +44,7 @@ class _Window:
     def __init__(self, file: EventFile, start_us: int, stop_us: int | None):
         self._file, self.start_us, self._stop_us = file, start_us, stop_us
         self.path, self.size, self.labelled, self.has_frames = file.path, file.size, file.labelled, file.has_frames
-        self.warnings = file.warnings
+        self.warnings, self.frame_us = file.warnings, getattr(file, "frame_us", None)
         self.describe, self.frames = file.describe, file.frames
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
