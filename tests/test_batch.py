@@ -150,3 +150,33 @@ def test_a_size_that_a_format_cannot_hold_is_refused_before_converting() -> None
     arguments = ["convert", "long.npy", "-o", "out", "--format", "v2e-hdf5"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 2 and "minutes" in result.stderr and not Path("out").exists()
+
+
+def test_one_frame_is_no_trouble() -> None:
+    np.save("one.npy", np.ones((1, 4, 4), np.float32))
+    result = vid2ev("one.npy", "clips/a9.npy", "-o", "out")
+    assert result.exit_code == 0 and "one frame only" in result.stdout and "2 of 2 done" in result.stdout
+    assert CliRunner().invoke(main, ["info", "out/one_events"]).exit_code == 0
+
+
+def test_a_slash_makes_a_folder_of_folders() -> None:
+    assert vid2ev("clips/a9.npy", "-o", "many/").exit_code == 0
+    assert vid2ev("clips/a9.npy", "clips/a10.npy", "-o", "many/", "--resume").exit_code == 0
+    assert {path.name for path in Path("many").iterdir()} == {"a9_events", "a10_events"}
+
+
+def test_recordings_are_not_taken_for_videos() -> None:
+    assert vid2ev("clips/a9.npy", "-o", "out", "--format", "hdf5,csv,evt3").exit_code == 0
+    for path in ("out", "out/events.h5", "out/events.csv", "out/events.raw"):
+        result = vid2ev(path, "-o", "again")
+        assert result.exit_code == 2 and "vid2ev render" in result.stderr and not Path("again").exists()
+
+
+def test_a_dry_run_of_many_says_what_is_planned() -> None:
+    result = vid2ev("clips", "-o", "out", "--dry-run")
+    assert "3 of 4 planned, 1 failed" in result.stdout and not Path("out").exists()
+
+
+def test_standard_input_is_not_a_folder_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("-").mkdir()
+    assert batch.sources_in("-") == ["-"]

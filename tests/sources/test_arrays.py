@@ -64,7 +64,8 @@ def test_times_beside_the_file(tmp_path: Path, suffix: str) -> None:
         np.savetxt(tmp_path / "clip_timestamps.txt", stamps, fmt="%d")
     source = open_source(path)
     assert [frame.t_ns for frame in source.frames()] == [1_000_000, 2_000_000, 4_000_000]
-    assert source.describe()["timestamps_unit"] == "us"
+    assert source.describe()["timestamps_unit"] == "us (by spacing)"
+    assert "are taken for us" in source.warnings[0]
     np.save(path, np.zeros((4, 2, 2), np.float32))
     with pytest.raises(DataError, match="3 times"):
         open_source(path)

@@ -79,15 +79,16 @@ def test_fps_overrules_stamps() -> None:
 
 @pytest.mark.parametrize(("text", "unit", "seconds"), [
     ("0.0\n0.033333333\n0.066666667\n", "s", ["0", "0.033333333", "0.066666667"]),
-    ("0\n33\n67\n100\n", "ms", ["0", "0.033", "0.067", "0.1"]),
-    ("0\n1042\n2083\n", "us", ["0", "0.001042", "0.002083"]),
-    ("1600000000000000\n1600000000033333\n", "us", ["1600000000", "1600000000.033333"]),
-    ("0\n33333333\n66666667\n", "ns", ["0", "0.033333333", "0.066666667"]),
+    ("0\n33\n67\n100\n", "ms (by spacing)", ["0", "0.033", "0.067", "0.1"]),
+    ("0\n1042\n2083\n", "us (by spacing)", ["0", "0.001042", "0.002083"]),
+    ("1600000000000000\n1600000000033333\n", "us (by spacing)", ["1600000000", "1600000000.033333"]),
+    ("0\n33333333\n66666667\n", "ns (by spacing)", ["0", "0.033333333", "0.066666667"]),
     ("# unit: ms\n0.0\n33.25\n", "ms", ["0", "0.03325"]),
     ("#Unit of nothing\n# unit: ns\n5\n7\n", "ns", ["0.000000005", "0.000000007"]),
     ("frame_0 0\n\nframe_1 1e-2\n", "s", ["0", "0.01"]),
-    ("0, 10\n1, 20\n", "ms", ["0.01", "0.02"]),
-    ("7\n", "ms", ["0.007"]),
+    ("0, 10\n1, 20\n", "ms (by spacing)", ["0.01", "0.02"]),
+    ("# us\n0\n2000000\n", "us", ["0", "2"]),
+    ("7\n", "ms (by spacing)", ["0.007"]),
 ])  # fmt: skip
 def test_the_unit_of_a_timestamp_file(tmp_path: Path, text: str, unit: str, seconds: list[str]) -> None:
     file = tmp_path / "timestamps.txt"
@@ -113,7 +114,7 @@ def test_a_binary_timestamp_file_is_refused(tmp_path: Path) -> None:
 def test_timestamps_in_an_array(tmp_path: Path) -> None:
     file = tmp_path / "t.npy"
     np.save(file, np.array([0, 33333, 66667], np.int64))
-    assert read_timestamp_array(file) == ([Fraction(k, 10**6) for k in (0, 33333, 66667)], "us")
+    assert read_timestamp_array(file) == ([Fraction(k, 10**6) for k in (0, 33333, 66667)], "us (by spacing)")
     np.save(file, np.array([0.0, 0.5]))
     assert read_timestamp_array(file) == ([Fraction(0), Fraction(1, 2)], "s")
     for bad in (np.zeros((2, 2)), np.array([0.0, np.nan]), np.array(["a", "b"])):

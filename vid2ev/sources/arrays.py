@@ -18,7 +18,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources.pictures import TYPES, PictureReader
 from vid2ev.sources.stacks import NpyStack, NpzStack, Stack
-from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, stamps_beside, stamps_of_array
+from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, remarks_on_unit, stamps_beside, stamps_of_array
 from vid2ev.sources.transfer import KNOWN
 from vid2ev.stream.frames import Colour, Frame
 
@@ -106,3 +106,4 @@ class ArrayStack:
             self._fps = parse_fps(self._stack.fps)
         else:
             self._stamps, self._unit = stamps_beside(self.path, count)
+        self.warnings += remarks_on_unit(self._unit)

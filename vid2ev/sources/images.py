@@ -20,7 +20,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.sources.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.sources.pictures import PictureReader
 from vid2ev.sources.recognise import PICTURE_SUFFIXES
-from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, stamps_beside
+from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, remarks_on_unit, stamps_beside
 from vid2ev.stream.frames import Colour, Frame
 
 TIMESTAMPS = "timestamps.txt"
@@ -55,6 +55,7 @@ class Images:
         self._unit: str | None = None
         if fps is None:
             self._stamps, self._unit = self._read_stamps()
+            self.warnings += remarks_on_unit(self._unit)
         first = read_picture(*self._places[0]).pixels
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)

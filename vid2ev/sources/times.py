@@ -7,7 +7,7 @@ frame 1.
 `timestamps.txt` holds one line per frame; the last column counts, blank lines and lines that begin with `#` do not.
 The unit is
 
-* what a line `# unit: s`, `# unit: ms`, `# unit: us` or `# unit: ns` says; without such a line
+* what a line `# unit: s` (or ms, us, ns), or just `# us`, says; without such a line
 * seconds, if any of the numbers has a decimal point or an exponent;
 * for whole numbers, by their median spacing: milliseconds below 100 (100 us would be 10 000 fps), nanoseconds from
   1 000 000 (1 s would be 1 fps), and microseconds between.
@@ -28,6 +28,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+GUESSED = " (by spacing)"  # after the name of a unit that nothing states
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
 
@@ -114,20 +115,24 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
         raise DataError(f"{path}: cannot be read as text ({error}); expected one time per line") from error
     for number, line in enumerate(lines, 1):
         if line.lstrip().startswith("#"):
-            said = re.match(r"\s*#\s*unit\s*[:=]\s*(\w+)\s*$", line)
-            if said and said[1] not in NS_PER_UNIT:
-                raise DataError(f"{path}, line {number}: unit '{said[1]}', expected s, ms, us or ns")
-            unit = said[1] if said else unit
+            said = re.match(r"\s*#\s*unit\s*[:=]\s*(\w+)\s*$|\s*#\s*(s|ms|us|ns)\s*$", line)
+            stated = said and (said[1] or said[2])
+            if stated and stated not in NS_PER_UNIT:
+                raise DataError(f"{path}, line {number}: unit '{stated}', expected s, ms, us or ns")
+            unit = stated or unit
         elif line.strip():
             words.append(line.replace(",", " ").split()[-1])
-    try:
-        values = [Fraction(word) for word in words]
-    except (ValueError, ZeroDivisionError) as error:
-        raise DataError(f"{path}: {error}; expected a time in the last column of every line") from error
-    if unit is None:
-        whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
-        unit = unit_of_integers([int(value) for value in values]) if whole else "s"
-    return _in_seconds(values, unit, path), unit
+    values = []
+    for word in words:
+        try:
+            values.append(Fraction(word))
+        except (ValueError, ZeroDivisionError) as error:
+            raise DataError(f"{path}: '{word}' is no time; expected one in the last column of every line") from error
+    if unit is not None:
+        return _in_seconds(values, unit, path), unit
+    whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
+    unit = unit_of_integers([int(value) for value in values]) if whole else "s"
+    return _in_seconds(values, unit, path), f"{unit}{GUESSED * whole}"
 
 
 def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
@@ -144,8 +149,20 @@ def stamps_of_array(stamps: np.ndarray, path: Path, unit: str | None = None) -> 
     if stamps.ndim != 1 or stamps.dtype.kind not in "iuf" or not np.all(np.isfinite(stamps)):
         raise DataError(f"{path}: {stamps.dtype} of shape {stamps.shape}, expected one finite time per frame")
     values = stamps.tolist()
-    unit = unit or ("s" if stamps.dtype.kind == "f" else unit_of_integers(values))
-    return _in_seconds([Fraction(value) for value in values], unit, path), unit
+    guessed = unit is None and stamps.dtype.kind != "f"
+    unit = unit or (unit_of_integers(values) if guessed else "s")
+    return _in_seconds([Fraction(value) for value in values], unit, path), f"{unit}{GUESSED * guessed}"
+
+
+def remarks_on_unit(unit: str | None) -> list[str]:
+    """A warning for a unit that was found by the rule for whole numbers."""
+    if unit is None or not unit.endswith(GUESSED):
+        return []
+    name = unit.removesuffix(GUESSED)
+    return [
+        f"times without a unit are taken for {name}, by their spacing; if that is wrong, begin timestamps.txt with"
+        " `# unit: s`, ms, us or ns"
+    ]
 
 
 def unit_of_integers(values: Sequence[int]) -> str:
