@@ -14,7 +14,7 @@ from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.recording.disk import write_npz
 from vid2ev.recording.folder import Folder
-from vid2ev.recording.preview import Preview
+from vid2ev.recording.preview import Preview, rate_for
 from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
@@ -78,7 +78,8 @@ class Recorder:
     def __init__(self, recipe: Recipe, dvs: Dvs, outputs: Outputs, folder: Folder):
         self.recipe, self.dvs, self.outputs, self.folder = recipe, dvs, outputs, folder
         self.done = Progress()
-        self._film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview)
+        rate = rate_for(recipe.source.frames_expected, recipe.source.duration_expected_s)
+        self._film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview, rate=rate)
         self._probe = Probe(outputs.probe, recipe.source.size[0]) if outputs.probe else None
 
     def take_up(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from vid2ev.recording.panels import COLOURS, GRAYS, NEUTRAL
-from vid2ev.recording.preview import RATE, Preview
+from vid2ev.recording.preview import RATE, Preview, rate_for
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
@@ -190,3 +190,11 @@ def test_the_colours_are_calm_and_grow() -> None:
     assert (np.diff(COLOURS[0, :, 0].astype(int)) >= 0).all() and (np.diff(COLOURS[:, 0, 0].astype(int)) >= 0).all()
     assert COLOURS[..., 0].min() >= 16 and COLOURS[..., 0].max() <= 235
     assert abs(int(COLOURS[0, 0, 1]) - NEUTRAL) < 8 and abs(int(COLOURS[0, 0, 2]) - NEUTRAL) < 8
+
+
+@pytest.mark.parametrize(
+    ("frames", "duration_s", "rate"),
+    [(300, 10.0, 30), (40, 10.0, 30), (10, 10.0, 8), (108, 10_800.0, 1), (None, 3.0, 30), (1, 0.0, 30), (2, None, 30)],
+)
+def test_slow_sources_have_fewer_frames(frames: int | None, duration_s: float | None, rate: int) -> None:
+    assert rate_for(frames, duration_s) == rate

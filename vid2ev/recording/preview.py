@@ -1,6 +1,6 @@
 """preview.mp4: the video on the left, its events on the right, in real time, for a browser.
 
-Frame k shows the instant t_k = t_0 + (k + 1/4) / RATE on the clock of the source: the newest source frame that is not
+Frame k shows the instant t_k = t_0 + (k + 1/4) / rate on the clock of the source: the newest source frame that is not
 after it, and the events since t_(k-1); none is lost, and one that is sent late is shown late.  The quarter lets source
 times that are rounded, or that drift as 29.97 Hz does, be shown in step.  Where nothing changes, a frame is left out
 and the one before it stays.
@@ -14,6 +14,7 @@ and now and then `close`, and in the end `finish`, `close` and `join`.
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
 RATE = 30  # frames per second
+PARTS = 8  # frames per interval of a slow source, for which fewer will do
 SIDE = 640
 ENCODER = {"preset": "ultrafast", "crf": "25"}  # 60 % of the time of "superfast", 24, in a third more bytes
 
@@ -37,14 +39,14 @@ class Preview:
     Its state between two pieces is small: how far it is, and the events not shown yet.
     """
 
-    def __init__(self, size: tuple[int, int], pieces: Path, *, wanted: bool = True):
+    def __init__(self, size: tuple[int, int], pieces: Path, *, wanted: bool = True, rate: int = RATE):
         width, height = size
         shrunk = min(1.0, SIDE / max(size))
         self.across, self.down = max(1, round(width * shrunk)), max(1, round(height * shrunk))
         self.enlarged = max(1, SIDE // max(size))
         sides = self.across * self.enlarged, self.down * self.enlarged
         self.panel = [side + side % 2 for side in sides]  # 4:2:0 needs even sides
-        self.wanted, self.pieces = wanted, pieces
+        self.wanted, self.pieces, self.rate = wanted, pieces, rate
         self._column = (np.arange(width) * self.across // width).astype(np.uint16)
         self._row = (np.arange(height) * self.down // height).astype(np.uint16)
         self._counts = np.zeros((2, self.down, self.across), np.uint8)  # events not shown yet: OFF, ON
@@ -113,7 +115,7 @@ class Preview:
                 with av.open(str(self._piece(number))) as piece:
                     for packet in piece.demux(video=0):
                         if packet.dts is not None and packet.pts is not None and packet.time_base:
-                            shift = int(start / (RATE * packet.time_base))
+                            shift = int(start / (self.rate * packet.time_base))
                             packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
                             packet.stream = stream
                             whole.mux(packet)
@@ -123,7 +125,7 @@ class Preview:
 
     def _instant_ns(self) -> int:
         assert self._t0_ns is not None
-        return self._t0_ns + (4 * self._next + 1) * 10**9 // (4 * RATE)
+        return self._t0_ns + (4 * self._next + 1) * 10**9 // (4 * self.rate)
 
     def _count(self, events: Events) -> None:
         if len(events):
@@ -151,10 +153,19 @@ class Preview:
     def _encode(self, picture: np.ndarray) -> None:
         if self._container is None:
             self._open()
-        self._container.mux(self._stream.encode(film_frame(picture, self._next - self._starts[-1], Fraction(RATE))))
+        self._container.mux(
+            self._stream.encode(film_frame(picture, self._next - self._starts[-1], Fraction(self.rate)))
+        )
 
     def _open(self) -> None:
         """Begin a piece with the next frame."""
         size = 2 * self.panel[0], self.panel[1]
-        self._container, self._stream = open_film(self._piece(len(self._starts)), size, Fraction(RATE), ENCODER)
+        self._container, self._stream = open_film(self._piece(len(self._starts)), size, Fraction(self.rate), ENCODER)
         self._starts.append(self._next)
+
+
+def rate_for(frames: int | None, duration_s: float | None) -> int:
+    """Frames per second of the preview of so many source frames: of slow sources at least one, `PARTS` per interval."""
+    if not frames or not duration_s:
+        return RATE
+    return min(RATE, max(1, math.ceil(PARTS * frames / duration_s)))
