@@ -48,7 +48,7 @@ class Auto(click.ParamType):
 )
 @click.option(
     "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
-    help="Light between the frames: steps along a straight line in time, or along the estimated motion.",
+    help="Light between the frames: a straight line, the same in steps, or carried along the estimated motion.",
 )  # fmt: skip
 @click.option(
     "--subframes",
