@@ -18,7 +18,7 @@ HEAD = 1 << 16  # bytes from which a format is recognised
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A frame that a file holds beside its events: gray uint8 [H, W] or colour [H, W, 3], at an instant [us]."""
+    """A frame that a file holds beside its events: uint8 gray [H, W] or red, green, blue [H, W, 3], and when [us]."""
 
     t_us: int
     pixels: np.ndarray
