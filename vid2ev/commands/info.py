@@ -35,7 +35,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
             *summary.file_facts(path),
             *summary.speed_facts(found),
         ]
-    elif path.is_file() and recognise(path):
+    elif (path / "metadata.yaml").is_file() or (path.is_file() and recognise(path)):  # (a folder of ROS 2, a file)
         found = describe_events(path)
         facts = summary.event_facts(found)
     else:

@@ -104,7 +104,7 @@ def describe_events(path: str | Path) -> dict[str, Any]:
         "times_going_back": disorder.places,
         "labels": file.labelled,
         "frames": file.has_frames,
-        "bytes": file.path.stat().st_size,
+        "bytes": sum(part.stat().st_size for part in _parts_of(file.path)),
         "stored": file.describe(),
         "warnings": file.warnings,
     }
@@ -185,6 +185,11 @@ def _opened(path: str | Path) -> tuple[Format, EventFile]:
     if kind is None or kind.open is None:
         raise DataError(f"{path} is no event file of a known format; expected one of {', '.join(FORMATS)}")
     return kind, kind.open(path)
+
+
+def _parts_of(path: Path) -> list[Path]:
+    """The file, or all files of the bag that a metadata.yaml speaks for."""
+    return [part for part in path.parent.iterdir() if part.is_file()] if path.name == "metadata.yaml" else [path]
 
 
 def _within(folder: Path) -> Path:
