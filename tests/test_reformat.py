@@ -77,6 +77,14 @@ def test_a_part(recording: Path) -> None:
     assert columns(Path("part.csv"))[0] == kept.tolist()
 
 
+def test_times_since_1970_are_no_recording_of_half_a_century(recording: Path) -> None:
+    Path("epoch.csv").write_text("t,x,y,p\n1600000000000000,1,2,1\n1600000000500000,3,4,0\n")
+    made = reformat("epoch.csv", "epoch.h5")
+    assert (made["start_us"], made["duration_us"]) == (1_600_000_000_000_000, 500_000)
+    assert columns(Path("epoch.h5"))[0] == [1_600_000_000_000_000, 1_600_000_000_500_000]
+    assert columns(recording)[0] and reformat("epoch.csv", "epoch.raw")["bytes"] < 10_000
+
+
 def test_json_and_a_summary(recording: Path) -> None:
     found = json.loads(run(str(recording), "one.npz", "--json").stdout)
     assert found["events"] == 5000 and found["files"] == ["one.npz"]
@@ -115,12 +123,12 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
 )
 def test_what_cannot_be_is_one_sentence(recording: Path, arguments: list[str], exit_code: int, sentence: str) -> None:
     Path("noise.raw").write_bytes(np.random.default_rng(0).bytes(5000))
-    one = np.array([0], np.uint16)
+    one = np.zeros(2, np.uint16)
     write = format_named("hdf5").write
     assert write is not None
     for name, size, t in (("wide.h5", (4000, 3), 0), ("long.h5", (1, 1), 2**33)):
-        events = Events(np.array([t]), one, one, one.astype(np.uint8))
-        write(Path(name), Recording(size, 0, t, 1, lambda events=events: iter([events])))
+        events = Events(np.array([0, t]), one, one, one.astype(np.uint8))
+        write(Path(name), Recording(size, 0, t, 2, lambda events=events: iter([events])))
     before = {path.name for path in Path().iterdir()}
     result = run(*arguments)
     assert result.exit_code == exit_code and sentence in result.stderr, result.output

@@ -51,6 +51,7 @@ FORMATS = {
 }
 
 
+LONG_SILENCE_US = 3_600_000_000  # before the first event: the file counts from another instant than it begins
 DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
 
 
@@ -113,14 +114,16 @@ def describe_events(path: str | Path) -> dict[str, Any]:
 def survey(file: EventFile) -> Recording:
     """An event file as a recording to be written anew; reads all of it once.
 
-    Where the file does not state its size, that is the smallest that holds all events.  Times that go back are put in
-    order, with a warning.  Raises DataError for events outside of the size stated, or minutes out of order.
+    Where the file does not state its size, that is the smallest that holds all events; where it counts from an instant
+    long before its first event (such as 1970), the recording begins with that.  Times that go back are put in order,
+    with a warning.  Raises DataError for events outside of the size stated, or minutes out of order.
     """
-    count, start_us, width, height, disorder = 0, file.start_us, 0, 0, Disorder()
+    count, first_us, width, height, disorder = 0, None, 0, 0, Disorder()
     for events in file.events():
         if len(events):
             disorder.add(events.t)
-            start_us = min(start_us, int(events.t.min()))
+            earliest_us = int(events.t.min())
+            first_us = earliest_us if first_us is None else min(first_us, earliest_us)
             width, height = max(width, int(events.x.max()) + 1), max(height, int(events.y.max()) + 1)
             count += len(events)
     size = file.size or (max(width, 1), max(height, 1))
@@ -130,6 +133,9 @@ def survey(file: EventFile) -> Recording:
             " the file is damaged"
         )
     _note_disorder(file, disorder)
+    start_us = file.start_us if first_us is None else min(file.start_us, first_us)
+    if first_us is not None and first_us - start_us > LONG_SILENCE_US:
+        start_us = first_us
     frame_us = getattr(file, "frame_us", None)
     ends = [start_us, disorder.latest_us or start_us, *(frame_us[-1:].tolist() if frame_us is not None else ())]
 
