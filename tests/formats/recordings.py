@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vid2ev.formats.event_file import BLOCK, Format, Recording, stretch
+from vid2ev.formats.event_file import BLOCK, Format, Recording
 from vid2ev.stream.events import Events
 
 SECOND = 10**6
@@ -30,7 +30,7 @@ def recording_of(
     last = int(events.t[-1]) - start_us if len(events) else 0
 
     def blocks():
-        return (stretch(events, at, min(at + block, len(events))) for at in range(0, len(events), block))
+        return (events.stretch(at, min(at + block, len(events))) for at in range(0, len(events), block))
 
     duration_us = last if duration_us is None else duration_us
     return Recording(size, start_us, duration_us, len(events), blocks, events.label is not None)

@@ -11,7 +11,6 @@ import click
 
 from vid2ev.errors import Vid2evError
 
-PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".exr", ".hdr"}
 CLIPS = {
     ".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".y4m", ".ogv", ".3gp",
     ".mts", ".m2ts", ".gif", ".npy", ".npz",
@@ -95,4 +94,6 @@ def _is_clip(path: Path) -> bool:
 
 
 def _holds_pictures(folder: Path) -> bool:
-    return any(path.suffix.lower() in PICTURES for path in folder.iterdir() if path.is_file())
+    from vid2ev.sources.recognise import PICTURE_SUFFIXES
+
+    return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.event_file import HEAD, Format, Recording, promised, stretch
+from vid2ev.formats.event_file import HEAD, Format, Recording, promised
 from vid2ev.formats.prophesee import Header, read_header
 from vid2ev.formats.sequential import Sequential, Unwrapped, pieces, reading
 from vid2ev.stream.events import Events
@@ -105,7 +105,7 @@ def _parted(recording: Recording) -> Iterator[tuple[int, np.ndarray, Events]]:
         while first < len(t):
             number = int(t[first]) // PART_US
             last = int(np.searchsorted(t, (number + 1) * PART_US))
-            yield number, t[first:last] - number * PART_US, stretch(events, first, last)
+            yield number, t[first:last] - number * PART_US, events.stretch(first, last)
             first = last
 
 

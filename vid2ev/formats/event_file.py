@@ -118,22 +118,13 @@ def regrouped(blocks: Iterator[Events], block: int = BLOCK) -> Iterator[Events]:
     for events in blocks:
         while count + len(events) >= block:
             first = block - count
-            yield Events.concatenate([*waiting, stretch(events, 0, first)])
-            events, waiting, count = stretch(events, first, len(events)), [], 0
+            yield Events.concatenate([*waiting, events.stretch(0, first)])
+            events, waiting, count = events.stretch(first, len(events)), [], 0
         if len(events):
             waiting.append(events)
             count += len(events)
     if count:
         yield Events.concatenate(waiting)
-
-
-def stretch(events: Events, first: int, last: int) -> Events:
-    """Events number first ... last - 1; no copy."""
-    if first == 0 and last == len(events):
-        return events
-    part = slice(first, last)
-    label = None if events.label is None else events.label[part]
-    return Events(events.t[part], events.x[part], events.y[part], events.p[part], label)
 
 
 def promised(recording: Recording) -> Iterator[tuple[np.ndarray, Events]]:

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vid2ev.formats.event_file import stretch
 from vid2ev.stream.events import Events
 
 
@@ -43,6 +42,6 @@ def ordered(blocks: Iterator[Events], depth_us: int) -> Iterator[Events]:
         both = Events.concatenate([waiting, events])
         both = both.select(np.argsort(both.t, kind="stable"))
         ready = int(np.searchsorted(both.t, both.t[-1] - depth_us, side="right")) if len(both) else 0
-        yield stretch(both, 0, ready)
-        waiting = stretch(both, ready, len(both))
+        yield both.stretch(0, ready)
+        waiting = both.stretch(ready, len(both))
     yield waiting

@@ -26,7 +26,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, stretch, within
+from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.evt_state import Left, State
 from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
 from vid2ev.formats.rosbag import Topic
@@ -225,4 +225,4 @@ def _windows(recording: Recording) -> Iterator[Events]:
         window = t // WINDOW_US
         cuts = [0, *(np.flatnonzero(np.diff(window)) + 1).tolist(), len(events)]
         for first, last in pairwise(cuts):
-            yield stretch(events, first, last)
+            yield events.stretch(first, last)

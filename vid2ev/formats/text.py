@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.event_file import Recording, promised, stretch
+from vid2ev.formats.event_file import Recording, promised
 from vid2ev.formats.sequential import PIECE, Sequential, reading
 from vid2ev.stream.events import Events
 
@@ -89,7 +89,7 @@ def write_lines(path: Path, recording: Recording, head: str, separator: str, sec
         file.write(f"{head}\n".encode())
         for _, events in promised(recording):
             for first in range(0, len(events), LINES):
-                part = stretch(events, first, min(first + LINES, len(events)))
+                part = events.stretch(first, min(first + LINES, len(events)))
                 label = part.label if labels and part.label is not None else none
                 size = write(part.t, part.x, part.y, part.p, label, ord(separator), second_us, text)
                 file.write(text[:size].data)

@@ -69,8 +69,8 @@ class Preview:
             return
         while (instant_ns := self._instant_ns()) < frame.t_ns:
             earlier = int(np.searchsorted(events.t, instant_ns // 1000, side="right"))
-            self._count(events.select(slice(earlier)))  # type: ignore[arg-type]
-            events = events.select(slice(earlier, None))  # type: ignore[arg-type]
+            self._count(events.stretch(0, earlier))
+            events = events.stretch(earlier, len(events))
             self._show()
         self._count(events)
         if frame.original:

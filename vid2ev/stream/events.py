@@ -62,6 +62,14 @@ class Events:
             np.concatenate([part.label for part in kept]) if labelled else None,  # type: ignore[misc]
         )
 
+    def stretch(self, first: int, last: int) -> Events:
+        """The events number first ... last - 1; no copy."""
+        if first == 0 and last == len(self):
+            return self
+        part = slice(first, last)
+        label = None if self.label is None else self.label[part]
+        return Events(self.t[part], self.x[part], self.y[part], self.p[part], label)
+
     def select(self, mask: np.ndarray) -> Events:
         """The events at a boolean mask or an index array."""
         label = None if self.label is None else self.label[mask]

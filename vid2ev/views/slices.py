@@ -143,8 +143,8 @@ def _between(recording: Recording, edges: Iterable[int]) -> Iterator[Piece]:
     for events in recording.blocks():
         while len(events) and events.t[-1] > stop_us:
             n = int(np.searchsorted(events.t, stop_us, side="right"))
-            yield Piece(start_us, stop_us, _part(events, 0, n), True)
-            events = _part(events, n, len(events))
+            yield Piece(start_us, stop_us, events.stretch(0, n), True)
+            events = events.stretch(n, len(events))
             start_us, stop_us = stop_us, _following(edges, int(events.t[-1]))
         if len(events):
             yield Piece(start_us, stop_us, events, False)
@@ -169,9 +169,9 @@ def _until(recording: Recording, fills: _Fills) -> Iterator[Piece]:
         while first < len(events):
             at = fills(events, first)
             if at < 0:
-                held.append(_part(events, first, len(events)))
+                held.append(events.stretch(first, len(events)))
                 break
-            held.append(_part(events, first, at + 1))
+            held.append(events.stretch(first, at + 1))
             stop_us = int(events.t[at])
             yield from _whole(start_us, stop_us, held)
             start_us, held, given, first = stop_us, [], True, at + 1
@@ -183,7 +183,3 @@ def _whole(start_us: int, stop_us: int, parts: list[Events]) -> Iterator[Piece]:
     parts = parts or [Events.empty()]
     for k, events in enumerate(parts):
         yield Piece(start_us, stop_us, events, k == len(parts) - 1)
-
-
-def _part(events: Events, first: int, stop: int) -> Events:
-    return events.select(slice(first, stop))  # type: ignore[arg-type]
