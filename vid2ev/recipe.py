@@ -14,13 +14,13 @@ from typing import Any, Literal, TypeVar
 from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.formats.event_file import Picture
+from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.physics.bayer import check_pattern, mosaic
 from vid2ev.recording.manifest import identity, versions
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import OPTIONS, Source, open_source
-from vid2ev.sources.eight_bits import srgb_codes
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import Interval, Upsampler, make_upsampler

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.transfer import code_table
 from vid2ev.sources import open_source
-from vid2ev.sources.transfer import code_table
 
 
 def saved(folder: Path, array: np.ndarray) -> Path:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
+from vid2ev.light.primaries import BRADFORD, CHROMATICITIES, D65, primaries_at, primaries_of
+from vid2ev.light.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
+from vid2ev.light.transfer import code_table, parse_transfer
 from vid2ev.sources import open_source
-from vid2ev.sources.primaries import BRADFORD, CHROMATICITIES, D65, primaries_at, primaries_of
-from vid2ev.sources.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
-from vid2ev.sources.transfer import code_table, parse_transfer
 
 LIMITED = 1
 

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
+from vid2ev.light.resample import resampled, taps_of
+from vid2ev.light.tags import BT709_WEIGHTS
 from vid2ev.sources import footage, open_source
 from vid2ev.sources.framing import crop_box, of_shape
-from vid2ev.sources.resample import resampled, taps_of
-from vid2ev.sources.tags import BT709_WEIGHTS
 
 
 def rising(count: int, shape: tuple[int, int] = (32, 48)) -> list[np.ndarray]:

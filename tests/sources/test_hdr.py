@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vid2ev.light.luminance import YuvCode, luminance_of_yuv, signal_table
+from vid2ev.light.tags import MATRICES, WEIGHTS
+from vid2ev.light.transfer import code_table, parse_transfer
 from vid2ev.sources import open_source
-from vid2ev.sources.luminance import YuvCode, luminance_of_yuv, signal_table
-from vid2ev.sources.tags import MATRICES, WEIGHTS
-from vid2ev.sources.transfer import code_table, parse_transfer
 
 BT2020, PQ, HLG, LIMITED, FULL = 9, 16, 18, 1, 2
 HDR = ["pq", "hlg", "log100", "log316", "st428"]

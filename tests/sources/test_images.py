@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.transfer import code_table
 from vid2ev.sources import open_source
-from vid2ev.sources.transfer import code_table
 
 
 def write(folder: Path, names: list[str], dtype=np.uint8, shape=(6, 8), stamps: str | None = None) -> list[np.ndarray]:

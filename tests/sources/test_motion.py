@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.spline import _turned, seen, spline_taps
 from vid2ev.sources import open_source
 from vid2ev.sources.motion import Pan, Saccade, parse_motion
 from vid2ev.sources.photograph import BORDER_PX, Photograph
-from vid2ev.sources.spline import _turned, seen, spline_taps
 
 TEXTURE = np.random.default_rng(0).uniform(0, 1, (120, 160)).astype(np.float32)
 

@@ -14,11 +14,12 @@ import tifffile
 from PIL import Image, ImageOps
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources import open_source, picture_files
-from vid2ev.sources.picture_files import read_picture
-from vid2ev.sources.recognise import recognise
-from vid2ev.sources.tags import BT709_WEIGHTS
-from vid2ev.sources.transfer import code_table
+from vid2ev.light import picture_files
+from vid2ev.light.picture_files import read_picture
+from vid2ev.light.recognise import recognise
+from vid2ev.light.tags import BT709_WEIGHTS
+from vid2ev.light.transfer import code_table
+from vid2ev.sources import open_source
 
 
 def codes(shape: tuple[int, ...], dtype: type = np.uint8) -> np.ndarray:

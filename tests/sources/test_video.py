@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.sources import footage, open_source
-from vid2ev.sources.transfer import parse_transfer
 
 LIMITED, FULL = 1, 2
 

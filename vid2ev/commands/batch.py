@@ -94,6 +94,6 @@ def _is_clip(path: Path) -> bool:
 
 
 def _holds_pictures(folder: Path) -> bool:
-    from vid2ev.sources.recognise import PICTURE_SUFFIXES
+    from vid2ev.light.recognise import PICTURE_SUFFIXES
 
     return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())

@@ -12,12 +12,12 @@ from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
 from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, PIXEL_LIMIT, SWALLOWED, TALLIES
 from vid2ev.kernels.order import order_keys, unpack
 from vid2ev.kernels.work import new_work
+from vid2ev.light.transfer import code_table
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
-from vid2ev.sources.transfer import code_table
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 

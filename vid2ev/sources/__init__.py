@@ -125,12 +125,12 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
 
 
 def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
-    from vid2ev.sources.recognise import recognise
+    from vid2ev.light.recognise import recognise
 
     match recognise(path):
         case "picture":
+            from vid2ev.light.picture_files import pages_of
             from vid2ev.sources.images import Images
-            from vid2ev.sources.picture_files import pages_of
 
             if pages_of(path) == 1:
                 raise UsageError(
@@ -155,8 +155,8 @@ def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colou
 
 
 def _in_motion(path: Path, motion: str, **options: Any) -> Source:
+    from vid2ev.light.recognise import recognise
     from vid2ev.sources.photograph import Photograph
-    from vid2ev.sources.recognise import recognise
 
     if _existing(path).is_dir() or recognise(path) != "picture":
         raise UsageError(f"{path}: motion '{motion}' is for a photograph, such as a PNG, JPEG or EXR; leave it out")

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.pictures import TYPES, PictureReader
+from vid2ev.light.pictures import TYPES, PictureReader
+from vid2ev.light.transfer import KNOWN
 from vid2ev.sources.stacks import NpyStack, NpzStack, Stack
 from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, remarks_on_unit, stamps_beside, stamps_of_array
-from vid2ev.sources.transfer import KNOWN
 from vid2ev.stream.frames import Colour, Frame
 
 

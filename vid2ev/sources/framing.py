@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.light.resample import Taps, resampled, taps_of
 from vid2ev.sources.edit import Edit
-from vid2ev.sources.resample import Taps, resampled, taps_of
 from vid2ev.stream.frames import Frame
 
 if TYPE_CHECKING:

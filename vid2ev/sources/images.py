@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.picture_files import PageReader, Picture, pages_of, read_picture
-from vid2ev.sources.pictures import PictureReader
-from vid2ev.sources.recognise import PICTURE_SUFFIXES
+from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
+from vid2ev.light.pictures import PictureReader
+from vid2ev.light.recognise import PICTURE_SUFFIXES
 from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, remarks_on_unit, stamps_beside
 from vid2ev.stream.frames import Colour, Frame
 

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.light.picture_files import read_picture
+from vid2ev.light.pictures import PictureReader
+from vid2ev.light.resample import resampled, taps_of
+from vid2ev.light.spline import seen
 from vid2ev.sources.framing import crop_box, parse_size
 from vid2ev.sources.motion import Motion, parse_motion
-from vid2ev.sources.picture_files import read_picture
-from vid2ev.sources.pictures import PictureReader
-from vid2ev.sources.resample import resampled, taps_of
-from vid2ev.sources.spline import seen
 from vid2ev.sources.times import parse_fps, round_ns
 from vid2ev.stream.frames import Colour, Frame
 

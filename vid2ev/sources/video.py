@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.colour import rgb_of_rgb, rgb_of_yuv
+from vid2ev.light.colour import rgb_of_rgb, rgb_of_yuv
+from vid2ev.light.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
+from vid2ev.light.primaries import primaries_of
+from vid2ev.light.tags import is_full_range, matrix_of, transfer_of
+from vid2ev.light.transfer import code_table, parse_transfer
 from vid2ev.sources.footage import Footage, stamp_of
-from vid2ev.sources.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
 from vid2ev.sources.planes import codes_of, halvings_of, orientation_of, planar, upright
-from vid2ev.sources.primaries import primaries_of
-from vid2ev.sources.tags import is_full_range, matrix_of, transfer_of
 from vid2ev.sources.times import Clock, parse_fps
-from vid2ev.sources.transfer import code_table, parse_transfer
 from vid2ev.stream.frames import Colour, Frame
 
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from vid2ev.sources.transfer import parse_transfer
+from vid2ev.light.transfer import parse_transfer
 
 STEPS, FINE_STEPS = 4096, 32768  # table entries per unit of signal
 FINE_CURVES = ("pq", "hlg", "smpte240m", "st428", "log100", "log316")

@@ -35,8 +35,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.sources import hdr
-from vid2ev.sources.hdr import Curve
+from vid2ev.light import hdr
+from vid2ev.light.hdr import Curve
 
 KNOWN = "srgb, bt709, linear, pq, hlg, smpte240m, st428, log100, log316 or gamma:G (such as gamma:2.2)"
 STEEPEST_GAMMA = 10.0

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numba import njit
 
-from vid2ev.sources.resample import Taps, resampled
+from vid2ev.light.resample import Taps, resampled
 
 
 def seen(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.sources.colour import rgb_of_rgb
-from vid2ev.sources.luminance import luminance_of_rgb
-from vid2ev.sources.primaries import BT709, Primaries, primaries_of
-from vid2ev.sources.transfer import code_table, parse_transfer
+from vid2ev.light.colour import rgb_of_rgb
+from vid2ev.light.luminance import luminance_of_rgb
+from vid2ev.light.primaries import BT709, Primaries, primaries_of
+from vid2ev.light.transfer import code_table, parse_transfer
 from vid2ev.stream.frames import Colour
 
 TYPES = "uint8, uint16 or floating point"

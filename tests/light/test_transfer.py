@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
-from vid2ev.sources.transfer import code_table, parse_transfer, signal_of_codes
+from vid2ev.light.transfer import code_table, parse_transfer, signal_of_codes
 
 CURVES = ["linear", "srgb", "bt709", "smpte240m", "gamma:2.2", "gamma:0.5"]  # from 0 at 0 to 1 at 1
 

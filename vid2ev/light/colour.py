@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from vid2ev.sources.luminance import F, Steps, YuvCode, chroma_row, places
+from vid2ev.light.luminance import F, Steps, YuvCode, chroma_row, places
 
 
 def rgb_of_yuv(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.sources.transfer import parse_transfer
+from vid2ev.light.transfer import parse_transfer
 
 LAST = 65535  # entries of the table, less one: finer than the steepest step of the curve
 

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.pictures import TYPES
-from vid2ev.sources.primaries import Primaries, primaries_at
-from vid2ev.sources.recognise import EXR, TIFF, head_of
+from vid2ev.light.pictures import TYPES
+from vid2ev.light.primaries import Primaries, primaries_at
+from vid2ev.light.recognise import EXR, TIFF, head_of
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
 

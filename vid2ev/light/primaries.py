@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.sources.tags import BT709_WEIGHTS, WEIGHTS
+from vid2ev.light.tags import BT709_WEIGHTS, WEIGHTS
 
 Place = tuple[float, float]
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vid2ev.sources.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
-from vid2ev.sources.pictures import PictureReader
-from vid2ev.sources.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
-from vid2ev.sources.transfer import code_table, parse_transfer
+from vid2ev.light.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
+from vid2ev.light.pictures import PictureReader
+from vid2ev.light.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
+from vid2ev.light.transfer import code_table, parse_transfer
 
 
 def by_the_book(y, u, v, code: YuvCode, transfer: str, weights) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""Codes and pictures <-> linear light: transfer curves, primaries, luminance, picture files, resampling."""

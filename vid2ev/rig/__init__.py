@@ -1,0 +1,1 @@
+"""From where it is seen: cameras and their poses, depth, views."""

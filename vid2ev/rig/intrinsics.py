@@ -1,0 +1,78 @@
+"""Intrinsics: how a camera maps directions to pixels.
+
+    u = fx x'' + cx,   v = fy y'' + cy,   (x'', y'') = distortion(x / z, y / z)
+
+Pixels count from 0 and have their centres at whole numbers, as in OpenCV: the middle of a row of W is at (W - 1) / 2.
+The distortion is `radtan` (OpenCV's k1, k2, p1, p2, k3, k4, k5, k6) or `equidistant` (OpenCV's and Kalibr's fisheye,
+k1 ... k4).
+
+Sources: the models of OpenCV 4.x, "Camera calibration and 3D reconstruction" and "Fisheye camera model"; D. C. Brown,
+"Decentering distortion of lenses", 1966; J. Kannala, S. Brandt, "A generic camera model", PAMI 2006.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+DistortionModel = Literal["none", "radtan", "equidistant"]
+COUNTS = {"none": (0,), "radtan": (4, 5, 8), "equidistant": (4,)}  # of coefficients
+
+
+class Intrinsics(BaseModel):
+    """A camera's intrinsics.
+
+    size         width, height [px]
+    focal_px     fx, fy [px]
+    centre_px    cx, cy: the principal point [px]
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    size: tuple[int, int] = Field(description="width and height [px]")
+    focal_px: tuple[float, float] = Field(description="focal lengths across and down [px]")
+    centre_px: tuple[float, float] = Field(description="the principal point, from the centre of the first pixel [px]")
+    model: DistortionModel = Field(default="none", description="none, radtan or equidistant")
+    distortion: tuple[float, ...] = Field(default=(), description="its coefficients, in OpenCV's order")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Intrinsics:
+        if min(self.size) < 1 or max(self.size) > 65535:
+            raise ValueError(f"size {self.size[0]}x{self.size[1]} must be 1 to 65535 pixels each way")
+        if min(self.focal_px) <= 0:
+            raise ValueError("focal lengths must be greater than 0")
+        if len(self.distortion) not in COUNTS[self.model]:
+            wanted = " or ".join(map(str, COUNTS[self.model]))
+            raise ValueError(f"distortion '{self.model}' takes {wanted} coefficients, not {len(self.distortion)}")
+        return self
+
+    @classmethod
+    def of_field(cls, size: tuple[int, int], fov_deg: float = 60.0) -> Intrinsics:
+        """Without distortion, square pixels, the centre in the middle, and a horizontal field of view [deg]."""
+        width, height = size
+        focal = width / 2 / math.tan(math.radians(fov_deg) / 2)
+        return cls(size=size, focal_px=(focal, focal), centre_px=((width - 1) / 2, (height - 1) / 2))
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """K [3, 3], float64."""
+        return np.array(
+            [[self.focal_px[0], 0, self.centre_px[0]], [0, self.focal_px[1], self.centre_px[1]], [0, 0, 1]], np.float64
+        )
+
+    @property
+    def fov_deg(self) -> float:
+        """The horizontal field of view between the outer borders of the pixels [deg], distortion left aside."""
+        left, right = self.centre_px[0] + 0.5, self.size[0] - 0.5 - self.centre_px[0]
+        return math.degrees(math.atan(left / self.focal_px[0]) + math.atan(right / self.focal_px[0]))
+
+    def scaled_to(self, size: tuple[int, int]) -> Intrinsics:
+        """The same field seen with other pixels; of another shape, the full width is kept."""
+        across = size[0] / self.size[0]
+        middle = (size[1] - self.size[1] * across) / 2  # (rows of another shape are cut or added on both sides)
+        centre = (self.centre_px[0] + 0.5) * across - 0.5, (self.centre_px[1] + 0.5) * across - 0.5 + middle
+        focal = self.focal_px[0] * across, self.focal_px[1] * across
+        return self.model_copy(update={"size": size, "focal_px": focal, "centre_px": centre})
