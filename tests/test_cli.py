@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from vid2ev import Frame, UsageError, conversion
+from vid2ev import UsageError, conversion
 from vid2ev.commands import main
-from vid2ev.recipe import Recipe
+from vid2ev.recipe import Instant, Recipe
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 QUICK = ["--upsample", "none", "--threads", "1"]
@@ -258,16 +258,16 @@ def test_a_place_that_cannot_be_written() -> None:
 
 def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     vid2ev("convert", CLIP, "-o", "whole", "-q", *QUICK)
-    light = Recipe._light
+    instants = Recipe._instants
 
-    def interrupted(self: Recipe, start: int) -> Iterator[tuple[Frame, int]]:
-        for k, item in enumerate(light(self, start)):
+    def interrupted(self: Recipe, start: int) -> Iterator[Instant]:
+        for k, item in enumerate(instants(self, start)):
             if k == 8:
                 raise KeyboardInterrupt
             yield item
 
     with monkeypatch.context() as patch:
-        patch.setattr(Recipe, "_light", interrupted)
+        patch.setattr(Recipe, "_instants", interrupted)
         result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
         assert (result.exit_code, result.stderr.count("\n")) == (130, 1)
         assert "nothing is left" in result.stderr and left() == {"whole"}

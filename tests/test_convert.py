@@ -13,8 +13,8 @@ import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
 
-from vid2ev import DataError, Events, Frame, UsageError, convert, events_of, load_sensor, read_events
-from vid2ev.recipe import Recipe, _ahead
+from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, read_events
+from vid2ev.recipe import Instant, Recipe, _ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
 NOISY = ["shot_rate_hz=20", "leak_rate_hz=1", "hot_probability=0.01", "hot_rate_hz=200"]
@@ -143,15 +143,15 @@ def test_a_random_seed_is_drawn_and_kept(tmp_path: Path) -> None:
 
 
 def test_a_source_that_fails_half_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    light = Recipe._light
+    instants = Recipe._instants
 
-    def failing(self: Recipe, start: int) -> Iterator[tuple[Frame, int]]:
-        for k, item in enumerate(light(self, start)):
+    def failing(self: Recipe, start: int) -> Iterator[Instant]:
+        for k, item in enumerate(instants(self, start)):
             if k == 8:
                 raise DataError("picture 8 is broken; mend it")
             yield item
 
-    monkeypatch.setattr(Recipe, "_light", failing)
+    monkeypatch.setattr(Recipe, "_instants", failing)
     with pytest.raises(DataError, match="picture 8"):
         convert(CLIP, tmp_path / "out", upsample="none")
     assert list(tmp_path.iterdir()) == []

@@ -40,13 +40,15 @@ FLOORS = {
     "kernels": 3,
     "sensors": 6,
     "outputs": 6,
-    "recipe": 7,
-    "reformat": 7,
-    "recorder": 8,
-    "conversion": 9,
-    "": 10,  # vid2ev/__init__.py: the public names
-    "commands": 11,
-    "__main__": 12,
+    "mounts": 7,
+    "tracks": 7,
+    "recipe": 8,
+    "reformat": 8,
+    "recorder": 9,
+    "conversion": 10,
+    "": 11,  # vid2ev/__init__.py: the public names
+    "commands": 12,
+    "__main__": 13,
 }
 
 

@@ -17,7 +17,6 @@ from vid2ev.recipe import Recipe
 from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job
 from vid2ev.recording.manifest import machine, write_manifest
-from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
@@ -65,18 +64,18 @@ def convert(
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()}
-    beside = growing(outputs)
-    with Folder(directory, job, labels=recipe.labels, overwrite=overwrite, resume=resume, growing=beside) as folder:
+    beside = growing(recipe, outputs)
+    with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
-        recorder = Recorder(recipe, recipe.dvs(threads), outputs, folder)
+        recorder = Recorder(recipe, outputs, folder, threads)
         recorder.take_up()
         if not recorder.done.finished:
             _record(recorder, piece, report)
-        manifest = job | _outcome(recorder.done, recorder.dvs) | {"run": _run(video, threads, recorder.done)}
+        manifest = job | recorder.outcome(0) | {"run": _run(video, threads, recorder.done)}
         with folder.writing():
-            recorder.write()
+            recorder.write(folder.whole)
             write_manifest(folder.whole / "manifest.json", manifest)
             folder.publish()
     return manifest
@@ -105,62 +104,23 @@ def _record(recorder: Recorder, piece: int, report: Report | None) -> None:
     """From the point of the last checkpoint to the end of the source."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
-    with closing(recipe.light(max(done.frames - 1, 0))) as light:
-        first = next(light, None)
+    with closing(recipe.instants(max(done.frames - 1, 0))) as instants:
+        first = next(instants, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
-        recorder.begin(first[0])
-        for frame, limited in light:
-            recorder.add(frame)
-            done.limited, done.seconds = limited_before + limited, time.monotonic() - began
-            work += max(STEP, frame.light.size)
-            if frame.original and report and report(recipe, done) is True:
+        recorder.begin(first)
+        for instant in instants:
+            recorder.add(instant)
+            done.limited, done.seconds = limited_before + instant.limited, time.monotonic() - began
+            work += max(STEP, sum(frame.light.size for frame in instant.frames))
+            if instant.original and report and report(recipe, done) is True:
                 done.warnings.append(f"ended by hand after {done.frames} frames")
                 break
-            if frame.original and work >= piece:
+            if instant.original and work >= piece:
                 recorder.checkpoint()
                 work = 0
     done.warnings += recipe.source.warnings
     recorder.finish()
-
-
-def _outcome(done: Progress, dvs: Dvs) -> dict[str, Any]:
-    """What came out, for the manifest."""
-    counts = {"frames": done.frames, "subframes": done.subframes, "limited_intervals": done.limited}
-    return {
-        "start_us": done.offset_us,
-        "duration_us": done.duration_us,
-        "counts": counts | {"events": done.events} | dvs.counts,
-        "cuts_us": done.cuts_us,
-        "warnings": done.warnings + _remarks(done, dvs),
-    }
-
-
-def _remarks(done: Progress, dvs: Dvs) -> list[str]:
-    """What a person should know about the result."""
-    counts = dvs.counts
-    remarks = []
-    if done.frames == 1:
-        remarks.append("one frame only: nothing changes, so there are no events")
-    if done.cuts_us:
-        remarks.append(
-            f"{len(done.cuts_us)} cut{'s' * (len(done.cuts_us) > 1)}: the sensor starts afresh there; --cuts keep takes"
-            " a cut for a step of light"
-        )
-    if done.limited:
-        remarks.append(
-            f"{done.limited} of {done.frames - 1} intervals asked for more sub-frames than --max-subframes allows"
-        )
-    if counts["capped"]:
-        remarks.append(
-            f"{counts['capped']} times a pixel had more than max_crossings = {dvs.spec.max_crossings} crossings"
-            " from frame to frame; the rest is missing"
-        )
-    if counts["not_finite"]:
-        remarks.append(
-            f"{counts['not_finite']} values of light were negative, not finite or beyond 1e30; they count as 0 or 1e30"
-        )
-    return remarks
 
 
 def _run(video: str | Path, threads: int, done: Progress) -> dict[str, Any]:

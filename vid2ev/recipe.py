@@ -1,4 +1,4 @@
-"""What decides the events of a recording: a source of light, made denser in time, and a sensor that looks at it."""
+"""What decides a recording: a source of light, made denser in time, and the cameras that look at it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.formats.event_file import Picture
 from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import check_pattern, mosaic
 from vid2ev.recording.manifest import identity, versions
-from vid2ev.sensors.dvs import Dvs
+from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import OPTIONS, Source, open_source
@@ -35,25 +36,39 @@ CUTS = ("restart", "keep")
 T = TypeVar("T")
 
 
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What the cameras see at one instant of the source's clock: a frame for each, on its own clock.
+
+    `original` and `cut` are those of the source's frame.  `limited` is the number of source intervals so far that hit
+    `max_subframes`.
+    """
+
+    frames: tuple[Frame, ...]
+    t_ns: int
+    original: bool
+    cut: bool
+    limited: int
+
+
 @dataclass(frozen=True)
 class Recipe:
-    """Everything that decides the events of a recording; the same recipe, the same events.
+    """Everything that decides a recording; the same recipe, the same events and frames.
 
     video          what the source was opened by
-    sensor         what the specification was found by
+    mounts         the cameras
     upsample       how light is made between frames: none, linear or flow
     subframes      intervals that a source interval becomes: "auto" (by motion and contrast), or a number
     max_subframes  the most that "auto" may take
-    seed           of the sensor, 0 ... 2**64 - 1
+    seed           of the sensors that have none of their own, 0 ... 2**64 - 1
     labels         give each event its cause
-    cuts           "restart": the sensor starts afresh after a cut, and "keep": it sees a step of light
+    cuts           "restart": event cameras start afresh after a cut, and "keep": they see a step of light
     bayer          the pattern of colour filters before the pixels; None for none: they see luminance
     """
 
     video: str
     source: Source
-    spec: DvsSpec
-    sensor: str
+    mounts: tuple[Mount, ...]
     upsample: str = "flow"
     subframes: int | Literal["auto"] = "auto"
     max_subframes: int = 64
@@ -90,7 +105,8 @@ class Recipe:
             rest["colour"], rest["bayer"] = "rgb", check_pattern(rest["bayer"].upper())
         refuse_recordings(Path(video))
         source = open_source(video, **{key: rest.pop(key) for key in OPTIONS if key in rest})
-        recipe = cls(str(video), source, spec, name, **rest)
+        mounts = (Mount("", 0, name, spec, seed, Intrinsics.of_field(source.size)),)
+        recipe = cls(str(video), source, mounts, **rest)
         recipe.upsampler()  # (refuses what cannot be)
         if recipe.cuts not in CUTS:
             raise UsageError(f"cuts '{recipe.cuts}': expected one of {', '.join(CUTS)}")
@@ -98,26 +114,27 @@ class Recipe:
 
     def upsampler(self) -> Upsampler:
         """A new upsampler."""
-        threshold = min(self.spec.threshold_on, self.spec.threshold_off)
-        return make_upsampler(self.upsample, self.subframes, self.max_subframes, threshold)
+        return make_upsampler(self.upsample, self.subframes, self.max_subframes, self._threshold)
 
-    def dvs(self, threads: int = 1) -> Dvs:
-        """The sensor, before its first frame."""
-        return Dvs(self.spec, self.source.size, self.seed, threads=threads, labels=self.labels)
+    @property
+    def _threshold(self) -> float:
+        """The least contrast threshold of all sensors [nat]."""
+        return min(
+            threshold for mount in self.mounts for threshold in (mount.spec.threshold_on, mount.spec.threshold_off)
+        )
 
-    def light(self, start: int = 0) -> Generator[tuple[Frame, int]]:
-        """Source frame `start`, and all frames after it, those in between too; with each the number of source intervals
-        so far that hit `max_subframes`.  Two threads make them, a little in advance: one looks for motion, the other
-        carries light along it."""
-        return _ahead(self._light(start), FRAMES_AHEAD)
+    def instants(self, start: int = 0) -> Generator[Instant]:
+        """What is seen at source frame `start`, and at all frames after it, those in between too.  Two threads make the
+        frames, a little in advance: one looks for motion, the other carries light along it."""
+        return _ahead(self._instants(start), FRAMES_AHEAD)
 
-    def _light(self, start: int) -> Generator[tuple[Frame, int]]:
+    def _instants(self, start: int) -> Generator[Instant]:
         limited = 0
         with closing(_ahead(self._intervals(start), INTERVALS_AHEAD)) as intervals:
             for interval in intervals:
                 limited += interval.limited
                 for frame in interval:
-                    yield self._filtered(frame), limited
+                    yield Instant((self._filtered(frame),), frame.t_ns, frame.original, frame.cut, limited)
 
     def _filtered(self, frame: Frame) -> Frame:
         return frame if self.bayer is None else replace(frame, light=mosaic(frame.light, self.bayer))
@@ -125,7 +142,7 @@ class Recipe:
     def _intervals(self, start: int) -> Generator[Interval]:
         """The frame `start` by itself, and each interval after it."""
         upsampler, straight = self.upsampler(), NoUpsampling()
-        cuts = CutDetector(min(self.spec.threshold_on, self.spec.threshold_off))
+        cuts = CutDetector(self._threshold)
         before: Frame | None = None
         # (whether there is a cut after frame `start` depends on the frame before it, too)
         for index, frame in enumerate(self.source.frames(max(start - 1, 0)), max(start - 1, 0)):
@@ -146,7 +163,6 @@ class Recipe:
         """The recipe as JSON: what the manifest says of it, and by which a run is known again."""
         path = Path(self.video)
         known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
-        width, height = self.source.size
         return json.loads(
             json.dumps(
                 {
@@ -158,13 +174,7 @@ class Recipe:
                         "max_subframes": self.max_subframes,
                         "cuts": self.cuts,
                     },
-                    "sensor": {
-                        "name": self.sensor,
-                        "size": [width, height],
-                        "parameters": self.spec.model_dump(mode="json"),
-                        "effects": self.spec.effects(),
-                        "bayer": self.bayer,
-                    },
+                    "sensor": self.mounts[0].describe() | {"bayer": self.bayer},
                     "seed": self.seed,
                     "labels": self.labels,
                 }
@@ -198,7 +208,8 @@ def events_of(
     The arguments are those of `Recipe.of`, and the `threads` of the sensor.  What is impossible is refused at once.
     """
     recipe = Recipe.of(video, sensor, overrides, **rest)
-    return recipe.dvs(threads).run(frame for frame, _ in recipe.light())
+    dvs = recipe.mounts[0].dvs(recipe.labels, threads)
+    return dvs.run(instant.frames[0] for instant in recipe.instants())
 
 
 def _ahead(items: Generator[T], depth: int) -> Generator[T]:

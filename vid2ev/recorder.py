@@ -1,31 +1,27 @@
-"""What grows while a recording is made: events, the preview, the instants of the frames, probed pixels; all with one
-checkpoint, so that whatever is interrupted fits together again."""
+"""What grows while a recording is made: a track for every camera; all with one checkpoint, so that whatever is
+interrupted fits together again."""
 
 from __future__ import annotations
 
 import json
-import shutil
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.outputs import Outputs
-from vid2ev.recipe import Recipe
-from vid2ev.recording.disk import write_npz
+from vid2ev.recipe import Instant, Recipe
 from vid2ev.recording.folder import Folder
-from vid2ev.recording.preview import Preview, rate_for
-from vid2ev.recording.probe import HEADER, Probe, plot
-from vid2ev.sensors.dvs import Dvs
-from vid2ev.stream.events import Events
-from vid2ev.stream.frames import Frame
-
-FRAME_US, PROBE = "frame_us", "probe.csv"  # files of the folder that grow beside the events
+from vid2ev.recording.preview import rate_for
+from vid2ev.tracks import Track
+from vid2ev.tracks.dvs import DvsTrack, dvs_files
 
 
-def growing(outputs: Outputs) -> list[str]:
-    """The files beside the events that a folder is to be made with."""
-    return [FRAME_US, *[PROBE] * bool(outputs.probe)]
+def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
+    """The files that a folder is to be made with."""
+    return [name for mount in recipe.mounts for name in dvs_files(mount.within, recipe.labels, outputs)]
 
 
 @dataclass
@@ -35,132 +31,124 @@ class Progress:
     frames: int = 0  # of the source
     subframes: int = 0  # made between them
     limited: int = 0  # source intervals that hit max_subframes
-    events: int = 0
+    events: int = 0  # of all cameras
     start_ns: int = 0  # the first frame
     end_ns: int = 0  # the last frame
-    last_us: int = 0  # the last event
     cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots
     seconds: float = 0.0  # of work, in all runs
     finished: bool = False
     warnings: list[str] = field(default_factory=list)
 
-    def add(self, frame: Frame, events: Events) -> None:
-        """Count a frame and the events up to it."""
-        self.frames += frame.original
-        self.subframes += not frame.original
-        self.end_ns = frame.t_ns
-        self.cuts_us += [frame.t_ns // 1000] * frame.cut
-        self.count(events)
-
-    def count(self, events: Events) -> None:
-        """Count events."""
-        self.events += len(events)
-        self.last_us = int(events.t[-1]) if len(events) else self.last_us
-
-    @property
-    def offset_us(self) -> int:
-        """The instant from which an event file counts: the first frame."""
-        return self.start_ns // 1000
-
-    @property
-    def duration_us(self) -> int:
-        """From the first frame to the last, or to the last event where the sensor's readout makes it later."""
-        return max(self.end_ns // 1000, self.last_us) - self.offset_us
+    def add(self, instant: Instant) -> None:
+        """Count an instant."""
+        self.frames += instant.original
+        self.subframes += not instant.original
+        self.start_ns = instant.t_ns if self.frames == 1 and instant.original else self.start_ns
+        self.end_ns = instant.t_ns
+        self.cuts_us += [instant.t_ns // 1000] * instant.cut
 
 
 class Recorder:
-    """Puts frames and events into a folder; `done` is how far it is.
+    """Puts what cameras see into a folder; `done` is how far it is.
 
-    `take_up` comes first, then `begin` with the first frame (or the last one before the checkpoint), `add` for each
-    that follows and now and then `checkpoint`, and in the end `finish` and `write`.
+    `take_up` comes first, then `begin` with the first instant (or the last source frame before the checkpoint), `add`
+    for each that follows and now and then `checkpoint`, and in the end `finish` and `write`.
     """
 
-    def __init__(self, recipe: Recipe, dvs: Dvs, outputs: Outputs, folder: Folder):
-        self.recipe, self.dvs, self.outputs, self.folder = recipe, dvs, outputs, folder
+    def __init__(self, recipe: Recipe, outputs: Outputs, folder: Folder, threads: int):
+        self.recipe, self.outputs, self.folder = recipe, outputs, folder
         self.done = Progress()
         rate = rate_for(recipe.source.frames_expected, recipe.source.duration_expected_s)
-        self._film = Preview(recipe.source.size, folder.partial, wanted=outputs.preview, rate=rate)
-        self._probe = Probe(outputs.probe, recipe.source.size[0]) if outputs.probe else None
+        pictures = recipe.pictures if recipe.source.rewindable else None
+        self.tracks: Sequence[Track] = [
+            DvsTrack(
+                mount.dvs(recipe.labels, threads), folder, outputs, within=mount.within, rate=rate, pictures=pictures
+            )
+            for mount in recipe.mounts
+        ]
 
     def take_up(self) -> None:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
         saved = self.folder.saved()
         if saved:
-            for part, name in ((self.dvs, "dvs."), (self._film, "film.")):
-                part.restore({key.removeprefix(name): array for key, array in saved.items() if key.startswith(name)})
+            for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
+                name = f"track{mount.number}."
+                track.restore({key.removeprefix(name): array for key, array in saved.items() if key.startswith(name)})
             self.done = Progress(**json.loads(str(saved["progress"])))
 
-    def begin(self, frame: Frame) -> None:
-        """The first frame of the recording; after `take_up`, the last source frame before the checkpoint."""
-        self._film.begin(frame)
-        if not self.done.frames:
-            self.dvs.step(frame.light, frame.t_ns)
-            self.done.frames, self.done.start_ns, self.done.end_ns = 1, frame.t_ns, frame.t_ns
-            with self.folder.writing():
-                self._note(frame)
-                if self._probe:
-                    self.folder.write(PROBE, HEADER)
-                    self._look_inside(frame, Events.empty())
-
-    def add(self, frame: Frame) -> None:
-        """The next frame, and what the sensor makes of it."""
-        events = self.dvs.see(frame)
+    def begin(self, instant: Instant) -> None:
+        """The first instant of the recording; after `take_up`, the last source frame before the checkpoint."""
         with self.folder.writing():
-            self.folder.append(events)
-            self._film.add(frame, events)
-            self._note(frame)
-            self._look_inside(frame, events)
-        self.done.add(frame, events)
+            for track, frame in zip(self.tracks, instant.frames, strict=True):
+                track.begin(frame)
+        if not self.done.frames:
+            self.done.add(instant)
+
+    def add(self, instant: Instant) -> None:
+        """The next instant, and what the sensors make of it."""
+        with self.folder.writing():
+            for track, frame in zip(self.tracks, instant.frames, strict=True):
+                track.add(frame)
+        self.done.add(instant)
+        self.done.events = sum(track.events for track in self.tracks)
 
     def finish(self) -> None:
-        """What the sensor held back, and the last checkpoint."""
-        events = self.dvs.flush()
+        """What the sensors held back, and the last checkpoint."""
         with self.folder.writing():
-            self.folder.append(events)
-            self._film.finish(events)
-            if self._probe:
-                self.folder.write(PROBE, "".join(self._probe.event_lines(events)).encode())
-        self.done.count(events)
+            for track in self.tracks:
+                track.finish()
+        self.done.events = sum(track.events for track in self.tracks)
         self.done.finished = True
         self.checkpoint()
 
     def checkpoint(self) -> None:
         """Make this the point from which an interrupted recording goes on."""
+        state: dict[str, np.ndarray] = {}
         with self.folder.writing():
-            self._film.close()
-            state = {f"dvs.{name}": array for name, array in self.dvs.state().items()}
-            state |= {f"film.{name}": array for name, array in self._film.state().items()}
+            for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
+                track.close()
+                state |= {f"track{mount.number}.{name}": array for name, array in track.state().items()}
             self.folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(self.done)))})
 
-    def write(self) -> None:
-        """The files of the recording, but for its manifest."""
-        whole = self.folder.whole
-        self.outputs.write(whole, self._recording())
-        self._film.join(whole / "preview.mp4")
-        if self._probe:
-            shutil.copyfile(self.folder.written(PROBE), whole / PROBE)
-            plot(whole / PROBE, whole / "probe.png")
-        if self.outputs.noise_maps:
-            write_npz(whole / "noise_maps.npz", self.dvs.maps())
+    def write(self, whole: Path) -> None:
+        """The files of all cameras, but for the manifests."""
+        for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
+            (whole / mount.within).mkdir(exist_ok=True)
+            track.write(whole / mount.within, *self.span_us(mount.number))
 
-    def _note(self, frame: Frame) -> None:
-        if frame.original:
-            self.folder.write(FRAME_US, np.int64(frame.t_ns // 1000).tobytes())
+    def span_us(self, number: int) -> tuple[int, int]:
+        """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last
+        thing that it sent where its readout makes it later."""
+        offset_us = self.recipe.mounts[number].clock_offset_us
+        start_us = self.done.start_ns // 1000 + offset_us
+        return start_us, max(self.done.end_ns // 1000 + offset_us, self.tracks[number].last_us) - start_us
 
-    def _look_inside(self, frame: Frame, events: Events) -> None:
-        if self._probe:
-            self.folder.write(PROBE, self._probe.lines(frame, events, self.dvs.inside(self._probe.places)))
+    def outcome(self, number: int) -> dict[str, Any]:
+        """What came out of a camera, for its manifest."""
+        done, track = self.done, self.tracks[number]
+        start_us, duration_us = self.span_us(number)
+        counts = {"frames": done.frames, "subframes": done.subframes, "limited_intervals": done.limited}
+        return {
+            "start_us": start_us,
+            "duration_us": duration_us,
+            "counts": counts | track.counts(),
+            "cuts_us": done.cuts_us,
+            "warnings": done.warnings + _remarks(done) + track.remarks(),
+        }
 
-    def _recording(self) -> Recording:
-        """What event files are written from."""
-        with_frames = self.outputs.want_frames and self.recipe.source.rewindable
-        return Recording(
-            self.recipe.source.size,
-            self.done.offset_us,
-            self.done.duration_us,
-            self.done.events,
-            lambda: self.folder.events(BLOCK),
-            self.recipe.labels,
-            self.recipe.pictures if with_frames else None,
-            np.fromfile(self.folder.written(FRAME_US), np.int64),
+
+def _remarks(done: Progress) -> list[str]:
+    """What a person should know about the light of the recording."""
+    remarks = []
+    if done.frames == 1:
+        remarks.append("one frame only: nothing changes, so there are no events")
+    if done.cuts_us:
+        remarks.append(
+            f"{len(done.cuts_us)} cut{'s' * (len(done.cuts_us) > 1)}: the sensor starts afresh there; --cuts keep takes"
+            " a cut for a step of light"
         )
+    if done.limited:
+        remarks.append(
+            f"{done.limited} of {done.frames - 1} intervals asked for more sub-frames than --max-subframes allows"
+        )
+    return remarks

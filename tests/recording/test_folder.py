@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.columns import EventColumns, column_files
 from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
 
 JOB = {"versions": {"vid2ev": "0"}, "sensor": {"threshold_on": 0.15}, "seed": 3}
 OTHER = JOB | {"sensor": {"threshold_on": 0.2}}
+
+
+COLUMNS = {"growing": column_files()}
 
 
 def events_at(*t: int) -> Events:
@@ -36,11 +40,12 @@ def tree(path: Path) -> dict[str, bytes]:
 
 def begun(directory: Path) -> None:
     """A conversion that was killed after its checkpoint: two events in it, a third beyond."""
-    folder = Folder(directory, JOB)
+    folder = Folder(directory, JOB, **COLUMNS)
     folder.__enter__()
-    folder.append(events_at(1, 2))
+    columns = EventColumns(folder)
+    columns.append(events_at(1, 2))
     folder.checkpoint({"level": np.arange(4.0)})
-    folder.append(events_at(3))
+    columns.append(events_at(3))
     for file in folder._files.values():
         file.flush()
     folder.__exit__(None, None, None)  # (what a kill does to the lock; with a checkpoint it leaves the files)
@@ -62,30 +67,32 @@ def test_an_empty_folder_is_free(tmp_path: Path) -> None:
 
 
 def test_an_error_before_the_first_checkpoint_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", JOB) as folder:
-        folder.append(events_at(1))
+    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", JOB, **COLUMNS) as folder:
+        EventColumns(folder).append(events_at(1))
         raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
 
 
 def test_events_come_back_in_blocks(tmp_path: Path) -> None:
-    with Folder(tmp_path / "out", JOB, labels=True) as folder:
+    with Folder(tmp_path / "out", JOB, growing=column_files(labels=True)) as folder:
+        columns = EventColumns(folder, labels=True)
         for t in ((1, 2, 3), (), (4,), (5, 6, 7)):
-            folder.append(events_at(*t))
-        blocks = list(folder.events(3))
+            columns.append(events_at(*t))
+        blocks = list(columns.blocks(3))
     assert [block.t.tolist() for block in blocks] == [[1, 2, 3], [4, 5, 6], [7]]
     assert all(block.label is not None and len(block.label) == len(block) for block in blocks)
-    with Folder(tmp_path / "out", JOB) as folder:
-        assert [len(block) for block in folder.events(3)] == [0]
+    with Folder(tmp_path / "out", JOB, **COLUMNS) as folder:
+        assert [len(block) for block in EventColumns(folder).blocks(3)] == [0]
 
 
 def test_resuming_cuts_off_what_came_after_the_checkpoint(tmp_path: Path) -> None:
     begun(tmp_path / "out")
-    with Folder(tmp_path / "out", JOB, resume=True) as folder:
-        assert folder.count == 2
+    with Folder(tmp_path / "out", JOB, resume=True, **COLUMNS) as folder:
+        columns = EventColumns(folder)
+        assert columns.count == 2
         np.testing.assert_array_equal(folder.saved()["level"], np.arange(4.0))
-        folder.append(events_at(8))
-        (block,) = folder.events(10)
+        columns.append(events_at(8))
+        (block,) = columns.blocks(10)
         assert block.t.tolist() == [1, 2, 8]
 
 
@@ -101,8 +108,8 @@ def test_a_begun_folder_is_neither_overwritten_nor_mixed(tmp_path: Path) -> None
         pass
     assert tree(tmp_path) == before
     assert begun_job(tmp_path / "out") == JOB
-    with Folder(tmp_path / "out", OTHER, resume=True, overwrite=True) as folder:
-        assert folder.count == 0 and not folder.saved()
+    with Folder(tmp_path / "out", OTHER, resume=True, overwrite=True, **COLUMNS) as folder:
+        assert EventColumns(folder).count == 0 and not folder.saved()
 
 
 def test_a_finished_recording_is_left_as_it_is(tmp_path: Path) -> None:
@@ -122,8 +129,8 @@ def test_overwriting_keeps_the_old_until_the_new_is_whole(tmp_path: Path) -> Non
     with Folder(tmp_path / "out", JOB) as folder:
         made(folder)
     before = tree(tmp_path / "out")
-    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", OTHER, overwrite=True) as folder:
-        folder.append(events_at(1))
+    with pytest.raises(ZeroDivisionError), Folder(tmp_path / "out", OTHER, overwrite=True, **COLUMNS) as folder:
+        EventColumns(folder).append(events_at(1))
         raise ZeroDivisionError
     assert tree(tmp_path / "out") == before
     with Folder(tmp_path / "out", OTHER, overwrite=True) as folder:
@@ -157,8 +164,8 @@ def test_folders_of_others_are_not_touched(tmp_path: Path, monkeypatch: pytest.M
 
 def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
     pytest.importorskip("fcntl", reason="no file locks on this system")
-    with Folder(tmp_path / "out", JOB) as first:
-        first.append(events_at(1))
+    with Folder(tmp_path / "out", JOB, **COLUMNS) as first:
+        EventColumns(first).append(events_at(1))
         for flags in ({}, {"overwrite": True}, {"resume": True}):
             with pytest.raises(UsageError, match="another vid2ev"), Folder(tmp_path / "out", JOB, **flags):
                 pass

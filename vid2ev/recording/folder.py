@@ -31,21 +31,20 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import lock, sync, whole_file
 from vid2ev.recording.manifest import difference, read_manifest
-from vid2ev.stream.events import Events
 
-COLUMNS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}
 FILES = re.compile(  # what a recording holds, and nothing else
-    r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|preview\.mp4|frame_index\.csv|probe\.(csv|png)|noise_maps\.npz|manifest\.json"
+    r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
+    r"|noise_maps\.npz|truth|rig\.toml|manifest\.json"
 )
 
 
 class Folder:
-    """The folder `directory` while it is made, as a context: `append`, `checkpoint`, then `publish`.
+    """The folder `directory` while it is made, as a context: `write`, `checkpoint`, then `publish`.
 
     job        what decides the recording, for JSON; what is there of another job is in the way
     overwrite  replace a recording that is in the way; it stays until the new one is whole
     resume     take what is there if it is of the same job: a finished recording, or the last checkpoint
-    growing    names of other files that grow with the recording (`write`)
+    growing    names of the files that grow with the recording
     Left without `publish`, the folder keeps its last checkpoint; without one it leaves nothing.
     Raises UsageError where `directory` is taken, DataError where it cannot be written.
     """
@@ -57,15 +56,12 @@ class Folder:
         *,
         overwrite: bool = False,
         resume: bool = False,
-        labels: bool = False,
         growing: Sequence[str] = (),
     ):
         self.directory = directory
         self.partial = partial_of(directory)
         self.job = json.loads(json.dumps(job))
         self.overwrite, self.resume = overwrite, resume
-        self.columns = {name: dtype for name, dtype in COLUMNS.items() if labels or name != "label"}
-        self.count = 0
         self._growing = tuple(growing)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
         self._files: dict[str, io.BufferedRandom] = {}
@@ -99,18 +95,16 @@ class Folder:
         """Whether there is a checkpoint to resume from."""
         return (self.partial / "checkpoint.npz").exists()
 
-    def append(self, events: Events) -> None:
-        """Add events; they count from the next checkpoint on."""
-        for name, dtype in self.columns.items() if len(events) else ():
-            self._files[name].write(np.ascontiguousarray(getattr(events, name), dtype).data)
-        self.count += len(events)
-
-    def write(self, name: str, content: bytes) -> None:
-        """Add to one of the other files that grow; counts from the next checkpoint on."""
+    def write(self, name: str, content: bytes | memoryview) -> None:
+        """Add to one of the files that grow; it counts from the next checkpoint on."""
         self._files[name].write(content)
 
+    def size(self, name: str) -> int:
+        """How many bytes a file that grows has."""
+        return self._files[name].tell()
+
     def written(self, name: str) -> Path:
-        """One of the other files that grow, with all that was written to it."""
+        """A file that grows, with all that was written to it."""
         self._files[name].flush()
         return self.partial / name
 
@@ -121,7 +115,7 @@ class Folder:
             os.fsync(file.fileno())
         with whole_file(self.partial / "checkpoint.npz") as saved:
             sizes = {f"size.{name}": np.int64(file.tell()) for name, file in self._files.items()}
-            np.savez(saved, allow_pickle=False, **state, **sizes, events=np.int64(self.count))
+            np.savez(saved, allow_pickle=False, **state, **sizes)
 
     def saved(self) -> dict[str, np.ndarray]:
         """The state of the last checkpoint; empty without one."""
@@ -129,19 +123,6 @@ class Folder:
             return {}
         with np.load(self.partial / "checkpoint.npz") as arrays:
             return dict(arrays)
-
-    def events(self, block: int) -> Iterator[Events]:
-        """All events appended, `block` of them at a time but for the last."""
-        for name in self.columns:
-            self._files[name].flush()
-        for at in range(0, max(self.count, 1), block):
-            n = min(block, self.count - at)
-            yield Events(
-                **{
-                    name: np.fromfile(self.partial / name, dtype, n, offset=at * np.dtype(dtype).itemsize)
-                    for name, dtype in self.columns.items()
-                }
-            )
 
     @property
     def whole(self) -> Path:
@@ -152,7 +133,7 @@ class Folder:
 
     def publish(self) -> None:
         """Put the finished recording in its place, at once."""
-        for path in self.whole.iterdir():
+        for path in self.whole.rglob("*"):
             sync(path)
         sync(self.whole)
         if self.directory.exists():
@@ -180,7 +161,6 @@ class Folder:
         made, sizes = self.directory / "manifest.json", dict[str, int]()
         if self.resume and self.resumable and self._is_same(self.partial / "job.json"):
             with np.load(self.partial / "checkpoint.npz") as saved:
-                self.count = int(saved["events"])
                 sizes = {name[5:]: int(saved[name]) for name in saved if name.startswith("size.")}
         elif self.resume and not self.resumable and made.exists() and self._is_same(made):
             self.finished = read_manifest(made)
@@ -189,7 +169,8 @@ class Folder:
             self._clear()
             with whole_file(self.partial / "job.json") as file:
                 file.write(json.dumps(self.job, indent=2).encode())
-        for name in (*self.columns, *self._growing):
+        for name in self._growing:
+            (self.partial / name).parent.mkdir(exist_ok=True)
             (self.partial / name).touch()
             self._files[name] = file = open(self.partial / name, "r+b")  # noqa: SIM115 (closed by __exit__)
             file.truncate(sizes.get(name, 0))
@@ -233,8 +214,8 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
         )
     if directory.exists() and not directory.is_dir():
         raise UsageError(f"{directory} is a file; choose a folder with -o")
-    held = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
-    others = {name for name in held if not FILES.fullmatch(name)}
+    held = list(directory.iterdir()) if directory.is_dir() else []
+    others = {path.name for path in held if not (FILES.fullmatch(path.name) or _is_camera(path))}
     if others:
         raise UsageError(
             f"{directory} holds files that are no recording ({min(others)}); choose another folder with -o"
@@ -247,3 +228,8 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
         raise UsageError(f"{partial} is needed to work in, and holds other files; choose another folder with -o")
     if "checkpoint.npz" in begun and not (overwrite or resume):
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")
+
+
+def _is_camera(path: Path) -> bool:
+    """Whether a folder is that of a camera of a rig."""
+    return (path / "manifest.json").is_file() and all(FILES.fullmatch(child.name) for child in path.iterdir())

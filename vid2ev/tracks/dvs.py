@@ -1,0 +1,154 @@
+"""The track of an event camera: events, the preview, the instants of the frames, probed pixels."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.formats.event_file import BLOCK, Picture, Recording
+from vid2ev.outputs import Outputs
+from vid2ev.recording.columns import EventColumns, column_files
+from vid2ev.recording.disk import write_npz
+from vid2ev.recording.folder import Folder
+from vid2ev.recording.preview import Preview
+from vid2ev.recording.probe import HEADER, Probe, plot
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+FRAME_US, PROBE = "frame_us", "probe.csv"  # files that grow beside the events
+
+
+def dvs_files(within: str, labels: bool, outputs: Outputs) -> list[str]:
+    """The files that grow, `within` the folder."""
+    return [*column_files(within, labels), f"{within}{FRAME_US}", *[f"{within}{PROBE}"] * bool(outputs.probe)]
+
+
+class DvsTrack:
+    """An event camera whose files are `within` a folder.
+
+    rate      pictures per second of the preview
+    pictures  gives the frames to be kept in files of events that have room for them; None for none
+    """
+
+    def __init__(
+        self,
+        dvs: Dvs,
+        folder: Folder,
+        outputs: Outputs,
+        *,
+        within: str = "",
+        rate: int = 30,
+        pictures: Callable[[], Iterator[Picture]] | None = None,
+    ):
+        self.dvs, self.folder, self.outputs = dvs, folder, outputs
+        self.last_us = 0
+        self._within, self._pictures = within, pictures
+        self._columns = EventColumns(folder, within, dvs.labels)
+        self._film = Preview(dvs.size, folder.partial / within, wanted=outputs.preview, rate=rate)
+        self._probe = Probe(outputs.probe, dvs.size[0]) if outputs.probe else None
+
+    @property
+    def events(self) -> int:
+        """Events so far."""
+        return self._columns.count
+
+    def begin(self, frame: Frame) -> None:
+        """The first frame; after `restore`, the last source frame before the checkpoint."""
+        self._film.begin(frame)
+        if not self.folder.size(f"{self._within}{FRAME_US}"):
+            self.dvs.step(frame.light, frame.t_ns)
+            self._note(frame)
+            if self._probe:
+                self.folder.write(f"{self._within}{PROBE}", HEADER)
+                self._look_inside(frame, Events.empty())
+
+    def add(self, frame: Frame) -> None:
+        """The next frame, and its events."""
+        events = self.dvs.see(frame)
+        self._append(events)
+        self._film.add(frame, events)
+        self._note(frame)
+        self._look_inside(frame, events)
+
+    def finish(self) -> None:
+        """What the sensor held back."""
+        events = self.dvs.flush()
+        self._append(events)
+        self._film.finish(events)
+        if self._probe:
+            self.folder.write(f"{self._within}{PROBE}", "".join(self._probe.event_lines(events)).encode())
+
+    def close(self) -> None:
+        """End a piece of the preview."""
+        self._film.close()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Sensor, preview, and the last event."""
+        state = {f"dvs.{name}": array for name, array in self.dvs.state().items()}
+        state |= {f"film.{name}": array for name, array in self._film.state().items()}
+        return state | {"last_us": np.array(self.last_us, np.int64)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state."""
+        for part, name in ((self.dvs, "dvs."), (self._film, "film.")):
+            part.restore({key.removeprefix(name): array for key, array in state.items() if key.startswith(name)})
+        self.last_us = int(state["last_us"])
+
+    def write(self, whole: Path, start_us: int, duration_us: int) -> None:
+        """The files of the recording."""
+        self.outputs.write(whole, self._recording(start_us, duration_us))
+        self._film.join(whole / "preview.mp4")
+        if self._probe:
+            shutil.copyfile(self.folder.written(f"{self._within}{PROBE}"), whole / PROBE)
+            plot(whole / PROBE, whole / "probe.png")
+        if self.outputs.noise_maps:
+            write_npz(whole / "noise_maps.npz", self.dvs.maps())
+
+    def counts(self) -> dict[str, int]:
+        """Events, and what became of crossings."""
+        return {"events": self.events} | self.dvs.counts
+
+    def remarks(self) -> list[str]:
+        """What is missing or was mended."""
+        counts, remarks = self.dvs.counts, []
+        if counts["capped"]:
+            remarks.append(
+                f"{counts['capped']} times a pixel had more than max_crossings = {self.dvs.spec.max_crossings}"
+                " crossings from frame to frame; the rest is missing"
+            )
+        if counts["not_finite"]:
+            remarks.append(
+                f"{counts['not_finite']} values of light were negative, not finite or beyond 1e30; they count as 0 or"
+                " 1e30"
+            )
+        return remarks
+
+    def _append(self, events: Events) -> None:
+        self._columns.append(events)
+        self.last_us = int(events.t[-1]) if len(events) else self.last_us
+
+    def _note(self, frame: Frame) -> None:
+        if frame.original:
+            self.folder.write(f"{self._within}{FRAME_US}", np.int64(frame.t_ns // 1000).tobytes())
+
+    def _look_inside(self, frame: Frame, events: Events) -> None:
+        if self._probe:
+            lines = self._probe.lines(frame, events, self.dvs.inside(self._probe.places))
+            self.folder.write(f"{self._within}{PROBE}", lines)
+
+    def _recording(self, start_us: int, duration_us: int) -> Recording:
+        """What event files are written from."""
+        return Recording(
+            self.dvs.size,
+            start_us,
+            duration_us,
+            self.events,
+            lambda: self._columns.blocks(BLOCK),
+            self.dvs.labels,
+            self._pictures if self.outputs.want_frames else None,
+            np.fromfile(self.folder.written(f"{self._within}{FRAME_US}"), np.int64),
+        )
