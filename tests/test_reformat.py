@@ -108,7 +108,7 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "exit_code", "sentence"),
     [
-        (["missing.raw", "out.h5"], 1, "no such file"),
+        (["missing.raw", "out.h5"], 2, "no such file"),
         (["whole.h5", "out.xyz"], 2, "suffix"),
         (["whole.h5", "out.es", "--format", "es"], 2, "only read"),
         (["whole.h5", "out.es", "--format", "evt9"], 2, "expected one of"),

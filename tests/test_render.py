@@ -324,7 +324,7 @@ def test_options_that_cannot_be_meant(arguments: list[str]) -> None:
 
 
 def test_files_that_are_none_or_damaged() -> None:
-    refused(DataError, "no such file", "missing.h5")
+    refused(UsageError, "no such file", "missing.h5")
     Path("text.h5").write_text("t x y p")
     refused(DataError, "no event file", "text.h5")
     write(scattered(50), size=(4, 4))

@@ -16,6 +16,7 @@ from vid2ev.views.on_disk import KINDS, write_frames
 from vid2ev.views.requests import parse_representation, parse_slicing
 
 FRAME_INDEX = "frame_index.csv"
+FRAMES_BY, FRAMES_AS = "duration:10ms", "counts"
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class Outputs:
     formats: tuple[str, ...] = ("hdf5",)
     preview: bool = True
     frames: str | None = None
-    frames_by: str = "duration:10ms"
-    frames_as: str = "counts"
+    frames_by: str = FRAMES_BY
+    frames_as: str = FRAMES_AS
     probe: tuple[tuple[int, int], ...] = ()
     noise_maps: bool = False
 
@@ -56,6 +57,11 @@ class Outputs:
                 raise UsageError(f"format '{name}' cannot be written; expected one of {writable}")
         if outputs.frames is not None and outputs.frames not in KINDS:
             raise UsageError(f"frames as '{outputs.frames}': expected one of {', '.join(KINDS)}")
+        if outputs.frames is None and (outputs.frames_by, outputs.frames_as) != (FRAMES_BY, FRAMES_AS):
+            raise UsageError(
+                f"frames by '{outputs.frames_by}', as '{outputs.frames_as}': expected frames to write; add --frames-out"
+                " npz, png or mp4"
+            )
         parse_slicing(outputs.frames_by)
         parse_representation(outputs.frames_as)
         return outputs

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vid2ev.errors import DataError
+from vid2ev.errors import Vid2evError
 from vid2ev.formats import describe_events, open_events, read_events, survey
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.formats.hdf5 import write_events
@@ -152,7 +152,7 @@ def test_files_of_others_without_size_and_index_are_read(tmp_path: Path) -> None
 
 
 def refused(path: Path) -> str:
-    with pytest.raises(DataError) as raised:
+    with pytest.raises(Vid2evError) as raised:
         list(read_events(path))
     assert str(path) in str(raised.value) and "\n" not in str(raised.value)
     return str(raised.value)

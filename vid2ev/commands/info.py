@@ -9,6 +9,9 @@ from typing import Any
 import click
 
 from vid2ev.commands.source_options import source_options
+from vid2ev.errors import DataError
+
+EVENT_SUFFIXES = {".aedat", ".aedat4", ".bag", ".dat", ".es", ".h5", ".hdf5", ".raw"}  # of no source of frames
 
 
 @click.command(short_help="Say what a recording, an event file or a video holds.")
@@ -38,6 +41,8 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     elif (path / "metadata.yaml").is_file() or (path.is_file() and recognise(path)):  # (a folder of ROS 2, a file)
         found = describe_events(path)
         facts = summary.event_facts(found)
+    elif path.is_file() and path.suffix.lower() in EVENT_SUFFIXES:
+        raise DataError(f"{path} is named as event files are, but begins as none; it is damaged or something else")
     else:
         from vid2ev.sources import open_source
 

@@ -63,7 +63,7 @@ def format_named(name: str) -> Format:
 
 
 def open_events(path: str | Path) -> EventFile:
-    """The event file at a path, or the one in a recording's folder, whatever it is called; raises DataError."""
+    """The event file at a path, or the one in a recording's folder; raises as `read_events` does."""
     return _opened(path)[1]
 
 
@@ -72,8 +72,8 @@ def read_events(
 ) -> Iterator[Events]:
     """The events of a file or recording folder with start_us <= t < stop_us, at most `block` at a time.
 
-    Times are absolute, on the clock of the source.  Raises DataError for a file that is not there, no event file, or
-    damaged.
+    Times are absolute, on the clock of the source.  Raises UsageError for a file that is not there, DataError for one
+    that is no event file, or damaged.
     """
     yield from open_events(path).events(start_us, stop_us, block)
 
@@ -171,13 +171,16 @@ def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = N
 
 
 def recognise(path: str | Path) -> Format | None:
-    """The format of a file, by its content; None if that is no event file.  Raises DataError if it cannot be read."""
+    """The format of a file, by its content; None if that is no event file.  Raises UsageError if it is not there,
+    DataError if it cannot be read."""
     path = Path(path)
     try:
         with open(path, "rb") as file:
             head = file.read(HEAD)
     except FileNotFoundError as error:
-        raise DataError(f"{path}: no such file; give an event file, or a folder that `vid2ev convert` wrote") from error
+        raise UsageError(
+            f"{path}: no such file; give an event file, or a folder that `vid2ev convert` wrote"
+        ) from error
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}; give an event file") from error
     kinds = (format_named(name) for name in FORMATS)
