@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -135,7 +136,7 @@ class Slowed(Edit):
                 raise DataError(
                     f"slowdown {float(self._slowdown):g}: two frames come to lie on one nanosecond; use less"
                 )
-            yield Frame(frame.light, t_ns)
+            yield replace(frame, t_ns=t_ns)
             before_ns = t_ns
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,4 +67,4 @@ class Grey(Edit):
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames [H, W, 3] from index `start` on."""
         for frame in self.source.frames(start):
-            yield Frame(np.repeat(frame.light[..., None], 3, axis=-1), frame.t_ns)
+            yield replace(frame, light=np.repeat(frame.light[..., None], 3, axis=-1))

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -103,10 +104,20 @@ class Framed(Edit):
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
         for frame in self.source.frames(start):
-            yield Frame(self._framed(frame.light), frame.t_ns)
+            depth = None if frame.depth is None else self._nearest(frame.depth)
+            yield replace(frame, light=self._framed(frame.light), depth=depth)
 
     def _framed(self, light: np.ndarray) -> np.ndarray:
         if self._taps is not None:
             return resampled(light, *self._taps)
         x, y, width, height = map(int, self._box)
         return np.ascontiguousarray(light[y : y + height, x : x + width])
+
+    def _nearest(self, depth: np.ndarray) -> np.ndarray:
+        """Depth at the centres of the pixels: a mean of near and far would be where nothing is."""
+        rows = _centres(self._box.y, self._box.height, self._size[1])
+        return np.ascontiguousarray(depth[rows][:, _centres(self._box.x, self._box.width, self._size[0])])
+
+
+def _centres(begin: Fraction, extent: Fraction, outputs: int) -> np.ndarray:
+    return np.array([math.floor(begin + (2 * i + 1) * extent / (2 * outputs)) for i in range(outputs)], np.int64)

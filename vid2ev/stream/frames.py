@@ -18,15 +18,17 @@ class Frame:
     `light` is float32 and linear; 1.0 is diffuse white and brighter light goes on unclipped.  It is luminance [H, W]
     or, from a source opened with colour "rgb", red, green, blue [H, W, 3] of the primaries of BT.709; a colour that
     these cannot mix has a negative component, so that 0.2126 R + 0.7152 G + 0.0722 B is the luminance of any colour.
-    `t_ns` is the instant in nanoseconds on the clock of the source.  `original` is True for a frame of the
-    source, False for one made between two of them.  `cut` is True where a new shot begins: what was seen
-    before has nothing to do with it.
+    `t_ns` is the instant in nanoseconds on the clock of the source.  `original` is True for a frame of the source,
+    False for one made between two of them.  `cut` is True where a new shot begins: what was seen before has nothing to
+    do with it.  `depth`, where it is known, is float32 [H, W]: how far the scene is along the axis of the camera that
+    sees it [m]; what is not finite and positive is unknown.
     """
 
     light: np.ndarray
     t_ns: int
     original: bool = True
     cut: bool = False
+    depth: np.ndarray | None = None
 
     @property
     def luminance(self) -> np.ndarray:
