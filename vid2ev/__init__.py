@@ -15,28 +15,38 @@ if TYPE_CHECKING:
     from vid2ev.errors import Vid2evError as Vid2evError
     from vid2ev.formats import read_events as read_events
     from vid2ev.recipe import events_of as events_of
+    from vid2ev.sensors.cis import Cis as Cis
+    from vid2ev.sensors.cis_spec import CisSpec as CisSpec
     from vid2ev.sensors.dvs import Dvs as Dvs
+    from vid2ev.sensors.presets import cis_names as cis_names
+    from vid2ev.sensors.presets import load_cis as load_cis
     from vid2ev.sensors.presets import load_sensor as load_sensor
     from vid2ev.sensors.presets import preset_names as preset_names
     from vid2ev.sensors.spec import DvsSpec as DvsSpec
     from vid2ev.sources import open_source as open_source
     from vid2ev.stream.events import Events as Events
     from vid2ev.stream.events import Label as Label
+    from vid2ev.stream.exposures import Exposure as Exposure
     from vid2ev.stream.frames import Frame as Frame
 
     __version__: str
 
 _HOME = {
+    "Cis": "vid2ev.sensors.cis",
+    "CisSpec": "vid2ev.sensors.cis_spec",
     "DataError": "vid2ev.errors",
     "Dvs": "vid2ev.sensors.dvs",
     "DvsSpec": "vid2ev.sensors.spec",
     "Events": "vid2ev.stream.events",
+    "Exposure": "vid2ev.stream.exposures",
     "Frame": "vid2ev.stream.frames",
     "Label": "vid2ev.stream.events",
     "UsageError": "vid2ev.errors",
     "Vid2evError": "vid2ev.errors",
+    "cis_names": "vid2ev.sensors.presets",
     "convert": "vid2ev.conversion",
     "events_of": "vid2ev.recipe",
+    "load_cis": "vid2ev.sensors.presets",
     "load_sensor": "vid2ev.sensors.presets",
     "open_source": "vid2ev.sources",
     "preset_names": "vid2ev.sensors.presets",

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from vid2ev.commands.sensors import sensors
 from vid2ev.errors import UsageError
-from vid2ev.sensors.presets import load_sensor, preset_names, read_sensor
-from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.presets import KINDS, Kind, load, read_sensor
 
 
 def run(*arguments: str) -> str:
@@ -19,33 +19,52 @@ def run(*arguments: str) -> str:
     return done.output
 
 
-def test_the_list_has_a_line_for_each_preset() -> None:
-    lines = run().splitlines()
-    for name in preset_names():
-        assert [line for line in lines if line.split()[:1] == [name] and read_sensor(name).about["title"] in line]
+ALL = [(kind, name) for kind in KINDS for name in kind.names()]
+
+
+@pytest.mark.parametrize(("kind", "name"), ALL)
+def test_the_list_has_a_line_for_each_preset(kind: Kind, name: str) -> None:
+    titled = [line for line in run().splitlines() if read_sensor(name, kind).about["title"] in line]
+    assert [line.split()[0] for line in titled] == [name]
 
 
 def test_the_list_for_programs() -> None:
-    assert sorted(json.loads(run("--json"))) == preset_names()
+    listed = json.loads(run("--json"))
+    assert {kind: sorted(titles) for kind, titles in listed.items()} == {kind.table: kind.names() for kind in KINDS}
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_page_explains_every_key_and_cites_every_source(name: str) -> None:
+@pytest.mark.parametrize(("kind", "name"), ALL)
+def test_a_page_explains_every_key_and_cites_every_source(kind: Kind, name: str) -> None:
     page = " ".join(run(name).split())
-    for key, field in DvsSpec.model_fields.items():
-        assert f"{key} = {json.dumps(load_sensor(name).model_dump(mode='json')[key])}" in page
+    for key, field in kind.spec.model_fields.items():
+        assert f"{key} = {json.dumps(load(kind, name).model_dump(mode='json')[key])}" in page
         assert (field.description or "").partition(" [")[0] in page
-    for source in [*read_sensor(name).sources.values(), *read_sensor(name).about["sources"]]:
+    for source in [*read_sensor(name, kind).sources.values(), *read_sensor(name, kind).about["sources"]]:
         assert " ".join(source.split()) in page
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_the_page_for_programs_makes_the_same_sensor(name: str) -> None:
+@pytest.mark.parametrize(("kind", "name"), ALL)
+def test_the_page_for_programs_makes_the_same_sensor(kind: Kind, name: str) -> None:
     page = json.loads(run(name, "--json"))
-    assert DvsSpec(**{key: entry["value"] for key, entry in page["dvs"].items()}) == load_sensor(name)
-    assert page["dvs"]["threshold_on"]["unit"] == "nat" and page["dvs"]["refractory_us"]["unit"] == "us"
+    assert kind.spec(**{key: entry["value"] for key, entry in page[kind.table].items()}) == load(kind, name)
+    assert page["about"][kind.table]["title"] == read_sensor(name, kind).about["title"]
+
+
+def test_units_are_given_apart() -> None:
+    keys = json.loads(run("paper", "--json"))
+    assert keys["dvs"]["threshold_on"]["unit"] == "nat" and keys["dvs"]["refractory_us"]["unit"] == "us"
+    assert keys["cis"]["exposure_us"]["unit"] == "us" and keys["cis"]["noise_lsb"]["unit"] == "LSB"
+
+
+def test_a_file_of_a_frame_sensor_is_explained_as_one(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[cis]\n# measured\nexposure_us = 123\n")
+    page = run(str(path))
+    assert "exposure_us = 123.0 us" in page and "[measured]" in page and "threshold_on" not in page
 
 
 def test_an_unknown_name_is_refused_as_everywhere() -> None:
     with pytest.raises(UsageError, match="did you mean"):
         run("davis364")
+    with pytest.raises(UsageError, match="did you mean phone"):
+        run("phones")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from vid2ev.sensors.presets import SensorFile
+    from vid2ev.sensors.presets import Kind, SensorFile
 
 
 @click.command(short_help="List, explain and cite the sensor presets.")
@@ -19,29 +19,34 @@ if TYPE_CHECKING:
 def sensors(name: str | None, as_json: bool) -> None:
     """List the sensor presets, or explain one.
 
-    NAME is a preset or a TOML file; its page shows each key with value, unit, meaning and source.
+    NAME is a preset or a TOML file; its page shows each key with value, unit, meaning and source.  Event sensors (dvs)
+    and frame sensors (cis) have presets of their own; a name that both have gives two pages.
     """
-    from vid2ev.sensors.presets import load_sensor, preset_names, read_sensor
+    from vid2ev.sensors.presets import KINDS, kinds_of, read_sensor
 
     if name is None:
-        titles = {preset: read_sensor(preset).about.get("title", "") for preset in preset_names()}
+        titles = {
+            kind.table: {preset: read_sensor(preset, kind).about.get("title", "") for preset in kind.names()}
+            for kind in KINDS
+        }
         click.echo(json.dumps(titles, indent=2) if as_json else _listing(titles))
         return
-    sensor = read_sensor(name)
-    keys = _explain(sensor, load_sensor(name).model_dump(mode="json"))
+    pages = [(kind, *_explained(name, kind)) for kind in kinds_of(name)]
     if as_json:
-        click.echo(json.dumps({"name": sensor.name, "about": dict(sensor.about), "dvs": keys}, indent=2, default=str))
+        about = {kind.table: dict(sensor.about) for kind, sensor, _ in pages}
+        values = {kind.table: keys for kind, _, keys in pages}
+        click.echo(json.dumps({"name": name, "about": about, **values}, indent=2, default=str))
     else:
-        click.echo(_page(sensor, keys))
+        click.echo("\n\n\n".join(_page(sensor, keys, kind) for kind, sensor, keys in pages))
 
 
-def _explain(sensor: SensorFile, values: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Value, unit, meaning and source of each key: those that the sensor states, then the defaults."""
-    from vid2ev.sensors.spec import DvsSpec
+def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, Any]]]:
+    """A sensor, and of each key value, unit, meaning and source: those that the sensor states, then the defaults."""
+    from vid2ev.sensors.presets import load, read_sensor
 
-    explained = {}
-    for key in dict.fromkeys([*sensor.values, *DvsSpec.model_fields]):
-        meaning = DvsSpec.model_fields[key].description or ""
+    sensor, values, explained = read_sensor(name, kind), load(kind, name).model_dump(mode="json"), {}
+    for key in dict.fromkeys([*sensor.values, *kind.spec.model_fields]):
+        meaning = kind.spec.model_fields[key].description or ""
         unit = re.search(r" \[(\w+)\]", meaning)
         explained[key] = {
             "value": values[key],
@@ -49,18 +54,23 @@ def _explain(sensor: SensorFile, values: dict[str, Any]) -> dict[str, dict[str, 
             "meaning": meaning.replace(unit[0], "") if unit else meaning,
             "source": sensor.sources.get(key) if key in sensor.values else "default",
         }
-    return explained
+    return sensor, explained
 
 
-def _listing(titles: dict[str, str]) -> str:
-    width = max(map(len, titles))
-    lines = [f"{name:<{width}}  {title}" for name, title in titles.items()]
-    return "\n".join([*lines, "", "Explain one: vid2ev sensors NAME.  Use one: vid2ev convert VIDEO --sensor NAME"])
+KIND_TITLES = {"dvs": "Event sensors (--sensor)", "cis": "Frame sensors (--cis)"}
 
 
-def _page(sensor: SensorFile, keys: dict[str, dict[str, Any]]) -> str:
-    about = sensor.about
-    lines = [f"{sensor.name}: {about['title']}" if "title" in about else sensor.name, ""]
+def _listing(titles: dict[str, dict[str, str]]) -> str:
+    width = max(len(name) for of_kind in titles.values() for name in of_kind)
+    lines = []
+    for table, of_kind in titles.items():
+        lines += [KIND_TITLES[table], *(f"  {name:<{width}}  {title}" for name, title in of_kind.items()), ""]
+    return "\n".join([*lines, "Explain one: vid2ev sensors NAME.  Use one: vid2ev convert VIDEO --sensor NAME"])
+
+
+def _page(sensor: SensorFile, keys: dict[str, dict[str, Any]], kind: Kind) -> str:
+    about, name = sensor.about, f"{sensor.name} [{kind.table}]"
+    lines = [f"{name}: {about['title']}" if "title" in about else name, ""]
     for key, entry in keys.items():
         unit = f" {entry['unit']}" if entry["unit"] else ""
         lines += [f"{key} = {json.dumps(entry['value'])}{unit}", *_wrapped(entry["meaning"])]

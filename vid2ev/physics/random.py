@@ -14,10 +14,12 @@ import numpy as np
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.elementary import fma, log64
 
-PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE = range(8)
+PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE, READOUT, FIXED_PATTERN = range(10)
 
 _M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _W0, _W1 = np.uint32(0x9E3779B9), np.uint32(0xBB67AE85)
+_2W0, _3W0, _4W0, _5W0 = (np.uint32(n * int(_W0) & 0xFFFFFFFF) for n in (2, 3, 4, 5))
+_2W1, _3W1, _4W1, _5W1 = (np.uint32(n * int(_W1) & 0xFFFFFFFF) for n in (2, 3, 4, 5))
 _32 = np.uint64(32)
 _TO_UNIT = 2.0**-32
 
@@ -43,6 +45,28 @@ def philox(seed, stream, pixel, tick):
         c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
         k0, k1 = np.uint32(k0 + _W0), np.uint32(k1 + _W1)
     return c0, c1, c2, c3
+
+
+@compiled
+def _five_rounds(c0, c1, c2, c3, k0, k1):
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, np.uint32(k0 + _W0), np.uint32(k1 + _W1))
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, np.uint32(k0 + _2W0), np.uint32(k1 + _2W1))
+    c0, c1, c2, c3 = _round(c0, c1, c2, c3, np.uint32(k0 + _3W0), np.uint32(k1 + _3W1))
+    return _round(c0, c1, c2, c3, np.uint32(k0 + _4W0), np.uint32(k1 + _4W1))
+
+
+@compiled
+def fill_words(words, seed, stream, first, tick):
+    """The words of `philox` for pixels first, first + 1, ... into words uint32 [4, n]; without a loop over the rounds
+    the loop over the pixels is vector code."""
+    w0, w1, w2, w3 = words[0], words[1], words[2], words[3]
+    k0, k1 = np.uint32(seed), np.uint32(np.uint64(seed) >> _32)
+    l0, l1 = np.uint32(k0 + _5W0), np.uint32(k1 + _5W1)
+    t0, t1 = np.uint32(tick), np.uint32(np.uint64(tick) >> _32)
+    for i in range(w0.size):
+        c0, c1, c2, c3 = _five_rounds(np.uint32(first + i), t0, t1, np.uint32(stream), k0, k1)
+        w0[i], w1[i], w2[i], w3[i] = _five_rounds(c0, c1, c2, c3, l0, l1)
 
 
 @compiled

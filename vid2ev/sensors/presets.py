@@ -1,8 +1,9 @@
 """Sensors by name: preset files, a person's own TOML file, and `key=value` on top of either.
 
-A sensor file has a table `[dvs]`, whose keys are the fields of `DvsSpec`; those left out have their defaults.
-A table `[about]` may hold `title`, `size`, `sources` and `differences`.  In a preset the comment above a key
-names the source of its value; `read_sensor` keeps it, so that `vid2ev sensors NAME` can cite it.
+The file of an event sensor has a table `[dvs]`, whose keys are the fields of `DvsSpec`, that of a frame sensor a table
+`[cis]` of `CisSpec`; keys left out have their defaults.  A table `[about]` may hold `title`, `size`, `sources` and
+`differences`.  In a preset the comment above a key names the source of its value; `read_sensor` keeps it, so that
+`vid2ev sensors NAME` can cite it.
 """
 
 from __future__ import annotations
@@ -16,12 +17,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
 
-PRESET_FILES = Path(__file__).with_name("preset_files")
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of sensor: the table of its files, their specification, where its presets are, and a setting to show."""
+
+    table: str
+    spec: type[BaseModel]
+    presets: Path
+    example: str
+
+    def names(self) -> list[str]:
+        """The names of the presets that come with vid2ev, in alphabetical order."""
+        return sorted(path.stem for path in self.presets.glob("*.toml"))
+
+
+HERE = Path(__file__).parent
+DVS = Kind("dvs", DvsSpec, HERE / "preset_files", "threshold_on=0.2")
+CIS = Kind("cis", CisSpec, HERE / "cis_files", "cis.exposure_us=500")
+KINDS = (DVS, CIS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +55,17 @@ class SensorFile:
 
 
 def preset_names() -> list[str]:
-    """The names of the presets that come with vid2ev, in alphabetical order."""
-    return sorted(path.stem for path in PRESET_FILES.glob("*.toml"))
+    """The names of the event sensors that come with vid2ev, in alphabetical order."""
+    return DVS.names()
+
+
+def cis_names() -> list[str]:
+    """The names of the frame sensors that come with vid2ev, in alphabetical order."""
+    return CIS.names()
 
 
 def load_sensor(name_or_path: str | Path, overrides: Sequence[str] = ()) -> DvsSpec:
-    """The specification of a sensor: a preset or a TOML file, changed by `key=value` texts.
+    """The specification of an event sensor: a preset or a TOML file, changed by `key=value` texts.
 
     An override names a key of `DvsSpec`, bare or with `dvs.` before it; its value is a TOML number, boolean,
     string or list, and a bare word is a string.  Later overrides win.
@@ -48,42 +73,78 @@ def load_sensor(name_or_path: str | Path, overrides: Sequence[str] = ()) -> DvsS
     Raises UsageError for an unknown preset or key and for a value that cannot be, DataError for a file that
     cannot be read as TOML.
     """
-    sensor = read_sensor(name_or_path)
+    spec = load(DVS, name_or_path, overrides)
+    assert isinstance(spec, DvsSpec)
+    return spec
+
+
+def load_cis(name_or_path: str | Path, overrides: Sequence[str] = ()) -> CisSpec:
+    """The specification of a frame sensor; as `load_sensor`, with `cis.` before a key, or bare."""
+    spec = load(CIS, name_or_path, overrides)
+    assert isinstance(spec, CisSpec)
+    return spec
+
+
+def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) -> BaseModel:
+    """The specification of a sensor of a kind; see `load_sensor`."""
+    sensor = read_sensor(name_or_path, kind)
     values = dict(sensor.values)
     for override in overrides:
-        key, value = _parse_override(override)
+        key, value = _parse_override(override, kind)
         values[key] = value
-    return _spec(values, sensor.name)
+    try:
+        return kind.spec(**values)
+    except ValidationError as error:
+        raise UsageError(_sentence(error, sensor.name, kind)) from error
 
 
-def read_sensor(name_or_path: str | Path) -> SensorFile:
+def read_sensor(name_or_path: str | Path, kind: Kind = DVS) -> SensorFile:
     """A sensor file with its comments; the values are not checked yet.  Raises as `load_sensor` does."""
-    name, path = _find(str(name_or_path))
+    name, path = _find(str(name_or_path), kind)
+    text, tables = _tables(path)
+    unknown = [key for key in tables if key not in (kind.table, "about")]
+    if unknown:
+        raise UsageError(
+            f"Sensor file {path} has '{unknown[0]}' outside its tables [{kind.table}] and [about]; "
+            f"put the sensor's keys under [{kind.table}]."
+        )
+    values, about = tables.get(kind.table), tables.get("about", {})
+    if not isinstance(values, dict) or not isinstance(about, dict):
+        raise UsageError(
+            f"Sensor file {path} has no table [{kind.table}]; put the sensor's keys under a line [{kind.table}]."
+        )
+    return SensorFile(name, about, values, _comments(text, kind))
+
+
+def kinds_of(name_or_path: str | Path) -> list[Kind]:
+    """The kinds of sensor that a name or a file stands for; where it stands for none, one in which it is not far off.
+
+    Raises DataError for a file that cannot be read as TOML.
+    """
+    name, path = str(name_or_path), Path(name_or_path)
+    known = [kind for kind in KINDS if name in kind.names()]
+    if not known and path.is_file():
+        known = [kind for kind in KINDS if kind.table in _tables(path)[1]]
+    return known or [kind for kind in KINDS if _nearest(name, kind.names())][:1] or [DVS]
+
+
+def _tables(path: Path) -> tuple[str, dict[str, Any]]:
+    """The text of a TOML file, and what is in it."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise DataError(f"Sensor file {path} cannot be read ({reason}); give a readable TOML file.") from error
     try:
-        tables = tomllib.loads(text)
+        return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"Sensor file {path} is not valid TOML: {error}; correct that line.") from error
-    unknown = [key for key in tables if key not in ("dvs", "about")]
-    if unknown:
-        raise UsageError(
-            f"Sensor file {path} has '{unknown[0]}' outside its tables [dvs] and [about]; "
-            "put the sensor's keys under [dvs]."
-        )
-    values, about = tables.get("dvs"), tables.get("about", {})
-    if not isinstance(values, dict) or not isinstance(about, dict):
-        raise UsageError(f"Sensor file {path} has no table [dvs]; put the sensor's keys under a line [dvs].")
-    return SensorFile(name, about, values, _comments(text))
 
 
-def _find(name_or_path: str) -> tuple[str, Path]:
-    names = preset_names()
+def _find(name_or_path: str, kind: Kind) -> tuple[str, Path]:
+    names = kind.names()
     if name_or_path in names:
-        return name_or_path, PRESET_FILES / f"{name_or_path}.toml"
+        return name_or_path, kind.presets / f"{name_or_path}.toml"
     path = Path(name_or_path)
     if path.is_file():
         return str(path), path
@@ -93,8 +154,8 @@ def _find(name_or_path: str) -> tuple[str, Path]:
     raise UsageError(f"Sensor '{name_or_path}' is not a preset{hint}; presets are {_list(names)}, or give a TOML file.")
 
 
-def _comments(text: str) -> dict[str, str]:
-    """The comment lines directly above each key of the table [dvs], joined to one line."""
+def _comments(text: str, kind: Kind) -> dict[str, str]:
+    """The comment lines directly above each key of the table of a kind, joined to one line."""
     found: dict[str, str] = {}
     block: list[str] = []
     table = ""
@@ -105,17 +166,17 @@ def _comments(text: str) -> dict[str, str]:
         if line.startswith("["):
             table = line
         assignment = re.match(r"([\w-]+)\s*=", line)
-        if assignment and block and table == "[dvs]":
+        if assignment and block and table == f"[{kind.table}]":
             found[assignment[1]] = " ".join(block)
         block = []
     return found
 
 
-def _parse_override(text: str) -> tuple[str, Any]:
+def _parse_override(text: str, kind: Kind) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
-    key = key.strip().removeprefix("dvs.")
+    key = key.strip().removeprefix(f"{kind.table}.")
     if not equals or not key or not value.strip():
-        raise UsageError(f"Setting '{text}' is not of the form key=value; write for example threshold_on=0.2.")
+        raise UsageError(f"Setting '{text}' is not of the form key=value; write for example {kind.example}.")
     return key, _parse_value(value.strip())
 
 
@@ -133,14 +194,7 @@ def _parse_value(text: str) -> Any:
         return text
 
 
-def _spec(values: Mapping[str, Any], name: str) -> DvsSpec:
-    try:
-        return DvsSpec(**values)
-    except ValidationError as error:
-        raise UsageError(_sentence(error, name)) from error
-
-
-def _sentence(error: ValidationError, name: str) -> str:
+def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
     """The first of pydantic's complaints as one sentence: key, value, what is possible, default."""
     complaint = error.errors()[0]
     where = f"in sensor {name}"
@@ -148,9 +202,9 @@ def _sentence(error: ValidationError, name: str) -> str:
         return f"The values {where} do not go together: {_plain(complaint['msg'])}."
     key = str(complaint["loc"][0])
     if complaint["type"] == "extra_forbidden":
-        hint = _nearest(key, DvsSpec.model_fields)
+        hint = _nearest(key, kind.spec.model_fields)
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
-    default = DvsSpec.model_fields[key].default
+    default = kind.spec.model_fields[key].default
     value = reprlib.repr(complaint["input"])
     return f"{key} = {value} {where} is impossible: {_plain(complaint['msg'])} (default {default!r})."
 

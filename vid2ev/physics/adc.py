@@ -1,0 +1,46 @@
+"""ADC: light to codes, within the range that the sensor operates in.
+
+    I16   = 65535 light exposure_gain
+    level = clip((I16 - min_illuminance) / slope, 0, top)           top = 2^bits - 1
+    code  = clip(floor(level + noise_lsb z + 1/2), 0, top)          z standard normal
+
+Noise is added after the signal is clipped, as in the paper's model, so black and white are noisy, too; the second clip
+keeps the codes within their bits.  Away from both ends the variance is noise_lsb^2 + 1/12, the second part from
+rounding.  `slope` is I16 per LSB: with fewer bits the range shrinks unless the slope grows with it.
+
+Pictures in 8 bits are codes of code / top by the curve `gamma`; black is min_illuminance, not darkness.
+
+Sources: the paper, section II.A ("minimum detectable difference and intensity slope", noise in LSB of a 10-bit ADC) and
+section IV for the numbers: 4096, 55, 5.2.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from vid2ev.kernel_compiler import compiled
+
+WHITE = 65535.0  # I16 of light 1.0
+
+
+class Adc(BaseModel, frozen=True, extra="forbid"):
+    """Parameters of the ADC."""
+
+    exposure_gain: float = Field(1.0, gt=0, le=1e9, description="how bright: aperture and time in one factor of light")
+    min_illuminance: float = Field(4096.0, ge=0, le=1e9, description="I16 of code 0; white is 65535")
+    slope: float = Field(55.0, gt=0, le=1e9, description="I16 per code")
+    noise_lsb: float = Field(5.2, ge=0, le=1e5, description="standard deviation of the noise of the ADC [LSB]")
+    bits: int = Field(10, ge=1, le=16, description="bits of a code")
+    gamma: Annotated[float, Field(ge=0.1, le=10)] | Literal["srgb"] = Field(
+        "srgb", description="curve of the pictures in 8 bits: srgb, or the exponent of a power"
+    )
+
+
+@compiled
+def code_of(i16, least, slope, top, noise):
+    """The code (as float64) of I16 with a noise [LSB]; a NaN cannot come here."""
+    level = min(max((i16 - least) / slope, 0.0), top)
+    return min(max(np.floor(level + noise + 0.5), 0.0), top)

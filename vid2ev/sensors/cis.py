@@ -1,0 +1,285 @@
+"""Cis: light in, exposures out, one frame of light at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.kernels.exposures import ReadOut, add_rows, read_rows, take_rows
+from vid2ev.kernels.layout import PIXEL_LIMIT
+from vid2ev.physics.fixed_pattern import fixed_pattern
+from vid2ev.physics.shading import shading_map
+from vid2ev.physics.shutter import interval_weights, opening_ns
+from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.tiles import Tiles
+from vid2ev.stream.exposures import Exposure
+from vid2ev.stream.frames import Frame
+
+__all__ = ["Cis", "CisSpec"]
+
+OPEN_BYTES = 1 << 32  # of the sums of all exposures that are open at a time
+NOTHING = np.empty((0, 0), np.float32)
+
+
+@dataclass(slots=True)
+class Open:
+    """An exposure that has begun: its number, when it opens [ns], the sums of its rows, and what weight the last frame
+    of light still has to be added with."""
+
+    index: int
+    start_ns: int
+    total: np.ndarray  # float64 [H, n]
+    pending: np.ndarray  # float64 [H]
+
+
+class Cis:
+    """A frame camera of `size` (width, height): feed it frames of light with `step`, get the exposures they complete.
+
+    spec      parameters of the sensor
+    seed      0 ... 2**64 - 1: fixed pattern and noise; the same seed is the same camera
+    camera    0 ... 2**24 - 1: the camera's number in a rig, so that cameras of one seed differ
+    threads   rows worked on at a time; changes nothing but the time it takes
+    linear    give each exposure its exact `light`, too, before electrons, noise and ADC
+
+    The frames of light are its samples in time; between them it is a straight line, and the exposures are its exact
+    integral, whatever the rates.  The first exposure opens with the first frame of light, the k-th k / frame_rate_hz
+    later.  Exposures depend on the earlier frames only through the state, which `state` gives and `restore` takes.
+    """
+
+    def __init__(
+        self,
+        spec: CisSpec,
+        size: tuple[int, int],
+        seed: int = 0,
+        *,
+        camera: int = 0,
+        threads: int = 1,
+        linear: bool = False,
+    ):
+        width, height = size
+        if width < 1 or height < 1 or width * height > PIXEL_LIMIT or max(width, height) > 65535:
+            raise UsageError(
+                f"size {width}x{height}: expected 1x1 to {PIXEL_LIMIT} pixels in all; scale the frames down"
+            )
+        if not 0 <= seed < 1 << 64 or not 0 <= camera < 1 << 24:
+            raise UsageError(f"seed {seed}, camera {camera}: expected 0 to 2**64 - 1 and 0 to 2**24 - 1")
+        if threads < 1:
+            raise UsageError(f"threads {threads}: expected at least 1; leave it out for one")
+        self.spec, self.size, self.seed, self.camera, self.linear = spec, (width, height), seed, camera, linear
+        self.effects = spec.effects()
+        self._rows = (height, width * (3 if spec.colour else 1))
+        if spec.in_flight(height) * self._rows[0] * self._rows[1] * 8 > OPEN_BYTES:
+            raise UsageError(
+                f"{spec.in_flight(height)} exposures of {width}x{height} pixels open at a time: expected to hold them"
+                " in 4 GiB; shorten exposure_us or line_us, or lower frame_rate_hz"
+            )
+        self._row_ns = np.arange(height) * (1e3 * spec.line_us)
+        self._tiles = Tiles(height, threads)
+        self._numbers = _numbers_of(spec, seed, camera)
+        self._shade, self._gain, self._dark = self._frozen()
+        self._t_ns: int | None = None
+        self._first_ns = self._next = self._unfinished = self._mended = 0
+        self._before, self._after = np.empty(self._rows, np.float32), np.empty(self._rows, np.float32)
+        self._open: list[Open] = []
+        self._spare: list[np.ndarray] = []  # sums that are free again
+
+    # ------------------------------------------------------------------------------------------------- light in
+
+    def step(self, light: np.ndarray, t_ns: int, *, cut: bool = False) -> list[Exposure]:
+        """Advance to a frame of light at t_ns [int, ns]; returns the exposures whose last row closes in (previous
+        frame, this frame], in order.
+
+        `light` is linear, floating point, [height, width, 3] (red, green, blue), or [height, width] if the spec's
+        `colour` is false; NaN and negative count as 0, what is above 1e30 as 1e30.  With `cut` the light steps to it at
+        t_ns instead of ramping.  Raises UsageError for another shape or type, or a time that is not after the last one.
+        """
+        return list(self._advance(light, t_ns, cut))
+
+    def see(self, frame: Frame) -> list[Exposure]:
+        """`step` to a frame, with a step of the light where it begins a new shot."""
+        return list(self._advance(self._seen(frame), frame.t_ns, frame.cut))
+
+    def run(self, frames: Iterable[Frame]) -> Iterator[Exposure]:
+        """`see` for each frame and `flush` at the end, an exposure at a time, however many there are between frames."""
+        for frame in frames:
+            yield from self._advance(self._seen(frame), frame.t_ns, frame.cut)
+        self.flush()
+
+    def flush(self) -> list[Exposure]:
+        """End the light: exposures that it did not last for are dropped and counted (`unfinished`); returns none."""
+        assert self._t_ns is not None or not self._open
+        begun = [each for each in self._open if each.start_ns < (self._t_ns or 0) or self.spec.exposure_us == 0]
+        self._unfinished += len(begun)
+        self._open.clear()
+        return []
+
+    # ------------------------------------------------------------------------------------------------- state
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that later exposures depend on, as plain arrays (copies); needs at least one frame."""
+        if self._t_ns is None:
+            return {}
+        clock = [self._t_ns, self._first_ns, self._next, self._unfinished, self._mended]
+        return {
+            "clock": np.array(clock, np.int64),
+            "light": self._before.copy(),
+            "open": np.array([(each.index, each.start_ns) for each in self._open], np.int64).reshape(-1, 2),
+            "totals": np.array([each.total for each in self._open]).reshape(-1, *self._rows),
+            "pending": np.array([each.pending for each in self._open]).reshape(-1, self._rows[0]),
+        }
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
+        self._open.clear()
+        if not state:
+            self._t_ns, self._first_ns, self._next, self._unfinished, self._mended = None, 0, 0, 0, 0
+            return
+        if state["light"].shape != self._rows:
+            raise UsageError(f"state of {state['light'].shape} values, expected {self._rows}: another sensor's state")
+        self._t_ns, self._first_ns, self._next, self._unfinished, self._mended = (int(n) for n in state["clock"])
+        self._before[...] = state["light"]
+        self._open += [
+            Open(int(index), int(start_ns), total.copy(), pending.copy())
+            for (index, start_ns), total, pending in zip(state["open"], state["totals"], state["pending"], strict=True)
+        ]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Exposures made (`frames`), those that the light did not last for (`unfinished`, after `flush`), and values
+        `not_finite` (or above 1e30, or negative where colours cannot be) that were mended."""
+        made = self._next - len(self._open) - self._unfinished
+        return {"frames": made, "unfinished": self._unfinished, "not_finite": self._mended}
+
+    def maps(self) -> dict[str, np.ndarray]:
+        """What is frozen in this sensor, float32, each of the shape of a picture: `gain` (relative sensitivity), `dark`
+        (dark signal [electrons]), and shading (optical gain)."""
+        planes = {"gain": (self._gain, 1.0), "dark": (self._dark, 0.0), "shading": (self._shade, 1.0)}
+        return {
+            name: self._shaped(plane.copy() if plane.size else np.full(self._rows, neutral, np.float32))
+            for name, (plane, neutral) in planes.items()
+        }
+
+    # ------------------------------------------------------------------------------------------------- inside
+
+    def _advance(self, light: np.ndarray, t_ns: int, cut: bool) -> Iterator[Exposure]:
+        """The exposures that a frame completes; all of them are to be taken before the next frame comes."""
+        rows, t_ns = self._light(light), self._later(t_ns)
+        self._take(rows)
+        if self._t_ns is None:  # the first frame: as if its light had been there for a moment
+            self._first_ns, self._t_ns, cut = t_ns, t_ns - 1, False
+            self._before[...] = self._after
+        since_ns, begun = self._t_ns, self._open
+        self._t_ns, self._open = t_ns, []
+        for each in begun:
+            yield from self._expose(each, since_ns, cut)
+        while (start_ns := self._first_ns + opening_ns(self._next, self.spec.frame_rate_hz)) <= t_ns:
+            self._next += 1
+            yield from self._expose(self._opened(self._next - 1, start_ns), since_ns, cut)
+        self._before, self._after = self._after, self._before
+
+    def _expose(self, each: Open, since_ns: int, cut: bool) -> Iterator[Exposure]:
+        """Give an exposure the light from `since_ns` until now; it comes out if its last row closes."""
+        assert self._t_ns is not None
+        row_ns = self._row_ns + (each.start_ns - since_ns)
+        before, after, closed = interval_weights(row_ns, 1e3 * self.spec.exposure_us, self._t_ns - since_ns, cut)
+        before += each.pending  # (a frame's two sides are added at once, when the next frame is there)
+        each.pending, after = np.where(closed, 0.0, after), np.where(closed, after, 0.0)
+        if before.any() or after.any():
+            self._each_rows(
+                lambda a, b: add_rows(each.total[a:b], self._before[a:b], before[a:b], self._after[a:b], after[a:b])
+            )
+        if closed[-1]:
+            yield self._read(each)
+        else:
+            self._open.append(each)
+
+    def _read(self, each: Open) -> Exposure:
+        """Read out an exposure; its sums are free for another one."""
+        codes = np.empty(self._rows, np.uint16)
+        light = np.empty(self._rows if self.linear else (0, 0), np.float32)
+
+        def read(a: int, b: int) -> None:
+            planes = [plane[a:b] for plane in (self._shade, self._gain, self._dark)]
+            first = a * self._rows[1]
+            read_rows(each.total[a:b], *planes, first, each.index, self._numbers, codes[a:b], light[a:b])
+
+        self._each_rows(read)
+        self._spare.append(each.total)
+        end_ns = each.start_ns + round(self._row_ns[-1] + 1e3 * self.spec.exposure_us)
+        made = self._shaped(light) if self.linear else None
+        return Exposure(self._shaped(codes), each.start_ns, end_ns, each.index, made)
+
+    def _opened(self, index: int, start_ns: int) -> Open:
+        total = self._spare.pop() if self._spare else np.empty(self._rows, np.float64)
+        total.fill(0.0)
+        return Open(index, start_ns, total, np.zeros(self._rows[0]))
+
+    def _each_rows(self, work) -> list:  # type: ignore[no-untyped-def]
+        return self._tiles.each_blocks(lambda _, first, last: work(first, last))
+
+    def _take(self, rows: np.ndarray) -> None:
+        signed = self.spec.colour
+        self._mended += sum(self._each_rows(lambda a, b: take_rows(rows[a:b], self._after[a:b], signed)))
+
+    def _seen(self, frame: Frame) -> np.ndarray:
+        return frame.light if self.spec.colour else frame.luminance
+
+    def _light(self, light: np.ndarray) -> np.ndarray:
+        """Light as rows [H, n]."""
+        light = np.asarray(light)
+        width, height = self.size
+        expected = (height, width, 3) if self.spec.colour else (height, width)
+        if light.shape != expected:
+            remedy = "open the source with colour='rgb', or set cis.colour=false" if light.ndim == 2 else "resize it"
+            raise UsageError(f"light of shape {light.shape}: expected {expected} of this sensor; {remedy}")
+        if light.dtype.kind != "f":
+            raise UsageError(f"light of type {light.dtype}: expected floating point, linear; decode the codes first")
+        wanted = None if light.dtype in (np.float32, np.float64) else np.float32
+        return np.ascontiguousarray(light, wanted).reshape(self._rows)
+
+    def _later(self, t_ns: int) -> int:
+        """The time of a frame, which must be after the last one."""
+        t_ns = int(t_ns)
+        if self._t_ns is not None and t_ns <= self._t_ns:
+            raise UsageError(
+                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames and drop repeated"
+                " times"
+            )
+        return t_ns
+
+    def _shaped(self, rows: np.ndarray) -> np.ndarray:
+        return rows.reshape(self._rows[0], self.size[0], 3) if self.spec.colour else rows
+
+    def _frozen(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Shading, sensitivity and dark signal, as rows; empty where they change nothing."""
+        spec, shade, gain, dark = self.spec, NOTHING, NOTHING, NOTHING
+        if spec.shading:
+            shade = np.repeat(shading_map(spec.shading, *self.size), 3 if spec.colour else 1, axis=1)
+        if spec.prnu > 0 or spec.dsnu > 0:
+            n = self._rows[0] * self._rows[1]
+            gain, dark = fixed_pattern(n, self._numbers.seed, self.camera, spec.prnu, spec.dsnu)
+        return shade, gain.reshape(-1, self._rows[1]), dark.reshape(-1, self._rows[1])
+
+
+def _numbers_of(spec: CisSpec, seed: int, camera: int) -> ReadOut:
+    """What readout needs of a specification."""
+    effects = set(spec.effects())
+    return ReadOut(
+        seed=np.uint64(seed),
+        camera=camera,
+        exposure_gain=spec.exposure_gain,
+        random=bool({"shot_noise", "read_noise", "noise"} & effects),
+        electrons=bool({"fixed_pattern", "shot_noise", "full_well", "read_noise"} & effects),
+        white_e=spec.white_e,
+        shot_noise=spec.shot_noise,
+        full_well_e=spec.full_well_e or math.inf,
+        read_noise_e=spec.read_noise_e,
+        least=spec.min_illuminance,
+        slope=spec.slope,
+        top=float(spec.top),
+        noise_lsb=spec.noise_lsb,
+    )

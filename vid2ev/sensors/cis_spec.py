@@ -1,0 +1,72 @@
+"""The specification of a frame camera: the parameters of every effect, in one flat, frozen, validated record."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from vid2ev.light.transfer import parse_transfer
+from vid2ev.physics.adc import Adc
+from vid2ev.physics.electrons import Electrons
+from vid2ev.physics.fixed_pattern import FixedPattern
+from vid2ev.physics.shading import Shading
+from vid2ev.physics.shutter import Shutter
+
+NOISELESS = {"noise_lsb": 0.0, "shot_noise": False, "read_noise_e": 0.0, "prnu": 0.0, "dsnu": 0.0}
+INSTANT = {"exposure_us": 0.0, "line_us": 0.0}
+
+
+class CisSpec(  # the order of the bases, last to first, is the order of the fields: the path of light
+    Adc, Electrons, FixedPattern, Shading, Shutter, frozen=True, extra="forbid"
+):
+    """Parameters of a frame camera; the defaults are the paper's (section IV), where it gives a number.
+
+    Raises `pydantic.ValidationError` for an unknown key or a value outside its limits; `vid2ev.load_cis` turns
+    that into one sentence.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="constants")
+
+    colour: bool = Field(True, description="true: red, green and blue in each pixel; false: luminance")
+
+    @property
+    def top(self) -> int:
+        """The highest code."""
+        return (1 << self.bits) - 1
+
+    def window_us(self, height: int) -> float:
+        """From the opening of the first of `height` rows to the closing of the last [us]."""
+        return (height - 1) * self.line_us + self.exposure_us
+
+    def in_flight(self, height: int) -> int:
+        """How many exposures of `height` rows are open at a time, at most."""
+        return 1 + math.floor(self.window_us(height) * 1e-6 * self.frame_rate_hz)
+
+    def noiseless(self) -> CisSpec:
+        """The same camera without noise and fixed pattern."""
+        return self.model_copy(update=NOISELESS)
+
+    def sampling(self, frame_rate_hz: float) -> CisSpec:
+        """The same camera without noise, all rows of which see an instant, at a rate: what a network is to rebuild."""
+        return CisSpec(**(self.model_dump() | NOISELESS | INSTANT | {"frame_rate_hz": frame_rate_hz}))
+
+    def picture_codes(self) -> np.ndarray:
+        """The code of 8 bits [uint8, 2**bits] of each code, by `gamma`."""
+        curve = parse_transfer("srgb" if self.gamma == "srgb" else f"gamma:{self.gamma}")
+        return np.rint(255 * curve.to_signal(np.arange(self.top + 1) / self.top)).astype(np.uint8)
+
+    def effects(self) -> list[str]:
+        """Names of the effects that these parameters switch on, in the order of the path of light."""
+        on = {
+            "exposure": self.exposure_us > 0,
+            "rolling_shutter": self.line_us > 0,
+            "shading": bool(self.shading),
+            "fixed_pattern": self.prnu > 0 or self.dsnu > 0,
+            "shot_noise": self.shot_noise,
+            "full_well": self.full_well_e > 0,
+            "read_noise": self.read_noise_e > 0,
+            "noise": self.noise_lsb > 0,
+        }
+        return [name for name, used in on.items() if used]
