@@ -82,7 +82,7 @@ class Cis:
         self._numbers = _numbers_of(spec, seed, camera)
         self._shade, self._gain, self._dark = self._frozen()
         self._t_ns: int | None = None
-        self._first_ns = self._next = self._unfinished = self._mended = 0
+        self._first_ns = self._next = self._made = self._unfinished = self._mended = 0
         self._before, self._after = np.empty(self._rows, np.float32), np.empty(self._rows, np.float32)
         self._open: list[Open] = []
         self._spare: list[np.ndarray] = []  # sums that are free again
@@ -123,9 +123,10 @@ class Cis:
         """Everything that later exposures depend on, as plain arrays (copies); needs at least one frame."""
         if self._t_ns is None:
             return {}
-        clock = [self._t_ns, self._first_ns, self._next, self._unfinished, self._mended]
+        clock = [self._t_ns, self._first_ns, self._next]
         return {
             "clock": np.array(clock, np.int64),
+            "counts": np.array(list(self.counts.values()), np.int64),
             "light": self._before.copy(),
             "open": np.array([(each.index, each.start_ns) for each in self._open], np.int64).reshape(-1, 2),
             "totals": np.array([each.total for each in self._open]).reshape(-1, *self._rows),
@@ -136,11 +137,13 @@ class Cis:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
         self._open.clear()
         if not state:
-            self._t_ns, self._first_ns, self._next, self._unfinished, self._mended = None, 0, 0, 0, 0
+            self._t_ns, self._first_ns, self._next = None, 0, 0
+            self._made = self._unfinished = self._mended = 0
             return
         if state["light"].shape != self._rows:
             raise UsageError(f"state of {state['light'].shape} values, expected {self._rows}: another sensor's state")
-        self._t_ns, self._first_ns, self._next, self._unfinished, self._mended = (int(n) for n in state["clock"])
+        self._t_ns, self._first_ns, self._next = (int(n) for n in state["clock"])
+        self._made, self._unfinished, self._mended = (int(n) for n in state["counts"])
         self._before[...] = state["light"]
         self._open += [
             Open(int(index), int(start_ns), total.copy(), pending.copy())
@@ -151,8 +154,7 @@ class Cis:
     def counts(self) -> dict[str, int]:
         """Exposures made (`frames`), those that the light did not last for (`unfinished`, after `flush`), and values
         `not_finite` (or above 1e30, or negative where colours cannot be) that were mended."""
-        made = self._next - len(self._open) - self._unfinished
-        return {"frames": made, "unfinished": self._unfinished, "not_finite": self._mended}
+        return {"frames": self._made, "unfinished": self._unfinished, "not_finite": self._mended}
 
     def maps(self) -> dict[str, np.ndarray]:
         """What is frozen in this sensor, float32, each of the shape of a picture: `gain` (relative sensitivity), `dark`
@@ -209,6 +211,7 @@ class Cis:
 
         self._each_rows(read)
         self._spare.append(each.total)
+        self._made += 1
         end_ns = each.start_ns + round(self._row_ns[-1] + 1e3 * self.spec.exposure_us)
         made = self._shaped(light) if self.linear else None
         return Exposure(self._shaped(codes), each.start_ns, end_ns, each.index, made)

@@ -5,9 +5,10 @@ once, to the nearest nanosecond, by integer arithmetic, so that frame 10**6 of a
 frame 1.
 
 `timestamps.txt` holds one line per frame; the last column counts, blank lines and lines that begin with `#` do not.
-The unit is
+Below a line `# start_us end_us` (or s, ms, ns) they are the instants at which a frame sensor's shutter opens and
+closes, and the first column counts.  The unit is
 
-* what a line `# unit: s` (or ms, us, ns), or just `# us`, says; without such a line
+* what a line `# unit: s` (or ms, us, ns), or just `# us`, or `# start_us end_us` says; without such a line
 * seconds, if any of the numbers has a decimal point or an exponent;
 * for whole numbers, by their median spacing: milliseconds below 100 (100 us would be 10 000 fps), nanoseconds from
   1 000 000 (1 s would be 1 fps), and microseconds between.
@@ -28,6 +29,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
@@ -108,26 +110,27 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
 
 def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
-    unit, words = None, []
+    unit, column, words = None, -1, []
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read as text ({error}); expected one time per line") from error
     for number, line in enumerate(lines, 1):
         if line.lstrip().startswith("#"):
-            said = re.match(r"\s*#\s*unit\s*[:=]\s*(\w+)\s*$|\s*#\s*(s|ms|us|ns)\s*$", line)
-            stated = said and (said[1] or said[2])
+            said = re.match(UNIT_LINE, line)
+            stated = said and (said[1] or said[2] or said[3])
             if stated and stated not in NS_PER_UNIT:
                 raise DataError(f"{path}, line {number}: unit '{stated}', expected s, ms, us or ns")
-            unit = stated or unit
+            unit, column = stated or unit, 0 if said and said[3] else column
         elif line.strip():
-            words.append(line.replace(",", " ").split()[-1])
+            words.append(line.replace(",", " ").split()[column])
     values = []
     for word in words:
         try:
             values.append(Fraction(word))
         except (ValueError, ZeroDivisionError) as error:
-            raise DataError(f"{path}: '{word}' is no time; expected one in the last column of every line") from error
+            place = "last" if column else "first"
+            raise DataError(f"{path}: '{word}' is no time; expected one in the {place} column of every line") from error
     if unit is not None:
         return _in_seconds(values, unit, path), unit
     whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)

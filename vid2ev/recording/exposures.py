@@ -1,0 +1,159 @@
+"""Pictures of a frame sensor as files.
+
+    raw     raw/000000.png ...       codes of the ADC as they are, in PNG of 16 bits, gray or colour
+    png     frames/000000.png ...    8 bits, by the curve of the sensor's `gamma`
+    mp4     frames.mp4               a film of these at the sensor's rate; made at the end of what is on the disk
+
+Each of the two folders has a `timestamps.txt`, by which it can be opened as a source again:
+
+    # start_us end_us
+    0 5000
+    33333 38333
+
+when the first row of each picture opens and the last closes, in whole microseconds on the clock of the source.
+
+Colour in 16 bits is read as it is by OpenCV and FFmpeg; Pillow, and what reads with it, makes 8 bits of it.
+
+An exposure's files depend on nothing but the exposure.  So an interrupted recording goes on to the same bytes: `keep`
+as many as its last checkpoint knows of, and add the others again.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import sync, whole_file
+from vid2ev.stream.exposures import Exposure
+
+KINDS = {"raw": "raw", "png": "frames", "mp4": "frames.mp4"}  # and what they are called
+TIMESTAMPS, HEADER = "timestamps.txt", "# start_us end_us\n"
+LEVEL = 1  # of Deflate: half the time of OpenCV's own 3, and 4 % more bytes where there is noise
+
+
+class ExposureFiles:
+    """Files of the exposures of one sensor, which grow in `folder`: `keep` what is there of an interrupted run, `add`
+    each exposure, `sync` before a checkpoint, and `finish` at the end.
+
+    kinds     some of "raw", "png" and "mp4"
+    picture   the code of 8 bits [uint8] of each code (`CisSpec.picture_codes`)
+    rate_hz   of the film
+    count     how many exposures there are
+    Raises UsageError for another kind; what the disk cannot take is an OSError.
+    """
+
+    def __init__(self, folder: Path, kinds: Sequence[str], picture: np.ndarray, rate_hz: float):
+        unknown = [kind for kind in kinds if kind not in KINDS]
+        if unknown or not kinds:
+            raise UsageError(f"pictures as {list(kinds)}: expected some of {', '.join(KINDS)}")
+        self.kinds, self.picture, self.rate = tuple(dict.fromkeys(kinds)), picture, Fraction(str(rate_hz))
+        kept = [kind for kind in ("raw", "png") if kind in kinds] or ["raw"]  # (a film is made of either)
+        self._folders = {kind: folder / KINDS[kind] for kind in kept}
+        self._unsynced: list[Path] = []
+        self.count = -1
+
+    def keep(self, count: int) -> None:
+        """Begin with the first `count` exposures that are there; what there is of others is removed.
+
+        Raises DataError if there are fewer."""
+        for folder in self._folders.values():
+            folder.mkdir(parents=True, exist_ok=True)
+            times = folder / TIMESTAMPS
+            lines = times.read_text(encoding="utf-8").splitlines(keepends=True)[1:] if times.exists() else []
+            there = [path for path in folder.glob("*.png") if path.stem.isdecimal() and int(path.stem) < count]
+            if min(len(lines), len(there)) < count:
+                raise DataError(f"{folder} holds {len(there)} pictures, expected {count}; start again with --overwrite")
+            with whole_file(times) as file:
+                file.write("".join([HEADER, *lines[:count]]).encode())
+            for path in {*folder.iterdir()} - {*there, times}:
+                path.unlink()
+        self.count = count
+
+    def add(self, exposure: Exposure) -> None:
+        """Write the next exposure."""
+        if self.count < 0:
+            self.keep(0)
+        for kind, folder in self._folders.items():
+            path = folder / f"{self.count:06d}.png"
+            write_codes(path, exposure.codes if kind == "raw" else self.picture[exposure.codes])
+            with open(folder / TIMESTAMPS, "a", encoding="utf-8", newline="") as times:
+                times.write(f"{exposure.start_ns // 1000} {exposure.end_ns // 1000}\n")
+            self._unsynced.append(path)
+        self.count += 1
+
+    def sync(self) -> None:
+        """Wait until all that was written is on the disk."""
+        for path in self._unsynced:
+            sync(path)
+        for folder in self._folders.values() if self.count >= 0 else ():
+            sync(folder / TIMESTAMPS)
+            sync(folder)
+        self._unsynced = []
+
+    def finish(self, into: Path) -> list[str]:
+        """Put what was asked for into the folder `into`, too, and make the film there; returns the names.
+
+        It replaces what it finds there of an earlier attempt.  Of no exposures there is no film.
+        """
+        if self.count < 0:
+            self.keep(0)
+        self.sync()
+        for kind in self._folders.keys() & set(self.kinds):
+            copy_of = into / KINDS[kind]
+            shutil.rmtree(copy_of, ignore_errors=True)
+            shutil.copytree(self._folders[kind], copy_of, copy_function=_linked)
+        if "mp4" in self.kinds and self.count:
+            _write_film(into / KINDS["mp4"], self._pictures(), self.rate)
+        return [KINDS[kind] for kind in self.kinds if kind != "mp4" or self.count]
+
+    def _pictures(self) -> Iterator[np.ndarray]:
+        """The pictures in 8 bits, red, green, blue, from the disk."""
+        kind, folder = list(self._folders.items())[-1]
+        for number in range(self.count):
+            codes = read_codes(folder / f"{number:06d}.png")
+            picture = self.picture[codes] if kind == "raw" else codes
+            yield picture if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
+
+
+def write_codes(path: Path, codes: np.ndarray) -> None:
+    """A PNG of codes, uint8 or uint16, [H, W] or red, green, blue [H, W, 3]; the same codes give the same bytes."""
+    import cv2
+
+    pixels = codes if codes.ndim == 2 else np.ascontiguousarray(codes[..., ::-1])
+    path.write_bytes(cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, LEVEL])[1].tobytes())
+
+
+def read_codes(path: Path) -> np.ndarray:
+    """The codes of a PNG that `write_codes` wrote.  Raises DataError."""
+    import cv2
+
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise DataError(f"{path}: not a picture that can be read, expected one written here; start again")
+    return pixels if pixels.ndim == 2 else pixels[..., ::-1]
+
+
+def _write_film(path: Path, pictures: Iterator[np.ndarray], rate: Fraction) -> None:
+    from vid2ev.pictures.film import Film
+
+    first = next(pictures)
+    height, width = first.shape[:2]
+    margin = (0, height % 2), (0, width % 2), (0, 0)  # 4:2:0 needs even sides
+    with Film(path, (width + width % 2, height + height % 2), rate) as film:
+        for picture in chain([first], pictures):
+            film.add(np.pad(picture, margin, mode="edge"))
+
+
+def _linked(source: str, target: str) -> None:
+    """The same file under a second name, or where there are no such names a copy."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
