@@ -5,6 +5,12 @@ option.  `DataError` (exit code 1) is a file, a disk or a recording that does no
 The command line prints the sentence without a traceback; in Python both are ordinary exceptions.
 """
 
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
 
 class Vid2evError(Exception):
     """Base of every error that vid2ev raises on purpose."""
@@ -22,3 +28,16 @@ class DataError(Vid2evError, OSError):
     """A source or a disk that does not hold what was expected; exit code 1."""
 
     exit_code = 1
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """A hint at the one of the words that may have been meant, to go on a sentence with; empty if none is near."""
+    close = difflib.get_close_matches(word, list(words), n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def clause(message: str) -> str:
+    """What pydantic says of a value, as a clause within a sentence."""
+    message = message.removeprefix("Value error, ").rstrip(".")
+    message = re.sub(r", (unable|got) .*", "", message)
+    return re.sub(r"^Input should be", "it must be", message).replace("a valid tuple", "a list")

@@ -21,7 +21,7 @@ def test_poses_compose_and_invert(turn, way, other_turn, other_way, point):  # t
     np.testing.assert_allclose(a.inverse().apply(a.apply(np.array(point))), point, atol=1e-9)
 
 
-@pytest.mark.parametrize("angle", [0, 1e-9, 1e-5, 0.1, 1, 3, np.pi - 1e-9, np.pi - 1e-5, np.pi])
+@pytest.mark.parametrize("angle", [0, 1e-200, 1e-12, 1e-9, 1e-7, 1e-5, 0.1, 1, 3, np.pi - 1e-9, np.pi - 1e-5, np.pi])
 def test_turns_are_those_of_opencv(angle: float) -> None:
     for seed in range(20):
         axis = np.random.default_rng(seed).normal(size=3)
@@ -29,6 +29,8 @@ def test_turns_are_those_of_opencv(angle: float) -> None:
         turn = rotation_of(vector)
         np.testing.assert_allclose(turn, cv2.Rodrigues(vector)[0], atol=1e-12)
         np.testing.assert_allclose(rotation_of(np.radians(rotation_vector_deg(turn))), turn, atol=1e-9)
+        if angle < 3:
+            np.testing.assert_allclose(np.radians(rotation_vector_deg(turn)), vector, rtol=1e-9, atol=1e-15)
 
 
 def test_half_of_a_way_is_half_of_the_turn_and_half_of_the_line() -> None:

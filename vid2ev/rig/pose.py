@@ -69,7 +69,7 @@ def angle_axis(rotation: np.ndarray) -> tuple[float, np.ndarray]:
         [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
     )
     angle = math.atan2(float(np.linalg.norm(turned)), float(np.trace(rotation)) - 1)
-    if np.linalg.norm(turned) > 1e-6:
+    if np.linalg.norm(turned) > (1e-6 if angle > 1 else 1e-200):
         return angle, turned / np.linalg.norm(turned)
     # (no turn, or nearly half of one: R + R' = 2 cos + 2 (1 - cos) a a' has the axis as its largest column)
     columns = rotation + rotation.T + (1 - np.trace(rotation)) * np.eye(3)

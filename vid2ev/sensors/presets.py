@@ -8,18 +8,17 @@ The file of an event sensor has a table `[dvs]`, whose keys are the fields of `D
 
 from __future__ import annotations
 
-import difflib
 import re
 import reprlib
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
 
@@ -125,7 +124,7 @@ def kinds_of(name_or_path: str | Path) -> list[Kind]:
     known = [kind for kind in KINDS if name in kind.names()]
     if not known and path.is_file():
         known = [kind for kind in KINDS if kind.table in _tables(path)[1]]
-    return known or [kind for kind in KINDS if _nearest(name, kind.names())][:1] or [DVS]
+    return known or [kind for kind in KINDS if nearest(name, kind.names())][:1] or [DVS]
 
 
 def _tables(path: Path) -> tuple[str, dict[str, Any]]:
@@ -150,7 +149,7 @@ def _find(name_or_path: str, kind: Kind) -> tuple[str, Path]:
         return str(path), path
     if path.suffix == ".toml" or len(path.parts) > 1:
         raise UsageError(f"Sensor file {path} does not exist; give an existing TOML file or one of {_list(names)}.")
-    hint = _nearest(name_or_path, names)
+    hint = nearest(name_or_path, names)
     raise UsageError(f"Sensor '{name_or_path}' is not a preset{hint}; presets are {_list(names)}, or give a TOML file.")
 
 
@@ -199,26 +198,14 @@ def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
     complaint = error.errors()[0]
     where = f"in sensor {name}"
     if not complaint["loc"]:
-        return f"The values {where} do not go together: {_plain(complaint['msg'])}."
+        return f"The values {where} do not go together: {clause(complaint['msg'])}."
     key = str(complaint["loc"][0])
     if complaint["type"] == "extra_forbidden":
-        hint = _nearest(key, kind.spec.model_fields)
+        hint = nearest(key, kind.spec.model_fields)
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
     default = kind.spec.model_fields[key].default
     value = reprlib.repr(complaint["input"])
-    return f"{key} = {value} {where} is impossible: {_plain(complaint['msg'])} (default {default!r})."
-
-
-def _plain(message: str) -> str:
-    """Pydantic's message as a clause within a sentence."""
-    message = message.removeprefix("Value error, ").rstrip(".")
-    message = re.sub(r", (unable|got) .*", "", message)
-    return re.sub(r"^Input should be", "it must be", message).replace("a valid tuple", "a list")
-
-
-def _nearest(word: str, words: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word, list(words), n=1)
-    return f" (did you mean {close[0]}?)" if close else ""
+    return f"{key} = {value} {where} is impossible: {clause(complaint['msg'])} (default {default!r})."
 
 
 def _list(names: Sequence[str]) -> str:

@@ -1,0 +1,142 @@
+"""Cameras as calibration files have them: lenses, and rigid motions from the first camera to each.
+
+    X_camera = R X_first + t
+
+That is how OpenCV, Kalibr, DSEC and dv-processing all write it, one camera after another or all from the first.  In a
+rig the first camera then stands at the origin, and the others where the inverse puts them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import ValidationError
+
+from vid2ev.errors import DataError, UsageError, clause
+from vid2ev.rig.calibration.node import Node
+from vid2ev.rig.camera import Camera, Rig, Viewpoint
+from vid2ev.rig.intrinsics import DistortionModel, Intrinsics
+from vid2ev.rig.pose import Pose, rotation_vector_deg
+
+Kind = Literal["dvs", "cis"]
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A camera of a calibration file; `from_first` takes points of the first camera to this one's coordinates [m]."""
+
+    name: str
+    intrinsics: Intrinsics
+    from_first: Pose
+    kind: Kind = "dvs"
+    clock_offset_us: int = 0
+
+
+@dataclass(frozen=True)
+class CalibrationFormat:
+    """A kind of calibration file.
+
+    name        of `--as`
+    title       what it is, in a line
+    recognises  whether a file is of this kind
+    read        its cameras, the first one first; raises DataError
+    write       the text of a file with these cameras; raises UsageError for a lens that it cannot hold
+    keeps       what it holds beside lenses and poses: of "names", "kinds", "clocks"
+    says_unit   whether a file says in which unit its translations are; if not, they are taken as metres
+    """
+
+    name: str
+    title: str
+    recognises: Callable[[Node], bool]
+    read: Callable[[Node], list[Calibrated]]
+    write: Callable[[Sequence[Viewpoint]], str]
+    keeps: frozenset[str] = frozenset()
+    says_unit: Callable[[Node], bool] = lambda tree: True
+
+
+def intrinsics_at(
+    place: Node, size: tuple[int, int], four: Sequence[float], model: DistortionModel, distortion: Sequence[float]
+) -> Intrinsics:
+    """The intrinsics of fx, fy, cx, cy and coefficients that stand at a place.  Raises DataError."""
+    fx, fy, cx, cy = four
+    try:
+        return Intrinsics(size=size, focal_px=(fx, fy), centre_px=(cx, cy), model=model, distortion=tuple(distortion))
+    except ValidationError as error:
+        why = clause(error.errors()[0]["msg"])
+        raise DataError(f"{place.file}: {place.place or 'the camera'}: {why}; correct that value") from error
+
+
+def model_named(place: Node, models: dict[str, DistortionModel]) -> DistortionModel:
+    """The distortion model that is named at a place.  Raises DataError for one that is not known."""
+    name = place.text()
+    if name not in models:
+        known = ", ".join(repr(known) for known in models if known)
+        raise DataError(f"{place.file}: {place.place} is '{name}'; vid2ev knows {known}")
+    return models[name]
+
+
+def rig_of(cameras: Sequence[Calibrated]) -> Rig:
+    """A rig of the cameras, with the first at its origin, and names that folders can have."""
+    made: list[Camera] = []
+    for camera in cameras:
+        lens, pose = camera.intrinsics, camera.from_first.inverse()
+        made.append(
+            Camera(
+                name=_free_name(camera.name, camera.kind, {other.name.casefold() for other in made}),
+                kind=camera.kind,
+                size=lens.size,
+                focal_px=lens.focal_px,
+                centre_px=lens.centre_px,
+                distortion_model=lens.model,
+                distortion=lens.distortion,
+                rotation_deg=tuple(rotation_vector_deg(pose.rotation).tolist()),
+                translation_mm=tuple((pose.translation_m * 1000).tolist()),
+                clock_offset_us=camera.clock_offset_us,
+            )
+        )
+    return Rig(cameras=tuple(made))
+
+
+def from_first(views: Sequence[Viewpoint]) -> list[Pose]:
+    """The rigid motions from the first camera's coordinates to those of each."""
+    return [_exact_if_same(views[0], view) for view in views]
+
+
+def radtan_of(view: Viewpoint, counts: Sequence[int], format_name: str) -> tuple[float, ...]:
+    """The coefficients of a camera's distortion, as many as a format can hold of them.  Raises UsageError."""
+    held = view.intrinsics.distortion
+    for count in counts:
+        if len(held) <= count:
+            return (*held, *(0.0,) * (count - len(held)))
+    if any(held[counts[-1] :]):
+        raise UsageError(
+            f"{format_name} holds {counts[-1]} coefficients of distortion, and camera {view.camera.name} has"
+            f" {len(held)}; choose --as opencv"
+        )
+    return held[: counts[-1]]
+
+
+def _exact_if_same(first: Viewpoint, view: Viewpoint) -> Pose:
+    if view is first:
+        return Pose.of()
+    return view.pose.inverse() @ first.pose
+
+
+def _free_name(text: str, kind: Kind, taken: set[str]) -> str:
+    """A name for a folder, as near to a text as can be, that no other camera has."""
+    base = re.sub(r"[^\w-]+", "_", text).strip("_-")[:48] or kind
+    for name in (text, base, *(f"{base}_{number}" for number in range(2, len(taken) + 4))):
+        if name.casefold() not in taken and _can_be(name, kind):
+            return name
+    return _free_name(f"camera_{base}", kind, taken)
+
+
+def _can_be(name: str, kind: Kind) -> bool:
+    try:
+        Camera(name=name, kind=kind)
+    except ValidationError:
+        return False
+    return True

@@ -1,0 +1,178 @@
+"""rig.toml: the cameras of a rig, as a person writes them.
+
+    [source]                    the camera that took the video; may be left out
+    fov_deg = 60
+
+    [[camera]]                  once for each camera; the keys are the fields of `Camera`
+    name = "left"
+    kind = "dvs"
+    translation_mm = [15, 0, 0]
+    set = { threshold_on = 0.2 }
+
+A `sensor` that is a file is looked for beside the rig file.  `example_rig.toml` explains every key.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import reprlib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from vid2ev.errors import DataError, UsageError, clause, nearest
+from vid2ev.recording.disk import whole_file
+from vid2ev.rig.camera import Camera, Rig, Source
+
+EXAMPLE = Path(__file__).with_name("example_rig.toml")
+Model = TypeVar("Model", bound=BaseModel)
+TABLES = ("source", "camera")
+LARGEST = 1 << 18  # bytes; no rig or calibration comes near
+
+
+def read_rig(path: str | Path) -> Rig:
+    """The rig of a file.  Raises DataError for what cannot be read as TOML, UsageError for keys and values that cannot
+    be meant."""
+    path = Path(path)
+    tables = _tables(path)
+    unknown = next((key for key in tables if key not in TABLES), None)
+    if unknown is not None:
+        raise UsageError(
+            f"{path}: '{unknown}' is unknown{nearest(unknown, TABLES)}; a rig file has a table [source] and a table"
+            " [[camera]] for each camera"
+        )
+    listed = tables.get("camera", [])
+    if not isinstance(listed, list) or not listed or not all(isinstance(table, dict) for table in listed):
+        raise UsageError(f"{path}: there is no camera; write a table [[camera]] for each one, with its name and kind")
+    source = _made(Source, tables.get("source", {}), f"{path}: [source]")
+    cameras = [_camera(table, index, path) for index, table in enumerate(listed)]
+    try:
+        return Rig(source=source, cameras=tuple(cameras))
+    except ValidationError as error:
+        raise UsageError(f"{path}: {clause(error.errors()[0]['msg'])}") from error
+
+
+def write_rig(path: str | Path, rig: Rig, overwrite: bool = False) -> None:
+    """Write a rig that reads back equal.  Raises UsageError where a file is in the way, DataError where the disk cannot
+    take it."""
+    path = Path(path)
+    write_text(path, rig_text(rig, path.parent), overwrite)
+
+
+def rig_text(rig: Rig, folder: Path = Path()) -> str:
+    """The text of a rig file; `sensor` files are named as seen from `folder`."""
+    tables = [] if rig.source == Source() else ["[source]\n" + _keys(rig.source)]
+    for camera in rig.cameras:
+        if camera.sensor is not None and _is_file(camera.sensor) and not os.path.isabs(camera.sensor):
+            camera = camera.model_copy(update={"sensor": os.path.relpath(camera.sensor, folder)})
+        tables.append("[[camera]]\n" + _keys(camera))
+    return "\n".join(tables)
+
+
+def write_text(path: Path, text: str, overwrite: bool = False) -> None:
+    """A text file, as a whole or not at all.  Raises UsageError where one is in the way, DataError where the disk
+    cannot take it."""
+    if path.is_dir() or (path.exists() and not overwrite):
+        remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
+        raise UsageError(f"{path} exists; {remedy}")
+    try:
+        with whole_file(path) as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise DataError(f"{path} cannot be written: {error.strerror}; choose another place") from error
+
+
+def read_text(path: Path) -> str:
+    """The text of a small file.  Raises DataError."""
+    try:
+        if path.is_file() and path.stat().st_size > LARGEST:
+            raise DataError(f"{path}: {path.stat().st_size:,} bytes are too many for a rig or calibration file")
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file; `vid2ev init rig.toml` writes a rig file to begin with") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: not UTF-8 text; give a rig file or a calibration file") from error
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror}; give a rig file or a calibration file") from error
+
+
+def is_rig_file(path: Path) -> bool:
+    """Whether a file is a rig's: by its suffix, or a line [[camera]] or [source].  Raises DataError."""
+    return (
+        path.suffix == ".toml" or re.search(r"^\s*\[(\[camera\]|source)\]", read_text(path), re.MULTILINE) is not None
+    )
+
+
+def _tables(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_text(path))
+    except (ValueError, RecursionError) as error:  # (numbers of thousands of digits are ValueErrors of their own)
+        raise DataError(f"{path}: not valid TOML: {str(error).splitlines()[0]}; correct that line") from error
+
+
+def _camera(table: Mapping[str, Any], index: int, path: Path) -> Camera:
+    name = table.get("name")
+    where = f"{path}: camera '{name}'" if isinstance(name, str) else f"{path}: camera {index + 1}"
+    camera = _made(Camera, table, where)
+    if camera.sensor is not None and _is_file(camera.sensor):
+        beside = os.path.normpath(path.parent / camera.sensor)
+        camera = camera.model_copy(update={"sensor": beside})
+    return camera
+
+
+def _is_file(sensor: str) -> bool:
+    """Whether a sensor is named by a file; a preset's name has neither suffix nor folder."""
+    return sensor.endswith(".toml") or len(Path(sensor).parts) > 1
+
+
+def _made(model: type[Model], values: Any, where: str) -> Model:
+    """A record of a table's values, or one sentence that says what is wrong with them."""
+    if not isinstance(values, dict):
+        raise UsageError(f"{where} is no table; write [source] on a line, and its keys below")
+    try:
+        return model(**values)
+    except ValidationError as error:
+        raise UsageError(complaint(error, model, values, where)) from error
+
+
+def complaint(error: ValidationError, model: type[BaseModel], values: Mapping[str, Any], where: str) -> str:
+    """The first of pydantic's complaints as one sentence: where, key, value, what is possible."""
+    first = error.errors()[0]
+    if not first["loc"]:
+        return f"{where}: {clause(first['msg'])}"
+    key = str(first["loc"][0])
+    if first["type"] == "extra_forbidden":
+        keys = model.model_fields
+        return f"{where}: '{key}' is unknown{nearest(key, keys)}; the keys are {', '.join(keys)}"
+    meaning = model.model_fields[key].description
+    if first["type"] == "missing" and len(first["loc"]) == 1:
+        return f"{where}: {key} is missing ({meaning})"
+    counts = {"missing": "it has too few values", "too_long": "it has too many values"}
+    why = counts.get(first["type"]) or clause(first["msg"])
+    return f"{where}: {key} = {reprlib.repr(values[key])} is impossible: {why} ({meaning})"
+
+
+def _keys(record: BaseModel) -> str:
+    """The keys of a record that differ from their defaults, as lines of TOML."""
+    values = record.model_dump(exclude_defaults=True)
+    order = ["name", "kind", *(key for key in values if key not in ("name", "kind"))]
+    return "".join(f"{key} = {_toml(values[key])}\n" for key in order if key in values)
+
+
+def _toml(value: Any) -> str:
+    """A value of TOML, in one line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else str(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_toml(str(key))} = {_toml(held)}" for key, held in value.items()) + " }"
+    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, list | tuple) else str(value)
