@@ -179,6 +179,7 @@ def test_finishing_may_be_repeated(tmp_path: Path) -> None:
     at_work.finish(into)
     want = contents(into)
     (into / "frames.mp4").write_bytes(b"half a film")
+    shutil.copy(tmp_path / "work" / "raw" / "000003.png", tmp_path / "work" / "raw" / "000004.png")
     shutil.rmtree(into / "raw")
     again = files(tmp_path / "work")
     again.keep(4)

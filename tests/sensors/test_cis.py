@@ -204,6 +204,14 @@ def test_exposures_that_the_light_does_not_last_for_are_counted():
     assert cis.flush() == []
 
 
+def test_rows_that_sampled_are_an_exposure_begun():
+    """A rolling shutter of instants: at the only frame the first row has sampled, and the others never will."""
+    light = np.full((*SIZE[::-1], 3), 0.5, np.float32)
+    for exposure_us, unfinished in ((0, 1), (10, 0)):
+        cis = Cis(CisSpec(exposure_us=exposure_us, line_us=1000), SIZE)
+        assert list(cis.run([Frame(light, 0)])) == [] and cis.counts["unfinished"] == unfinished
+
+
 def test_an_exposure_says_when_it_was():
     light = np.full((*SIZE[::-1], 3), 0.5, np.float32)
     cis = Cis(CisSpec(frame_rate_hz=30, exposure_us=1234.5678, line_us=10.1), SIZE)

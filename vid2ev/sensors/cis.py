@@ -172,7 +172,7 @@ class Cis:
         rows, t_ns = self._light(light), self._later(t_ns)
         self._take(rows)
         if self._t_ns is None:  # the first frame: as if its light had been there for a moment
-            self._first_ns, self._t_ns, cut = t_ns, t_ns - 1, False
+            self._first_ns, self._t_ns = t_ns, t_ns - 1
             self._before[...] = self._after
         since_ns, begun = self._t_ns, self._open
         self._t_ns, self._open = t_ns, []
