@@ -125,7 +125,7 @@ def error_of_edge(pixels_per_frame: float, exposure_px: float, line_px: float) -
     light = np.stack([np.broadcast_to(edge(x - 4 - t * 1e-6), (rows, 32)) for t in t_ns])
     keys = {"frame_rate_hz": 210.0, "exposure_us": 1000 * exposure_px, "line_us": 1000 * line_px}
     worst = 0.0
-    for each in expose(spec(**keys), t_ns, light):  # (light in float64: its rounding is no part of this)
+    for each in expose(spec(**keys), t_ns, light):
         for y in range(rows):
             a = each.start_ns * 1e-6 + y * line_px
             at = x - 4 - a

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.kernels.exposures import ReadOut, add_rows, read_rows, take_rows
+from vid2ev.kernels.exposures import add_rows, read_rows, take_rows
 from vid2ev.kernels.layout import PIXEL_LIMIT
-from vid2ev.physics.fixed_pattern import fixed_pattern
-from vid2ev.physics.shading import shading_map
 from vid2ev.physics.shutter import interval_weights, opening_ns
+from vid2ev.sensors.cis_readout import frozen_of, numbers_of
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.exposures import Exposure
@@ -22,7 +20,6 @@ from vid2ev.stream.frames import Frame
 __all__ = ["Cis", "CisSpec"]
 
 OPEN_BYTES = 1 << 32  # of the sums of all exposures that are open at a time
-NOTHING = np.empty((0, 0), np.float32)
 
 
 @dataclass(slots=True)
@@ -79,8 +76,8 @@ class Cis:
             )
         self._row_ns = np.arange(height) * (1e3 * spec.line_us)
         self._tiles = Tiles(height, threads)
-        self._numbers = _numbers_of(spec, seed, camera)
-        self._shade, self._gain, self._dark = self._frozen()
+        self._numbers = numbers_of(spec, seed, camera)
+        self._frozen = frozen_of(spec, self._numbers, size)
         self._t_ns: int | None = None
         self._first_ns = self._next = self._made = self._unfinished = self._mended = 0
         self._before, self._after = np.empty(self._rows, np.float32), np.empty(self._rows, np.float32)
@@ -101,17 +98,20 @@ class Cis:
 
     def see(self, frame: Frame) -> list[Exposure]:
         """`step` to a frame, with a step of the light where it begins a new shot."""
-        return list(self._advance(self._seen(frame), frame.t_ns, frame.cut))
+        return list(self.exposures(frame))
+
+    def exposures(self, frame: Frame) -> Iterator[Exposure]:
+        """`see`, but an exposure at a time, however many there are between two frames; take all of them."""
+        return self._advance(frame.light if self.spec.colour else frame.luminance, frame.t_ns, frame.cut)
 
     def run(self, frames: Iterable[Frame]) -> Iterator[Exposure]:
-        """`see` for each frame and `flush` at the end, an exposure at a time, however many there are between frames."""
+        """The `exposures` of each frame, and `flush` at the end."""
         for frame in frames:
-            yield from self._advance(self._seen(frame), frame.t_ns, frame.cut)
+            yield from self.exposures(frame)
         self.flush()
 
     def flush(self) -> list[Exposure]:
         """End the light: exposures that it did not last for are dropped and counted (`unfinished`); returns none."""
-        assert self._t_ns is not None or not self._open
         begun = [each for each in self._open if each.start_ns < (self._t_ns or 0) or self.spec.exposure_us == 0]
         self._unfinished += len(begun)
         self._open.clear()
@@ -159,7 +159,8 @@ class Cis:
     def maps(self) -> dict[str, np.ndarray]:
         """What is frozen in this sensor, float32, each of the shape of a picture: `gain` (relative sensitivity), `dark`
         (dark signal [electrons]), and shading (optical gain)."""
-        planes = {"gain": (self._gain, 1.0), "dark": (self._dark, 0.0), "shading": (self._shade, 1.0)}
+        shade, gain, dark = self._frozen
+        planes = {"gain": (gain, 1.0), "dark": (dark, 0.0), "shading": (shade, 1.0)}
         return {
             name: self._shaped(plane.copy() if plane.size else np.full(self._rows, neutral, np.float32))
             for name, (plane, neutral) in planes.items()
@@ -205,9 +206,8 @@ class Cis:
         light = np.empty(self._rows if self.linear else (0, 0), np.float32)
 
         def read(a: int, b: int) -> None:
-            planes = [plane[a:b] for plane in (self._shade, self._gain, self._dark)]
-            first = a * self._rows[1]
-            read_rows(each.total[a:b], *planes, first, each.index, self._numbers, codes[a:b], light[a:b])
+            first, frozen = a * self._rows[1], self._frozen.rows(a, b)
+            read_rows(each.total[a:b], *frozen, first, each.index, self._numbers, codes[a:b], light[a:b])
 
         self._each_rows(read)
         self._spare.append(each.total)
@@ -227,9 +227,6 @@ class Cis:
     def _take(self, rows: np.ndarray) -> None:
         signed = self.spec.colour
         self._mended += sum(self._each_rows(lambda a, b: take_rows(rows[a:b], self._after[a:b], signed)))
-
-    def _seen(self, frame: Frame) -> np.ndarray:
-        return frame.light if self.spec.colour else frame.luminance
 
     def _light(self, light: np.ndarray) -> np.ndarray:
         """Light as rows [H, n]."""
@@ -256,33 +253,3 @@ class Cis:
 
     def _shaped(self, rows: np.ndarray) -> np.ndarray:
         return rows.reshape(self._rows[0], self.size[0], 3) if self.spec.colour else rows
-
-    def _frozen(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Shading, sensitivity and dark signal, as rows; empty where they change nothing."""
-        spec, shade, gain, dark = self.spec, NOTHING, NOTHING, NOTHING
-        if spec.shading:
-            shade = np.repeat(shading_map(spec.shading, *self.size), 3 if spec.colour else 1, axis=1)
-        if spec.prnu > 0 or spec.dsnu > 0:
-            n = self._rows[0] * self._rows[1]
-            gain, dark = fixed_pattern(n, self._numbers.seed, self.camera, spec.prnu, spec.dsnu)
-        return shade, gain.reshape(-1, self._rows[1]), dark.reshape(-1, self._rows[1])
-
-
-def _numbers_of(spec: CisSpec, seed: int, camera: int) -> ReadOut:
-    """What readout needs of a specification."""
-    effects = set(spec.effects())
-    return ReadOut(
-        seed=np.uint64(seed),
-        camera=camera,
-        exposure_gain=spec.exposure_gain,
-        random=bool({"shot_noise", "read_noise", "noise"} & effects),
-        electrons=bool({"fixed_pattern", "shot_noise", "full_well", "read_noise"} & effects),
-        white_e=spec.white_e,
-        shot_noise=spec.shot_noise,
-        full_well_e=spec.full_well_e or math.inf,
-        read_noise_e=spec.read_noise_e,
-        least=spec.min_illuminance,
-        slope=spec.slope,
-        top=float(spec.top),
-        noise_lsb=spec.noise_lsb,
-    )
