@@ -1,0 +1,85 @@
+"""Lenses bend as OpenCV says they do, and what they bend is made straight again."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixel_grid, pixels_of, radial_table, rays_of
+
+SIZE = (640, 480)
+LENSES = {
+    "none": ("none", ()),
+    "barrel": ("radtan", (-0.3, 0.1, 0.001, -0.0005)),
+    "five": ("radtan", (-0.28, 0.08, -0.002, 0.0015, 0.01)),
+    "rational": ("radtan", (0.3, -0.1, 0.001, -0.0005, 0.02, 0.1, 0.05, 0.01)),
+    "pincushion": ("radtan", (0.15, 0.02, 0.0, 0.0)),
+    "fisheye": ("equidistant", (0.05, -0.01, 0.003, -0.001)),
+}
+
+
+def lens(name: str, focal: float = 400) -> Intrinsics:
+    model, distortion = LENSES[name]
+    return Intrinsics(
+        size=SIZE, focal_px=(focal, 1.02 * focal), centre_px=(322.4, 237.1), model=model, distortion=distortion
+    )
+
+
+def opencv_pixels(points: np.ndarray, camera: Intrinsics) -> np.ndarray:
+    still, values = np.zeros(3), np.array(camera.distortion)
+    if camera.model == "equidistant":
+        return cv2.fisheye.projectPoints(points[:, None].copy(), still, still, camera.matrix, values)[0][:, 0]
+    return cv2.projectPoints(points, still, still, camera.matrix, values)[0][:, 0]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_lenses_bend_as_those_of_opencv(name: str) -> None:
+    camera = lens(name)
+    rays = rays_of(pixel_grid(SIZE)[::7, ::7], camera).reshape(-1, 3)
+    assert not np.isnan(rays).any()
+    points = rays * np.random.default_rng(0).uniform(0.1, 50, (len(rays), 1))
+    np.testing.assert_allclose(pixels_of(points, camera), opencv_pixels(points, camera), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_every_pixel_finds_its_ray_again(name: str) -> None:
+    camera, grid = lens(name), pixel_grid(SIZE)
+    rays = rays_of(grid, camera)
+    np.testing.assert_allclose(pixels_of(rays, camera), grid, atol=1e-6)
+    np.testing.assert_allclose(opencv_pixels(rays.reshape(-1, 3), camera), grid.reshape(-1, 2), atol=1e-4)
+
+
+def test_what_no_lens_sees_has_no_pixel() -> None:
+    for name in LENSES:
+        behind = pixels_of(np.array([[0, 0, -1.0], [1, 1, 0], [0.1, 0, -1e-12], [np.nan, 0, 1]]), lens(name))
+        assert np.isnan(behind).all()
+    folding = Intrinsics(
+        size=SIZE, focal_px=(300, 300), centre_px=(320, 240), model="radtan", distortion=(-0.3, 0, 0, 0)
+    )
+    turn = np.sqrt(1 / 0.9)  # r - 0.3 r**3 falls from here on
+    assert radial_table(folding)[0][-1] == pytest.approx(turn, rel=1e-2)
+    seen = pixels_of(np.array([[turn * 0.98, 0, 1], [turn * 1.02, 0, 1], [1.8, 0, 1]]), folding)
+    assert not np.isnan(seen[0]).any() and np.isnan(seen[1:]).all()
+    outside = 320 + 300 * turn * (1 - 0.3 * turn**2) + 1
+    assert np.isnan(rays_of(np.array([[outside, 240.0]]), folding)[0, :2]).all()
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.lists(st.floats(-1, 1), min_size=8, max_size=8),
+    st.sampled_from([("radtan", 4), ("radtan", 5), ("radtan", 8), ("equidistant", 4)]),
+    st.floats(10, 3000),
+)
+def test_any_coefficients_give_pixels_or_nothing(values: list[float], kind: tuple[str, int], focal: float) -> None:
+    model, count = kind
+    camera = Intrinsics(
+        size=(32, 24), focal_px=(focal, focal), centre_px=(15.5, 11.5), model=model, distortion=tuple(values[:count])
+    )  # fmt: skip
+    grid = pixel_grid((32, 24))
+    rays = rays_of(grid, camera)
+    found = ~np.isnan(rays).any(-1)
+    np.testing.assert_allclose(pixels_of(rays[found], camera), grid[found], atol=1e-5)

@@ -1,0 +1,73 @@
+"""Light between the pixels: through the pixels, flat where flat, never far from what is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.ndimage
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vid2ev.rig.bands import Bands
+from vid2ev.rig.lens import pixel_grid
+from vid2ev.rig.sampling import pixel_means, sampled
+from vid2ev.rig.spline import Spline
+
+ONE = Bands(1)
+
+
+def at(light: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    places = (np.asarray(place, np.float32) for place in (x, y))
+    return np.moveaxis(sampled(Spline(light, ONE), *places, ONE), 0, -1)
+
+
+def test_it_is_the_spline_of_scipy() -> None:
+    random = np.random.default_rng(0)
+    light = 1 + 0.1 * random.random((40, 50), np.float32)
+    x, y = random.uniform(0, 49, (30, 30)), random.uniform(0, 39, (30, 30))
+    expected = scipy.ndimage.map_coordinates(light.astype(float), [y, x], order=3, mode="mirror")
+    held = np.abs(at(light, x, y)[..., 0] - expected)
+    assert np.quantile(held, 0.9) < 1e-6 and held.max() < 0.03  # (the few that ring are held back)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 2), (33, 29), (20, 30, 3)])
+def test_at_a_pixel_it_is_the_pixel(shape: tuple[int, ...]) -> None:
+    light = np.random.default_rng(1).random(shape, np.float32)
+    x, y = np.moveaxis(pixel_grid((shape[1], shape[0])), -1, 0)
+    np.testing.assert_allclose(at(light, x, y).reshape(shape), light, atol=2e-6)
+    beyond = at(light, x - 2 * shape[1], y)  # the border goes on
+    np.testing.assert_allclose(beyond.reshape(shape)[:, 0], light[:, 0], atol=2e-6)
+
+
+@given(st.floats(0, 1e4, width=32), st.integers(0, 2**32 - 1))
+def test_flat_light_stays_exactly_flat(value: float, seed: int) -> None:
+    light, random = np.full((17, 19), value, np.float32), np.random.default_rng(seed)
+    x, y = random.uniform(-3, 22, (2, 12, 12))
+    fine = at(light, x, y)[..., 0]
+    assert (fine == np.float32(value)).all()
+    assert (pixel_means(fine[None], 3) == np.float32(value)).all()
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_lamp_neither_rings_far_away_nor_darkens_below_zero(seed: int) -> None:
+    light, random = np.full((21, 21), 0.01, np.float32), np.random.default_rng(seed)
+    light[10, 10] = 1000
+    x, y = random.uniform(0, 20, (2, 30, 30))
+    found, away = at(light, x, y)[..., 0], np.maximum(np.abs(x - 10), np.abs(y - 10))
+    assert (found >= 0.0025).all() and (found <= 1500).all()
+    assert (found[away > 1.6] == np.float32(0.01)).all()
+
+
+def test_light_moves_smoothly() -> None:
+    """The slope along a path has no steps, as that of a piecewise line or parabola would."""
+    light = 0.5 + 0.4 * np.sin(np.arange(40, dtype=np.float32) * 1.3)[None].repeat(5, 0)
+    x = np.linspace(5, 30, 25 * 64 + 1)[None]
+    found = at(light, x, np.full_like(x, 2))[0, :, 0].astype(float)
+    bends = np.abs(np.diff(found, 2)) * 64**2
+    assert bends.max() < 1.25 * 0.4 * 1.3**2
+
+
+def test_means_over_pixels_are_means() -> None:
+    fine = np.random.default_rng(3).random((3, 12, 8), np.float32)
+    np.testing.assert_allclose(pixel_means(fine, 4), fine.reshape(3, 3, 4, 2, 4).mean(axis=(2, 4)), atol=1e-6)

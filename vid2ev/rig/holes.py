@@ -1,0 +1,127 @@
+"""Holes filled from the background around them.
+
+From each pixel of a hole the nearest pixels without one are looked up to the left, to the right, above and below.  Of
+these four, those on the farthest surface count, in proportion to 1 / distance**2: what opens up beside a thing in front
+shows what is behind it.  Pixels that see nothing in their row or column take what their filled neighbours have.
+
+The pixel at the rim of a hole is often a mixture with the thing in front, because the photograph's lens and pixels mix
+there; `inset` looks so many pixels further on, where these are of the same surface.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from vid2ev.kernel_cache import mark_our_kernels
+
+mark_our_kernels()
+F = np.float32
+NOTHING = -1
+ALIKE = F(1.05)  # inverse depths of one surface: up to so many times that of the farthest,
+SPREAD = F(0.1)  # or up to this share of the way from the farthest to the nearest
+
+
+class Fill(NamedTuple):
+    """How holes are filled; in this order, since later ones take from earlier ones."""
+
+    holes: np.ndarray  # [n] flat index of the pixel
+    sources: np.ndarray  # [n, 4] flat indices of those it is made of; -1 for none
+    weights: np.ndarray  # [n, 4] float32, which sum to 1
+
+
+def fill_of(inverse: np.ndarray, inset: int = 0) -> Fill:
+    """How to fill the pixels of inverse depth [h, w] float32 that are negative.  Nothing can be done if all are."""
+    holes = np.flatnonzero(inverse < 0)
+    if holes.size in (0, inverse.size):
+        return Fill(np.zeros(0, np.int64), np.zeros((0, 4), np.int64), np.zeros((0, 4), F))
+    found = np.array(inverse)
+    rounds: list[Fill] = []
+    while holes.size:
+        hits = np.full((holes.size, 4), NOTHING, np.int64)
+        _look_around(found, holes, hits)
+        seen = (hits != NOTHING).any(axis=1)
+        weights = np.zeros((holes.size, 4), F)
+        _weigh(found, holes, hits, inset if not rounds else 0, weights)
+        rounds.append(Fill(holes[seen], hits[seen], weights[seen]))
+        apply_fill(rounds[-1], found[None])
+        holes = holes[~seen]
+    return Fill(*(np.concatenate(parts) for parts in zip(*rounds, strict=True)))
+
+
+def apply_fill(fill: Fill, planes: np.ndarray) -> None:
+    """Fill the holes of planes [C, h, w] float32 in place."""
+    if fill.holes.size:
+        _apply(*fill, planes.reshape(len(planes), -1))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _look_around(inverse, holes, hits):
+    height, width = inverse.shape
+    last = np.full(width, NOTHING, np.int64)  # in each column
+    k = 0
+    for y in range(height):
+        left = NOTHING
+        for x in range(width):
+            if inverse[y, x] >= F(0):
+                left, last[x] = y * width + x, y * width + x
+            elif k < holes.size and holes[k] == y * width + x:
+                hits[k, 0], hits[k, 2] = left, last[x]
+                k += 1
+    last[:] = NOTHING
+    k = holes.size - 1
+    for y in range(height - 1, -1, -1):
+        right = NOTHING
+        for x in range(width - 1, -1, -1):
+            if inverse[y, x] >= F(0):
+                right, last[x] = y * width + x, y * width + x
+            elif k >= 0 and holes[k] == y * width + x:
+                hits[k, 1], hits[k, 3] = right, last[x]
+                k -= 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _weigh(inverse, holes, hits, inset, weights):
+    height, width = inverse.shape
+    depths = inverse.reshape(-1)
+    for k in range(holes.size):
+        y, x = holes[k] // width, holes[k] % width
+        farthest, nearest = F(np.inf), F(0)
+        for way in range(4):
+            if hits[k, way] != NOTHING:
+                farthest, nearest = min(farthest, depths[hits[k, way]]), max(nearest, depths[hits[k, way]])
+        limit, total = max(ALIKE * farthest, farthest + SPREAD * (nearest - farthest)), F(0)
+        for way in range(4):
+            hit = hits[k, way]
+            if hit == NOTHING:
+                continue
+            if depths[hit] > limit:
+                hits[k, way] = NOTHING
+                continue
+            row, column = hit // width, hit % width
+            away = max(abs(row - y), abs(column - x))
+            weights[k, way] = F(1) / F(away * away)
+            total += weights[k, way]
+            if inset:
+                row += inset * ((way == 3) - (way == 2))
+                column += inset * ((way == 1) - (way == 0))
+                if 0 <= row < height and 0 <= column < width and F(0) <= inverse[row, column] <= ALIKE * depths[hit]:
+                    hits[k, way] = row * width + column
+        for way in range(4):
+            weights[k, way] /= max(total, F(1e-30))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _apply(holes, sources, weights, planes):
+    for c in range(planes.shape[0]):
+        for k in range(holes.size):
+            base, total = F(np.nan), F(0)
+            for way in range(4):
+                if sources[k, way] != NOTHING:
+                    light = planes[c, sources[k, way]]
+                    if base != base:
+                        base = light
+                    total += weights[k, way] * (light - base)  # (differences: flat light stays exactly flat)
+            planes[c, holes[k]] = base + total

@@ -1,0 +1,101 @@
+"""What a camera sees of a plane, or of the infinitely far: a map from its pixels to those of the source.
+
+The plane lies Z in front of the source and faces it.  Along the direction r of a pixel of the camera
+(X_source = R X_camera + t) the source sees it in the direction
+
+    g = R r + t (R r)_z / (Z - t_z)         or, between pixels, H = K_source (I + t e_z' / (Z - t_z)) R K_camera^-1
+
+For Z = infinity this is the turn alone, and so it is without a translation, whatever the depth.  The plane is seen
+where it is in front of both, Z > t_z and (R r)_z > 0; lenses bend r and g.
+
+Source: R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2004, section 13.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixel_grid, pixels_of, rays_of
+from vid2ev.rig.pose import Pose
+
+BORDER_PX = 1e-3  # beyond the outermost pixels' borders: rounding, not a place outside
+FINEST = 16  # places across a pixel, at most
+
+
+class Places(NamedTuple):
+    """Where in the source the pixels of a camera look: for `samples` x `samples` places in each of its pixels."""
+
+    x: np.ndarray  # [samples h, samples w] float32, px of the source; of what is not seen, the nearest that is
+    y: np.ndarray
+    seen: np.ndarray  # [samples h, samples w] bool
+
+
+def homography(source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float = math.inf) -> np.ndarray:
+    """H [3, 3]: from pixels of the camera to pixels of the source, for cameras without distortion.
+
+    pose      from the camera's coordinates to those of the source
+    plane_m   Z; raises UsageError if it is not greater than 0 or the camera is not before the plane
+    """
+    if not _before_plane(pose, plane_m):
+        at_m = pose.translation_m[2]
+        raise UsageError(
+            f"a camera {at_m:g} m ahead of the source does not see a plane at {plane_m:g} m; put it farther"
+        )
+    return source.matrix @ _onto_plane(pose, plane_m) @ np.linalg.inv(camera.matrix)
+
+
+def places_on_plane(
+    source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float = math.inf, samples: int = 1
+) -> Places:
+    """Where in the source the pixels of a camera look, the scene being a plane at plane_m, infinity allowed."""
+    width, height = camera.size
+    fine = camera.scaled_to((width * samples, height * samples)) if samples > 1 else camera
+    rays = rays_of(pixel_grid(fine.size), fine)
+    before = _before_plane(pose, plane_m)
+    directions = rays @ (_onto_plane(pose, plane_m) if before else pose.rotation).T
+    px = pixels_of(directions, source)
+    with np.errstate(invalid="ignore"):
+        inside = (px >= -0.5 - BORDER_PX).all(-1) & (px <= np.array(source.size) - 0.5 + BORDER_PX).all(-1)
+    lost = np.isnan(px).any(-1)
+    px[lost] = _towards(directions[lost], source)
+    return Places(px[..., 0].astype(np.float32), px[..., 1].astype(np.float32), np.asarray(inside & before))
+
+
+def samples_for(places: Places) -> int:
+    """How many places across a pixel it takes for none of the source to be skipped; from places of one each."""
+    spacings = []
+    for axis in (0, 1):
+        both = np.logical_and(np.take(places.seen, range(1, places.seen.shape[axis]), axis),
+                              np.take(places.seen, range(places.seen.shape[axis] - 1), axis))  # fmt: skip
+        step = np.hypot(np.diff(places.x, axis=axis), np.diff(places.y, axis=axis))
+        spacings.append(float(np.median(step[both])) if both.any() else 1.0)
+    return min(max(math.ceil(max(spacings) - 0.05), 1), FINEST)
+
+
+def _before_plane(pose: Pose, plane_m: float) -> bool:
+    if not plane_m > 0:
+        raise UsageError(f"a plane at {plane_m} m; expected a distance greater than 0, or inf")
+    return bool(plane_m - pose.translation_m[2] > 1e-9 * max(1.0, abs(pose.translation_m[2])))
+
+
+def _onto_plane(pose: Pose, plane_m: float) -> np.ndarray:
+    """[3, 3]: from directions of the camera to those in which the source sees the same place of the plane."""
+    shear = np.eye(3)
+    shear[:, 2] += pose.translation_m / (plane_m - pose.translation_m[2])
+    return shear @ pose.rotation
+
+
+def _towards(directions: np.ndarray, source: Intrinsics) -> np.ndarray:
+    """The places on the picture's border [n, 2] in the sense of directions that have none."""
+    way = np.nan_to_num(directions[:, :2] * source.focal_px)
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    way = np.where(length > 0, way / np.where(length > 0, length, 1), (1.0, 0.0))
+    centre, last = np.clip(source.centre_px, 0, np.array(source.size) - 1), np.array(source.size) - 1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.where(way > 0, (last - centre) / way, np.where(way < 0, -centre / way, np.inf))
+    return centre + way * np.min(far, axis=1, keepdims=True)

@@ -1,0 +1,144 @@
+"""Light between the pixels of a picture.
+
+It is that of a cubic spline through the pixels (`spline.py`), held to what the pixels around the place allow.
+
+**Near an edge of the scene** (`near_cut` of a surface) the spline would mix what is before with what is behind.  There
+cubic convolution (Keys, a = -1/2) looks at the sixteen pixels around, and those that are not on the surface of the
+nearest one count as that one.
+
+**Pixels with an area.**  A camera's pixel is the mean of `samples` x `samples` places in it.
+
+Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29(6), 1981.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.rig.bands import Bands
+from vid2ev.rig.spline import MARGIN, Spline
+
+mark_our_kernels()
+F = np.float32
+_NOWHERE = np.zeros((0, 0), np.bool_)
+_SIXTH, _HALF, _ONE, _TWO, _ZERO = F(1 / 6), F(0.5), F(1), F(2), F(0)
+_TWO_THIRDS = F(2 / 3)
+
+
+def sampled(
+    spline: Spline,
+    x: np.ndarray,
+    y: np.ndarray,
+    bands: Bands,
+    near_cut: np.ndarray = _NOWHERE,
+    inverse: np.ndarray = _NOWHERE,
+    steep: float = 0.0,
+) -> np.ndarray:
+    """Light [C, h, w] at places x, y [h, w] float32 of a picture; beyond its border, that of the border.
+
+    near_cut, inverse, steep   those of a surface, if the picture is of one
+    """
+    out = np.empty((len(spline.pixels), *x.shape), F)
+
+    def sample(begin: int, end: int) -> None:
+        _sample(spline.weights, spline.lowest, spline.highest, x, y, begin, end, out)
+        if near_cut.size:
+            _sample_beside_cuts(spline.pixels, x, y, near_cut, inverse, F(steep), begin, end, out)
+
+    bands.run(len(x), sample)
+    return out
+
+
+def pixel_means(fine: np.ndarray, samples: int) -> np.ndarray:
+    """Means [C, h, w] of samples x samples places each, of [C, samples h, samples w]."""
+    if samples == 1:
+        return fine
+    channels, height, width = fine.shape
+    out = np.empty((channels, height // samples, width // samples), F)
+    _means(fine, samples, out)
+    return out
+
+
+@njit(nogil=True, error_model="numpy", inline="always")
+def _row(p, y, x, w0, w1, w2, w3):
+    return w0 * p[y, x] + w1 * p[y, x + np.uintp(1)] + w2 * p[y, x + np.uintp(2)] + w3 * p[y, x + np.uintp(3)]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sample(weights, lowest, highest, x, y, begin, end, out):
+    channels, height, width = lowest.shape
+    x_last, y_last = F(width - 1), F(height - 1)
+    for j in range(begin, end):
+        for i in range(x.shape[1]):
+            across, down = min(max(x[j, i], _ZERO), x_last), min(max(y[j, i], _ZERO), y_last)
+            left, top = np.int32(across), np.int32(down)
+            a, b = across - F(left), down - F(top)
+            a1, b1 = _ONE - a, _ONE - b
+            x0, x3, y0, y3 = _SIXTH * a1 * a1 * a1, _SIXTH * a * a * a, _SIXTH * b1 * b1 * b1, _SIXTH * b * b * b
+            x1, y1 = _TWO_THIRDS - a * a * (_ONE - _HALF * a), _TWO_THIRDS - b * b * (_ONE - _HALF * b)
+            x2, y2 = _ONE - x0 - x1 - x3, _ONE - y0 - y1 - y3
+            own_x, own_y = np.uintp(left + (a >= _HALF)), np.uintp(top + (b >= _HALF))
+            column, row = np.uintp(left + (MARGIN - 1)), np.uintp(top + (MARGIN - 1))
+            second, third, fourth = row + np.uintp(1), row + np.uintp(2), row + np.uintp(3)
+            for c in range(channels):
+                p = weights[c]
+                light = y0 * _row(p, row, column, x0, x1, x2, x3) + y1 * _row(p, second, column, x0, x1, x2, x3)
+                light += y2 * _row(p, third, column, x0, x1, x2, x3) + y3 * _row(p, fourth, column, x0, x1, x2, x3)
+                out[c, j, i] = min(max(light, lowest[c, own_y, own_x]), highest[c, own_y, own_x])
+
+
+@njit(nogil=True, error_model="numpy", inline="always")
+def _keys(a):
+    """The weights of four pixels for a place a beyond the second (Keys, a = -1/2)."""
+    b = _ONE - a
+    w0, w3 = -_HALF * a * b * b, -_HALF * a * a * b
+    w2 = a * (_HALF + a * (_TWO - F(1.5) * a))
+    return w0, _ONE - w0 - w2 - w3, w2, w3
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sample_beside_cuts(pixels, x, y, near_cut, inverse, steep, begin, end, out):
+    """Places near cuts once more, by cubic convolution among the pixels of one surface."""
+    height, width = near_cut.shape
+    x_last, y_last = F(width - 1), F(height - 1)
+    columns, rows, weights = np.empty(16, np.int64), np.empty(16, np.int64), np.empty(16, np.float32)
+    for j in range(begin, end):
+        for i in range(x.shape[1]):
+            across, down = min(max(x[j, i], _ZERO), x_last), min(max(y[j, i], _ZERO), y_last)
+            own_x, own_y = int(across + _HALF), int(down + _HALF)
+            if not near_cut[own_y, own_x]:
+                continue
+            left, top, depth, count = int(across), int(down), inverse[own_y, own_x], 0
+            weights_x, weights_y = _keys(across - F(left)), _keys(down - F(top))
+            for m in range(4):
+                row = min(max(top + m - 1, 0), height - 1)
+                for n in range(4):
+                    column = min(max(left + n - 1, 0), width - 1)
+                    there, away = inverse[row, column], F(max(abs(row - own_y), abs(column - own_x)))
+                    if abs(there - depth) <= steep * away * max(there, depth):
+                        columns[count], rows[count], weights[count] = column, row, weights_y[m] * weights_x[n]
+                        count += 1
+            for c in range(out.shape[0]):
+                own = pixels[c, own_y, own_x]
+                total, low, high = _ZERO, own, own
+                for k in range(count):
+                    light = pixels[c, rows[k], columns[k]]
+                    total += weights[k] * (light - own)
+                    low, high = min(low, light), max(high, light)
+                out[c, j, i] = min(max(own + total, low), high)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _means(fine, samples, out):
+    share = F(1) / F(samples * samples)
+    for c in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                first = fine[c, j * samples, i * samples]  # (sums of differences: flat light stays exactly flat)
+                total = _ZERO
+                for m in range(j * samples, (j + 1) * samples):
+                    for n in range(i * samples, (i + 1) * samples):
+                        total += fine[c, m, n] - first
+                out[c, j, i] = first + share * total
