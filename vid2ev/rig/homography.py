@@ -24,6 +24,7 @@ from vid2ev.rig.lens import pixel_grid, pixels_of, rays_of
 from vid2ev.rig.pose import Pose
 
 BORDER_PX = 1e-3  # beyond the outermost pixels' borders: rounding, not a place outside
+SKIPPED = 0.25  # px of the source, between two places: so little is not worth more of them
 FINEST = 16  # places across a pixel, at most
 
 
@@ -74,7 +75,7 @@ def samples_for(places: Places) -> int:
                               np.take(places.seen, range(places.seen.shape[axis] - 1), axis))  # fmt: skip
         step = np.hypot(np.diff(places.x, axis=axis), np.diff(places.y, axis=axis))
         spacings.append(float(np.median(step[both])) if both.any() else 1.0)
-    return min(max(math.ceil(max(spacings) - 0.05), 1), FINEST)
+    return min(max(math.ceil(max(spacings) - SKIPPED), 1), FINEST)
 
 
 def _before_plane(pose: Pose, plane_m: float) -> bool:

@@ -151,7 +151,8 @@ class Views:
         x, y, inverse = seen_of(surface, fine, pose, self._bands)
         seen = inverse >= 0
         if not seen.any():
-            return far._replace(valid=np.zeros_like(far.valid))
+            nothing = far.places._replace(seen=np.zeros_like(far.places.seen))
+            return far._replace(places=nothing, valid=np.zeros_like(far.valid))
         if not known.all():
             width, height = self.source.size
             columns, rows = np.clip(np.rint(x), 0, width - 1), np.clip(np.rint(y), 0, height - 1)
@@ -178,7 +179,7 @@ def filled_inverse(depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Without any that is known it is infinitely far.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         known = depth_m >= NEAREST_M
         inverse = np.where(known, 1 / depth_m, np.float32(-1)).astype(np.float32)
     if not known.all():
