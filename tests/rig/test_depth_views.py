@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kornia.geometry.depth import warp_frame_depth
-from rigs import Texture, pinhole, psnr
+from view_rigs import Texture, pinhole, psnr
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import pytest
-from rigs import psnr
+from view_rigs import psnr
 
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.rig.intrinsics import Intrinsics
