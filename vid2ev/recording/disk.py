@@ -52,7 +52,7 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def write_npz(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+def write_npz(path: Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
     """An npz file; the same arrays give the same bytes."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():

@@ -1,0 +1,92 @@
+"""poses.txt: where a camera was, and how it was turned, in the format of the TUM RGB-D benchmark.
+
+    # timestamp tx ty tz qx qy qz qw
+    0.033333333 0.015 0.0 0.0 0.0 0.0 0.0 1.0
+
+Seconds with nine decimals, metres, and a unit quaternion from the camera's coordinates to those of the world.
+
+Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, page "File formats".
+"""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import whole_file
+
+HEADER = "# timestamp tx ty tz qx qy qz qw\n"
+COLUMNS = 8
+NEARLY_ONE = 1e-3  # how far a quaternion of few digits may be from length 1
+LATEST_S = 1 << 32
+
+
+def write_poses(path: Path, t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarray) -> None:
+    """Write poses: instants [N] int64, positions [N, 3], unit quaternions x, y, z, w [N, 4].
+
+    Raises UsageError for what are no poses, OSError from the disk.
+    """
+    lines = pose_lines(t_ns, positions_m, quaternions)
+    with whole_file(path) as file:
+        file.write(f"{HEADER}{lines}".encode())
+
+
+def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarray) -> str:
+    """A line for each pose, for a file that grows; the first line of the file is `HEADER`.  Raises UsageError."""
+    poses = np.c_[positions_m, quaternions].astype(np.float64)
+    if poses.shape != (len(t_ns), 7) or np.asarray(t_ns).dtype.kind not in "iu":
+        raise UsageError(f"poses are instants [N], positions [N, 3] and quaternions [N, 4]; found {list(poses.shape)}")
+    if not np.isfinite(poses).all() or any(abs(math.hypot(*pose[3:]) - 1) > NEARLY_ONE for pose in poses.tolist()):
+        raise UsageError("poses are finite, and their quaternions of length 1")
+    # (+ 0.0: a zero without a sign)
+    return "".join(
+        f"{_seconds(int(t))} {' '.join(repr(value + 0.0) for value in pose)}\n"
+        for t, pose in zip(t_ns, poses.tolist(), strict=True)
+    )
+
+
+def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise DataError(f"{path} cannot be read: {reason}; give a file of poses") from error
+    rows = [(number, line.split()) for number, line in enumerate(lines, start=1) if _holds(line)]
+    times = np.array([_nanoseconds(path, number, row) for number, row in rows], np.int64)
+    poses = np.array([_numbers(path, number, row) for number, row in rows], np.float64).reshape(-1, 7)
+    quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    return times, poses[:, :3], quaternions
+
+
+def _holds(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _seconds(t_ns: int) -> str:
+    return f"{'-' if t_ns < 0 else ''}{abs(t_ns) // 10**9}.{abs(t_ns) % 10**9:09d}"
+
+
+def _nanoseconds(path: Path, number: int, row: list[str]) -> int:
+    try:
+        seconds = Decimal(row[0])
+    except InvalidOperation:
+        seconds = Decimal("nan")
+    if not seconds.is_finite() or abs(seconds) > LATEST_S:
+        raise DataError(f"{path}: line {number} begins with '{row[0][:40]}', not an instant in seconds; correct it")
+    return int((seconds * 10**9).to_integral_value())
+
+
+def _numbers(path: Path, number: int, row: list[str]) -> list[float]:
+    try:
+        values = [float(word) for word in row[1:]]
+    except ValueError:
+        values = []
+    fits = len(row) == COLUMNS and len(values) == COLUMNS - 1 and bool(np.isfinite(values).all())
+    if not fits or abs(math.hypot(*values[3:]) - 1) > NEARLY_ONE:
+        raise DataError(f"{path}: line {number} is no pose; expected t x y z and a unit quaternion qx qy qz qw")
+    return values
