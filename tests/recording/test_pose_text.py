@@ -86,9 +86,11 @@ def test_lines_that_are_no_poses_are_named(tmp_path: Path, line: str) -> None:
 
 def test_files_that_are_none_are_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "poses.txt").write_bytes(b"\xff\xfe")
-    for path in (tmp_path / "poses.txt", tmp_path / "none.txt", tmp_path):
+    for path in (tmp_path / "poses.txt", tmp_path):
         with pytest.raises(DataError, match="cannot be read"):
             read_poses(path)
+    with pytest.raises(UsageError, match="no such file"):
+        read_poses(tmp_path / "none.txt")
 
 
 def test_what_are_no_poses_is_refused(tmp_path: Path) -> None:

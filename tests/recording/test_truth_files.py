@@ -275,5 +275,5 @@ def test_damage_is_never_a_traceback(tmp_path: Path, name: str) -> None:
         except DataError as error:
             assert "\n" not in str(error)
     path.unlink()
-    with pytest.raises(DataError, match="no such file"):
+    with pytest.raises(UsageError, match="no such file"):
         read(path)

@@ -48,7 +48,7 @@ def write_depth(path: Path, depth_m: np.ndarray, m_per_code: float = 0.001) -> N
 
 
 def read_depth(path: Path) -> np.ndarray:
-    """Depth [H, W], float32, m.  Raises DataError, or UsageError without the package for EXR."""
+    """Depth [H, W], float32, m.  Raises DataError, or UsageError if it is not there or an EXR without the package."""
     read = by_suffix(path, {".npy": _read_npy, ".exr": _read_exr, ".png": _read_depth_png}, "depth")
     depth = as_stored(read(path), 2, path)
     if np.any(depth <= 0):  # (OpenEXR gives zeros for what is damaged)

@@ -51,7 +51,7 @@ def read_flow(path: Path, codes_per_px: int | None = None) -> np.ndarray:
     """Flow [H, W, 2], float32, px.
 
     codes_per_px  of a .png without flow.txt beside it: 64 as KITTI's, 128 as DSEC's
-    Raises DataError, and UsageError for a scale that cannot be.
+    Raises DataError, and UsageError for a file that is not there and a scale that cannot be.
     """
     if codes_per_px is not None and codes_per_px < 1:
         raise UsageError(f"{path}: codes_per_px {codes_per_px} must be at least 1; KITTI has 64, DSEC 128")

@@ -50,9 +50,12 @@ def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarra
 
 
 def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError."""
+    """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError, UsageError if
+    there is no such file."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: no such file; give a file of poses") from error
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise DataError(f"{path} cannot be read: {reason}; give a file of poses") from error

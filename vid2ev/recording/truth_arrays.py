@@ -48,7 +48,7 @@ def as_stored(values: np.ndarray, dimensions: int, path: Path) -> np.ndarray:
 
 
 def read_npz(path: Path, name: str) -> np.ndarray:
-    """An array of an .npz file.  Raises DataError."""
+    """An array of an .npz file.  Raises as `reading` does."""
     with reading(path), open(path, "rb") as file, zipfile.ZipFile(file) as whole:
         held = [member.removesuffix(".npy") for member in whole.namelist()]
         if name not in held:
@@ -69,7 +69,7 @@ def write_png(path: Path, picture: np.ndarray) -> None:
 
 
 def read_png(path: Path) -> np.ndarray:
-    """A picture as `write_png` takes it; transparency is left out.  Raises DataError."""
+    """A picture as `write_png` takes it; transparency is left out.  Raises as `reading` does."""
     import cv2
 
     with reading(path):
@@ -112,12 +112,12 @@ def stated_number(path: Path, name: str) -> float:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Whatever goes wrong with a file within becomes one sentence."""
+    """Whatever goes wrong with a file within becomes one sentence: UsageError if it is not there, else DataError."""
     try:
         yield
-    except DataError:
+    except (DataError, UsageError):
         raise
     except FileNotFoundError as error:
-        raise DataError(f"{path}: no such file; give a file of truth that vid2ev wrote") from error
+        raise UsageError(f"{path}: no such file; give a file of truth that vid2ev wrote") from error
     except Exception as error:  # (numpy, zipfile, zlib and OpenEXR have a dozen of their own)
         raise DataError(f"{path} cannot be read: it is cut short or damaged; get another copy") from error

@@ -46,7 +46,7 @@ def write_mask(path: Path, mask: np.ndarray) -> None:
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """A mask, bool [H, W]: where the picture is not 0.  Raises DataError."""
+    """A mask, bool [H, W]: where the picture is not 0.  Raises DataError, UsageError if there is none."""
     codes = read_png(path)
     if codes.ndim != 2 or codes.dtype != np.uint8:
         raise DataError(f"{path}: a mask has one channel of 8 bits, not {list(codes.shape)} of {codes.dtype}")
@@ -62,5 +62,5 @@ def write_pixel_map(path: Path, pixels: np.ndarray) -> None:
 
 
 def read_pixel_map(path: Path) -> np.ndarray:
-    """Where each pixel is in another camera, float32 [H, W, 2].  Raises DataError."""
+    """Where each pixel is in another camera, float32 [H, W, 2].  Raises DataError, UsageError if there is none."""
     return as_stored(read_npz(path, "pixels"), 3, path)

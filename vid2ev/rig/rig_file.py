@@ -37,8 +37,8 @@ LARGEST = 1 << 18  # bytes; no rig or calibration comes near
 
 
 def read_rig(path: str | Path) -> Rig:
-    """The rig of a file.  Raises DataError for what cannot be read as TOML, UsageError for keys and values that cannot
-    be meant."""
+    """The rig of a file.  Raises DataError for what cannot be read as TOML, UsageError for a file that is not there and
+    for keys and values that cannot be meant."""
     path = Path(path)
     tables = _tables(path)
     unknown = next((key for key in tables if key not in TABLES), None)
@@ -89,13 +89,13 @@ def write_text(path: Path, text: str, overwrite: bool = False) -> None:
 
 
 def read_text(path: Path) -> str:
-    """The text of a small file.  Raises DataError."""
+    """The text of a small file.  Raises UsageError if it is not there, DataError if it cannot be read."""
     try:
         if path.is_file() and path.stat().st_size > LARGEST:
             raise DataError(f"{path}: {path.stat().st_size:,} bytes are too many for a rig or calibration file")
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
-        raise DataError(f"{path}: no such file; `vid2ev init rig.toml` writes a rig file to begin with") from error
+        raise UsageError(f"{path}: no such file; `vid2ev init rig.toml` writes a rig file to begin with") from error
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: not UTF-8 text; give a rig file or a calibration file") from error
     except OSError as error:
@@ -103,15 +103,16 @@ def read_text(path: Path) -> str:
 
 
 def is_rig_file(path: Path) -> bool:
-    """Whether a file is a rig's: by its suffix, or a line [[camera]] or [source].  Raises DataError."""
+    """Whether a file is a rig's: by its suffix, or a line [[camera]] or [source].  Raises as `read_text` does."""
     return (
         path.suffix == ".toml" or re.search(r"^\s*\[(\[camera\]|source)\]", read_text(path), re.MULTILINE) is not None
     )
 
 
 def _tables(path: Path) -> dict[str, Any]:
+    text = read_text(path)
     try:
-        return tomllib.loads(read_text(path))
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # (numbers of thousands of digits are ValueErrors of their own)
         raise DataError(f"{path}: not valid TOML: {str(error).splitlines()[0]}; correct that line") from error
 

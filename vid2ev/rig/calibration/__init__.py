@@ -62,7 +62,8 @@ def read_calibration(path: str | Path, unit: str | None = None) -> Calibration:
     """The cameras of a calibration file or a rig file.
 
     unit  of the translations, of `UNITS_M`, in files that do not say it; left out: m
-    Raises DataError for what is no such file or lacks a key, UsageError for a unit that the file contradicts.
+    Raises DataError for what is no such file or lacks a key, UsageError for a file that is not there and a unit that it
+    contradicts.
     """
     path = Path(path)
     if is_rig_file(path):

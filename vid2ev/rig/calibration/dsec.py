@@ -124,7 +124,7 @@ def _kind(node: Node) -> Kind:
 
 
 def _recognises(tree: Node) -> bool:
-    return "intrinsics" in tree and "extrinsics" in tree and "cam0" in tree["intrinsics"]
+    return "intrinsics" in tree and "cam0" in tree["intrinsics"]
 
 
 FORMAT = CalibrationFormat(

@@ -90,9 +90,8 @@ def _texts(numbers: Sequence[float]) -> list[str]:
 
 def _recognises(tree: Node) -> bool:
     cameras = tree["cameras"].value if "cameras" in tree else None
-    return isinstance(cameras, dict) and any(
-        isinstance(held, dict) and "focalLength" in held for held in cameras.values()
-    )
+    entries = cameras.values() if isinstance(cameras, dict) else []
+    return any(isinstance(held, dict) and ("focalLength" in held or "resolution" in held) for held in entries)
 
 
 FORMAT = CalibrationFormat(

@@ -122,7 +122,7 @@ def four_by_four(pose: Pose) -> list[list[float]]:
 
 
 def _recognises(tree: Node) -> bool:
-    return "cam0" in tree and "intrinsics" in tree["cam0"]
+    return "cam0" in tree and any(key in tree["cam0"] for key in ("intrinsics", "camera_model", "distortion_model"))
 
 
 FORMAT = CalibrationFormat(

@@ -140,7 +140,7 @@ class Node:
 
 
 def read_tree(path: Path) -> Node:
-    """A YAML or JSON file.  Raises DataError for what is neither."""
+    """A YAML or JSON file.  Raises DataError for what is neither, UsageError if there is none."""
     text = read_text(path)
     first, _, rest = text.partition("\n")
     try:
