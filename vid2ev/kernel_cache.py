@@ -19,7 +19,7 @@ from pathlib import Path
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
-_COMPILED = ("physics", "kernels")
+_COMPILED = ("physics", "kernels", "scenes/rays")
 _MARK = uuid.uuid4().hex[:8]
 
 

@@ -30,12 +30,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.pose import IDENTITY, Pose
+
+if TYPE_CHECKING:
+    from vid2ev.scenes.mesh_numbers import MeshNumbers
 
 Colour = tuple[float, float, float]
 Point = tuple[float, float, float]
@@ -118,6 +121,13 @@ class Mesh:
     def size_m(self) -> np.ndarray:
         """The full extents [3]."""
         return np.ptp(self.vertices, axis=0)
+
+    @cached_property
+    def numbers(self) -> MeshNumbers:
+        """The triangles in a hierarchy of boxes, as rays meet them."""
+        from vid2ev.scenes.mesh_numbers import numbers_of
+
+        return numbers_of(self)
 
 
 @dataclass(frozen=True, eq=False)

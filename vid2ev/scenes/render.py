@@ -1,0 +1,73 @@
+"""Pictures of a world: light, depth and what is seen, exact at the centre of each pixel, edges smoothed.
+
+    depth, thing   where the ray through the pixel's centre meets something first
+    light          there, with pictures on surfaces filtered over the pixel; where things, faces or shadows meet
+                   within a pixel or beside it, the light of each weighted with its area in the pixel
+
+A picture is a function of its arguments alone, and light changes smoothly while things move.  What is narrower than
+half a pixel (1 / samples) may be missed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
+from vid2ev.scenes.lens import rays_of_pixels
+from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
+from vid2ev.scenes.snapshot import Snapshot
+from vid2ev.scenes.world_numbers import numbers_of
+
+SAMPLES = 2
+
+
+class Picture(NamedTuple):
+    """What a camera sees.
+
+    light  float32 [H, W, 3], linear, 1.0 a white surface under ambient light of 1.0
+    depth  float32 [H, W], z in the camera's coordinates [m]; +inf where nothing is
+    thing  int32 [H, W], the number of the thing in the snapshot; -1 where nothing is
+    """
+
+    light: np.ndarray
+    depth: np.ndarray
+    thing: np.ndarray
+
+
+def render(
+    snapshot: Snapshot, intrinsics: Intrinsics, pose: Pose, *, samples: int = SAMPLES, threads: int | None = None
+) -> Picture:
+    """The picture of a camera with this pose (camera to world).
+
+    samples  1: one ray for each pixel, jagged edges; n >= 2: pixels at edges are measured in n x n cells
+    threads  all cores if not given; the picture is the same
+    """
+    if not 1 <= samples <= 16:
+        raise UsageError(f"{samples} samples must be 1 (jagged edges) to 16; 2 is usual")
+    width, height = intrinsics.size
+    rays, world = rays_of_pixels(intrinsics), numbers_of(snapshot, pose)
+    light, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+    thing, keys = np.empty((height, width), np.int32), np.empty((height + 2, width + 2), np.int64)
+    _in_bands(lambda first, last: trace_band(world, rays, first, last, light, depth, thing, keys), height + 2, threads)
+    if samples > 1:
+        _in_bands(lambda first, last: smooth_band(world, rays, first, last, samples, light, keys), height + 2, threads)
+    return Picture(light, depth, thing)
+
+
+def _in_bands(work: Callable[[int, int], Any], height: int, threads: int | None) -> None:
+    """Do the work for all bands of rows."""
+    bands = [(first, min(first + TILE, height)) for first in range(0, height, TILE)]
+    threads = min(threads or os.cpu_count() or 1, len(bands))
+    if threads == 1:
+        for band in bands:
+            work(*band)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda band: work(*band), bands))
