@@ -31,15 +31,15 @@ INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
 
 def compiled(function: Callable) -> Any:
     """A kernel: compiled and cached, for Python and other kernels to call."""
-    return _of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function))
+    return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function))
 
 
 def inner(function: Callable) -> Any:
     """A part of kernels, which only they can call."""
-    return _of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))
+    return of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))
 
 
-def _of_plain_types(dispatcher: Any) -> Any:
+def of_plain_types(dispatcher: Any) -> Any:
     template_of = dispatcher.get_call_template
     dispatcher.get_call_template = lambda args, kws: template_of([types.unliteral(arg) for arg in args], kws)
     return dispatcher

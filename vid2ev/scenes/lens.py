@@ -19,7 +19,7 @@ CLOSE_PX = 0.02  # a ray is one if it leads back to its pixel
 
 @lru_cache(maxsize=16)
 def rays_of_pixels(intrinsics: Intrinsics) -> np.ndarray:
-    """float64 [H + 2, W + 2, 2], not to be written to: x, y of the rays through pixel centres, with a margin of 1 px."""
+    """x, y [H + 2, W + 2, 2] of the rays through pixel centres, with a margin of 1 px; not to be written to."""
     width, height = intrinsics.size
     x, y = np.meshgrid(np.arange(-1.0, width + 1), np.arange(-1.0, height + 1))
     rays = rays_of(np.stack([x, y], axis=-1).reshape(-1, 2), intrinsics).reshape(height + 2, width + 2, 2)
@@ -31,7 +31,11 @@ def rays_of(pixels: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
     """x, y [n, 2] of the rays (x, y, 1) through places [n, 2, px] of the picture."""
     pixels = np.asarray(pixels, np.float64)
     straight = (pixels - intrinsics.centre_px) / intrinsics.focal_px
-    if intrinsics.model == "none" or not any(intrinsics.distortion) and intrinsics.model == "radtan" or not len(pixels):
+    if (
+        intrinsics.model == "none"
+        or (not any(intrinsics.distortion) and intrinsics.model == "radtan")
+        or not len(pixels)
+    ):
         return straight
     import cv2
 
@@ -45,7 +49,7 @@ def rays_of(pixels: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
 
 
 def pixels_of(points_m: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
-    """Places [n, 2, px] at which points [n, 3] of the camera's coordinates are seen; NaN for those not in front of it."""
+    """Places [n, 2, px] at which points [n, 3] in the camera's coordinates are seen; NaN for those behind it."""
     points_m = np.asarray(points_m, np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         plane = points_m[:, :2] / points_m[:, 2:]

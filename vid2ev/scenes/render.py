@@ -21,11 +21,13 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.lens import rays_of_pixels
+from vid2ev.scenes.rays.edges import Scratch, scratch_for
 from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world_numbers import numbers_of
 
 SAMPLES = 2
+Work = Callable[[int, int, Scratch], Any]  # on rows first ... last - 1
 
 
 class Picture(NamedTuple):
@@ -55,19 +57,26 @@ def render(
     rays, world = rays_of_pixels(intrinsics), numbers_of(snapshot, pose)
     light, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
     thing, keys = np.empty((height, width), np.int32), np.empty((height + 2, width + 2), np.int64)
-    _in_bands(lambda first, last: trace_band(world, rays, first, last, light, depth, thing, keys), height + 2, threads)
-    if samples > 1:
-        _in_bands(lambda first, last: smooth_band(world, rays, first, last, samples, light, keys), height + 2, threads)
+
+    def trace(first: int, last: int, scratch: Scratch) -> Any:
+        trace_band(world, rays, first, last, light, depth, thing, keys, scratch)
+
+    def smooth(first: int, last: int, scratch: Scratch) -> Any:
+        smooth_band(world, rays, first, last, samples, light, keys, scratch)
+
+    works: list[Work] = [trace, smooth] if samples > 1 else [trace]
+    for work in works:
+        _in_bands(work, height + 2, lambda: scratch_for(len(world.kind), samples), threads)
     return Picture(light, depth, thing)
 
 
-def _in_bands(work: Callable[[int, int], Any], height: int, threads: int | None) -> None:
+def _in_bands(work: Work, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:
     """Do the work for all bands of rows."""
     bands = [(first, min(first + TILE, height)) for first in range(0, height, TILE)]
     threads = min(threads or os.cpu_count() or 1, len(bands))
     if threads == 1:
         for band in bands:
-            work(*band)
+            work(*band, scratch())
         return
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda band: work(*band), bands))
+        list(pool.map(lambda band: work(*band, scratch()), bands))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
         gloss=_rows([(surface.specular, surface.shininess, surface.emission) for surface in surfaces], 3),
         repeat=_rows([surface.repeat for surface in surfaces], 2),
         wraps=_rows([_wraps(thing) for thing in things], 2).astype(np.int64),
-        texture=np.array([numbers.get(_texture(thing), NOTHING) for thing in things], np.int64),
+        texture=np.array([_number(_texture(thing), numbers) for thing in things], np.int64),
         environment=NOTHING if sky is None else numbers[sky],
         to_environment=_to_environment(snapshot, camera),
         environment_gain=float(snapshot.environment_gain),
@@ -69,6 +70,10 @@ def _texture(thing: Thing) -> Texture | None:
     if mesh is None:
         return thing.surface.texture
     return None if mesh.uv is None else thing.surface.texture or mesh.texture
+
+
+def _number(texture: Texture | None, numbers: dict[Texture, int]) -> int:
+    return NOTHING if texture is None else numbers[texture]
 
 
 def _wraps(thing: Thing) -> tuple[bool, bool]:
@@ -102,7 +107,7 @@ def _to_environment(snapshot: Snapshot, camera: Pose) -> np.ndarray:
     return np.array([to_sky @ pose.rotation for pose in (*(thing.pose for thing in snapshot.things), camera)])
 
 
-def _lamps(lamps: Sequence[Lamp], things: Sequence[Thing], camera: Pose) -> dict[str, np.ndarray | int]:
+def _lamps(lamps: Sequence[Lamp], things: Sequence[Thing], camera: Pose) -> dict[str, Any]:
     """The fields of the world that tell of lamps."""
     ambient = sum((np.array(lamp.colour) for lamp in lamps if lamp.kind == "ambient"), np.zeros(3))
     others = [lamp for lamp in lamps if lamp.kind != "ambient"]
@@ -138,6 +143,6 @@ def _atlas(textures: tuple[Texture, ...]) -> tuple[np.ndarray, np.ndarray, np.nd
     counts = [len(one.sizes) for one in sets]
     pictures = np.stack([np.cumsum([0, *counts[:-1]]), counts], axis=1)
     firsts = np.cumsum([0, *(len(one.pixels) for one in sets[:-1])])
-    levels = np.concatenate([one.sizes + [first, 0, 0] for one, first in zip(sets, firsts, strict=True)])
+    levels = np.concatenate([one.sizes + np.array([first, 0, 0]) for one, first in zip(sets, firsts, strict=True)])
     texels = sets[0].pixels if len(sets) == 1 else np.concatenate([one.pixels for one in sets])
     return pictures.astype(np.int64), levels.astype(np.int64), texels

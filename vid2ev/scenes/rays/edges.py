@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.layout import PART, STACK, THING
 from vid2ev.scenes.rays.meet import key_of, meet, meet_thing, row, turned
 from vid2ev.scenes.rays.pixel import light_of, shadows_of
@@ -36,12 +36,11 @@ class Scratch(NamedTuple):
     parts: np.ndarray  # float64 [KEYS, 5]: area, first moments, the place of a corner with that key
 
 
-@inner
-def scratch_for(world, cells):
-    """New scratch."""
+def scratch_for(things: int, cells: int) -> Scratch:
+    """New scratch, for a world of so many things."""
     return Scratch(
         np.empty(STACK, np.int64),
-        np.empty(len(world.kind), np.int64),
+        np.empty(things, np.int64),
         np.empty((cells + 1, cells + 1), np.int64),
         np.empty((cells + 1, cells), np.float64),
         np.empty((cells, cells + 1), np.float64),
@@ -50,11 +49,11 @@ def scratch_for(world, cells):
     )
 
 
-@inner
+@law
 def ray_at(rays, x, y):
     """The ray (x, y, 1) through any place of the picture [px], from those through the centres of its pixels."""
-    column = min(max(int(math.floor(x)) + 1, 0), rays.shape[1] - 2)
-    line = min(max(int(math.floor(y)) + 1, 0), rays.shape[0] - 2)
+    column = min(max(math.floor(x) + 1, 0), rays.shape[1] - 2)
+    line = min(max(math.floor(y) + 1, 0), rays.shape[0] - 2)
     right, low = x + 1.0 - column, y + 1.0 - line
     w00, w01 = (1.0 - right) * (1.0 - low), right * (1.0 - low)
     w10, w11 = (1.0 - right) * low, right * low
@@ -66,7 +65,7 @@ def ray_at(rays, x, y):
     )  # fmt: skip
 
 
-@inner
+@law
 def key_at(world, rays, x, y, count, scratch):
     """The key at any place of the picture."""
     rx, ry = ray_at(rays, x, y)
@@ -74,7 +73,7 @@ def key_at(world, rays, x, y, count, scratch):
     return key_of(world, meeting[0], meeting[2], shadows_of(world, meeting, rx, ry, scratch.stack))
 
 
-@inner
+@law
 def change_between(world, rays, x0, y0, x1, y1, key, count, scratch):
     """The share of the way from one place to another at which the key is no longer that of the first."""
     low, high = 0.0, 1.0
@@ -87,7 +86,7 @@ def change_between(world, rays, x0, y0, x1, y1, key, count, scratch):
     return 0.5 * (low + high)
 
 
-@inner
+@law
 def measure(world, rays, column, line, cells, count, scratch):
     """Fill `keys` and `parts` with what is in a pixel; how many."""
     left, top, size = column - 0.5, line - 0.5, 1.0 / cells
@@ -109,7 +108,7 @@ def measure(world, rays, column, line, cells, count, scratch):
     return found
 
 
-@inner
+@law
 def share_cell(scratch, i, j, x, y, size, found):
     """Add a cell to the parts of its pixel."""
     a, b = scratch.corners[j, i], scratch.corners[j, i + 1]
@@ -132,7 +131,7 @@ def share_cell(scratch, i, j, x, y, size, found):
     return share_side(scratch, d, a, (x, y1), (x, y), (x, left), middle, found)
 
 
-@inner
+@law
 def share_side(scratch, key, next_key, start, end, change, middle, found):
     """Add the triangle between a cell's side and its middle, in two where the key changes."""
     if key == next_key:
@@ -141,7 +140,7 @@ def share_side(scratch, key, next_key, start, end, change, middle, found):
     return add_triangle(scratch, next_key, change, end, middle, end, found)
 
 
-@inner
+@law
 def add_triangle(scratch, key, a, b, c, corner, found):
     """Add a triangle to the part of its key."""
     part = 0
@@ -163,7 +162,7 @@ def add_triangle(scratch, key, a, b, c, corner, found):
     return found
 
 
-@inner
+@law
 def light_of_parts(world, rays, found, across, down, count, scratch):
     """Red, green and blue of a pixel that has been measured."""
     red, green, blue, whole = 0.0, 0.0, 0.0, 0.0
@@ -175,7 +174,7 @@ def light_of_parts(world, rays, found, across, down, count, scratch):
     return red / whole, green / whole, blue / whole
 
 
-@inner
+@law
 def light_of_part(world, rays, part, across, down, count, scratch):
     """The light of a part where its centre is, even if something else is in front there; at its corner if it is not."""
     key, area = scratch.keys[part], scratch.parts[part, AREA]

@@ -21,7 +21,7 @@ DEEP = 40
 
 @compiled
 def build(lows, highs):
-    """The order of triangles with these boxes [n, 3], and nodes: `bounds` [nodes, 6], `links` [nodes, 2] (see layout)."""
+    """The order of triangles with these boxes [n, 3], and the nodes: `bounds` and `links` of `layout.World`."""
     n = len(lows)
     order = np.arange(n)
     bounds, links = np.empty((2 * n, 6)), np.empty((2 * n, 2), np.int32)

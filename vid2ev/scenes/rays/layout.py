@@ -57,7 +57,9 @@ class World(NamedTuple):
     levels: np.ndarray  # int64 [levels, 3]: first texel, width, height
     texels: np.ndarray  # float32 [texels, 3]
     bounds: np.ndarray  # float64 [nodes, 6]: low corner, high corner
-    links: np.ndarray  # int32 [nodes, 2]: a leaf's first triangle and how many; two children's nodes (second below 0: ~node)
+    links: (
+        np.ndarray
+    )  # int32 [nodes, 2]: a leaf's first triangle and how many; two children's nodes (second below 0: ~node)
     corners: np.ndarray  # float64 [triangles, 3, 3]: the first corner, and the ways from it to the two others
     triangle_uv: np.ndarray  # float32 [triangles, 3, 2]
     triangle_normals: np.ndarray  # float32 [triangles, 3, 3]

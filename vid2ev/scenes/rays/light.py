@@ -7,13 +7,13 @@
 n, l, h are unit vectors: normal, towards the lamp, half way between l and the eye.  The environment's light on a normal
 is the average over its half of all directions, weighted by the cosine, in spherical harmonics up to the second order.
 
-Sources: J. F. Blinn, SIGGRAPH 1977; R. Ramamoorthi, P. Hanrahan, "An efficient representation for irradiance environment
-maps", SIGGRAPH 2001 (equation 12).
+Sources: J. F. Blinn, SIGGRAPH 1977; R. Ramamoorthi, P. Hanrahan, "An efficient representation for irradiance
+environment maps", SIGGRAPH 2001 (equation 12).
 """
 
 from __future__ import annotations
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.layout import POINT, SHADOW_BITS
 from vid2ev.scenes.rays.meet import row, turned
 from vid2ev.scenes.rays.surface import dot, unit
@@ -21,7 +21,7 @@ from vid2ev.scenes.rays.surface import dot, unit
 CLOSEST = 1e-4  # of the reach squared
 
 
-@inner
+@law
 def lit(world, thing, p, normal, view, albedo, shadows):
     """The light that a point of a thing sends along `view` (a unit vector towards the eye)."""
     specular, shininess, emission = row(world.gloss, thing)
@@ -45,7 +45,7 @@ def lit(world, thing, p, normal, view, albedo, shadows):
     return albedo[0] * red + gloss_red, albedo[1] * green + gloss_green, albedo[2] * blue + gloss_blue
 
 
-@inner
+@law
 def towards(world, thing, lamp, p):
     """The unit vector towards a lamp, and how strong its light is there."""
     x, y, z = world.lamp[thing, lamp, 0], world.lamp[thing, lamp, 1], world.lamp[thing, lamp, 2]
@@ -56,7 +56,7 @@ def towards(world, thing, lamp, p):
     return unit(way), reach2 / max(dot(way, way), CLOSEST * reach2)
 
 
-@inner
+@law
 def environment_light(world, n):
     """Ambient light on a white surface with this normal, in coordinates of the environment."""
     red, green, blue = row(world.ambient, 0)
@@ -66,7 +66,7 @@ def environment_light(world, n):
     return red, green, blue
 
 
-@inner
+@law
 def irradiance(harmonics, n):
     """The sum of nine harmonics, of which each row has the weights for red, green and blue."""
     x, y, z = n

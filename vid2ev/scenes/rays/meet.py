@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 
-from vid2ev.kernel_compiler import inner
-from vid2ev.scenes.rays.layout import BOX, CYLINDER, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
+from vid2ev.scenes.rays.compiler import law
+from vid2ev.scenes.rays.layout import BOX, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
 from vid2ev.scenes.rays.shapes import meet_box, meet_cylinder, meet_plane, meet_sphere
 from vid2ev.scenes.rays.triangles import meet_mesh
 
 CLEAR = 1e-7  # of the distance: how far above a surface a ray towards a lamp starts
 
 
-@inner
+@law
 def turned(turns, i, x, y, z):
     """A direction in coordinates of the camera, in those of a thing."""
     return (
@@ -26,13 +26,13 @@ def turned(turns, i, x, y, z):
     )
 
 
-@inner
+@law
 def row(values, i):
     """Three numbers of an array [n, 3]."""
     return values[i, 0], values[i, 1], values[i, 2]
 
 
-@inner
+@law
 def meet_thing(world, thing, o, d, nearest, stack):
     """(t, part, b1, b2) of a ray in coordinates of the thing; t infinite if nothing is nearer than `nearest`."""
     kind, half = world.kind[thing], row(world.half, thing)
@@ -49,7 +49,7 @@ def meet_thing(world, thing, o, d, nearest, stack):
     return (t if t < nearest else math.inf), part, 0.0, 0.0
 
 
-@inner
+@law
 def meet(world, things, count, x, y, stack):
     """The meeting of the ray (x, y, 1) with the first `count` of `things`, numbers in order of their nearest point."""
     best, found, part, b1, b2 = math.inf, NOTHING, 0, 0.0, 0.0
@@ -64,7 +64,7 @@ def meet(world, things, count, x, y, stack):
     return found, best, part, b1, b2
 
 
-@inner
+@law
 def key_of(world, thing, part, shadows):
     """The key of a meeting."""
     if thing < 0:
@@ -73,7 +73,7 @@ def key_of(world, thing, part, shadows):
     return thing * THING + smooth * PART + shadows
 
 
-@inner
+@law
 def shadows_at(world, x, y, t, normal, stack):
     """Which lamps are hidden from a point of a thing, as bits; `normal` in coordinates of the camera, towards it."""
     bits = 0
@@ -93,7 +93,7 @@ def shadows_at(world, x, y, t, normal, stack):
     return bits
 
 
-@inner
+@law
 def hidden(world, start, way, limit, stack):
     """Whether a thing is met from a point on a way, in coordinates of the camera, before `limit` times the way."""
     for i in range(len(world.kind)):
@@ -106,7 +106,7 @@ def hidden(world, start, way, limit, stack):
     return False
 
 
-@inner
+@law
 def near_ball(ball, i, start, way, limit):
     """Whether a ray may meet what is within a ball."""
     x, y, z = ball[i, 0] - start[0], ball[i, 1] - start[1], ball[i, 2] - start[2]

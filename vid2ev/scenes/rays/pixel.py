@@ -1,6 +1,6 @@
 """What one ray of a picture sees: the light that comes along it, and the key of what it meets.
 
-The footprint of a pixel on a surface: where the ray turns by (dx, dy) from pixel to pixel, the point that it meets moves by
+The footprint of a pixel on a surface: where the ray turns by dd from pixel to pixel, the point that it meets moves by
 
     dX = t (dd - d (n dd) / (n d))
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.layout import MESH
 from vid2ev.scenes.rays.light import lit
 from vid2ev.scenes.rays.meet import row, shadows_at, turned
@@ -22,7 +22,7 @@ from vid2ev.scenes.rays.triangles import triple
 GRAZING = 1e-9
 
 
-@inner
+@law
 def shadows_of(world, meeting, x, y, stack):
     """Which lamps are hidden from a meeting, as bits."""
     thing, t, part, b1, b2 = meeting
@@ -41,7 +41,7 @@ def shadows_of(world, meeting, x, y, stack):
     return shadows_at(world, x, y, t, back, stack)
 
 
-@inner
+@law
 def light_of(world, meeting, x, y, across, down, shadows):
     """Red, green and blue along the ray (x, y, 1), which turns by `across` and `down` (x, y) from pixel to pixel."""
     thing, t, part, b1, b2 = meeting
@@ -64,7 +64,7 @@ def light_of(world, meeting, x, y, across, down, shadows):
     return lit(world, thing, p, smooth, (-d[0] / length, -d[1] / length, -d[2] / length), albedo, shadows)
 
 
-@inner
+@law
 def colour_on(world, thing, uv, du, dv, normal, d, t, across, down):
     """The colour of a thing's picture within the footprint of a pixel."""
     moved = footprint(normal, d, turned(world.turn, thing, across[0], across[1], 0.0), t)
@@ -78,7 +78,7 @@ def colour_on(world, thing, uv, du, dv, normal, d, t, across, down):
     )  # fmt: skip
 
 
-@inner
+@law
 def footprint(normal, d, turn, t):
     """How the point that a ray meets moves along the surface when the ray turns."""
     facing = dot(normal, d)
@@ -88,7 +88,7 @@ def footprint(normal, d, turn, t):
     return t * (turn[0] - d[0] * along), t * (turn[1] - d[1] * along), t * (turn[2] - d[2] * along)
 
 
-@inner
+@law
 def colour_of_corners(world, triangle, b1, b2):
     """The colour between those of a triangle's corners."""
     c0, c1 = triple(world.triangle_colours, triangle, 0), triple(world.triangle_colours, triangle, 1)
@@ -100,7 +100,7 @@ def colour_of_corners(world, triangle, b1, b2):
     )
 
 
-@inner
+@law
 def background(world, x, y, across, down):
     """The environment in a direction."""
     if world.environment < 0:

@@ -2,21 +2,21 @@
 
     X = o + d t,  t > 0
 
-Each law gives (t, part), t infinite for a miss; part tells apart the faces of a box (-x, +x, -y, +y, -z, +z) and the side
-and ends of a cylinder.  From inside, a ray meets the far side.  Shapes without any extent are met by nothing; nothing
-is NaN.
+Each law gives (t, part), t infinite for a miss; part tells apart the faces of a box (-x, +x, -y, +y, -z, +z) and the
+side and ends of a cylinder.  From inside, a ray meets the far side.  Shapes without any extent are met by nothing;
+nothing is NaN.
 """
 
 from __future__ import annotations
 
 import math
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 
 SIDE, LOW_END, HIGH_END = range(3)
 
 
-@inner
+@law
 def meet_plane(o, d, half):
     """The rectangle |x| <= half x, |y| <= half y in z = 0."""
     if d[2] == 0.0:
@@ -26,7 +26,7 @@ def meet_plane(o, d, half):
     return (t, 0) if inside and t > 0.0 else (math.inf, 0)
 
 
-@inner
+@law
 def slab(o, d, half):
     """When a ray is within |x| <= half of one axis: from, to; from > to if never."""
     if d == 0.0:
@@ -35,7 +35,7 @@ def slab(o, d, half):
     return min(one, other), max(one, other)
 
 
-@inner
+@law
 def meet_box(o, d, half):
     """Slabs, after Kay and Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986."""
     x0, x1 = slab(o[0], d[0], half[0])
@@ -54,7 +54,7 @@ def meet_box(o, d, half):
     return t, 2 * axis + (1 if sign * d[axis] < 0.0 else 0)
 
 
-@inner
+@law
 def roots(a, b, c):
     """The roots of a t^2 + 2 b t + c, the smaller first; infinite and crossed if there are none."""
     disc = b * b - a * c
@@ -66,7 +66,7 @@ def roots(a, b, c):
     return min(q / a, c / q), max(q / a, c / q)
 
 
-@inner
+@law
 def meet_sphere(o, d, half):
     """The ellipsoid with these half axes."""
     if not (half[0] > 0.0 and half[1] > 0.0 and half[2] > 0.0):
@@ -79,7 +79,7 @@ def meet_sphere(o, d, half):
     return (near, 0) if near > 0.0 else (far, 0)
 
 
-@inner
+@law
 def meet_cylinder(o, d, half):
     """The elliptic cylinder along z, with its two ends."""
     if not (half[0] > 0.0 and half[1] > 0.0):

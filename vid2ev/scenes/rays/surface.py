@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.layout import BOX, MESH, PLANE, SPHERE
 from vid2ev.scenes.rays.meet import row
 from vid2ev.scenes.rays.shapes import LOW_END, SIDE
@@ -19,7 +19,7 @@ TURN = 2.0 * math.pi
 POLE = 1e-12  # where a meridian has no direction
 
 
-@inner
+@law
 def place(world, thing, part, b1, b2, p):
     """The surface at a point p of a thing."""
     kind, half = world.kind[thing], row(world.half, thing)
@@ -34,7 +34,7 @@ def place(world, thing, part, b1, b2, p):
     return place_on_cylinder(part, half, p)
 
 
-@inner
+@law
 def place_on_side(normal, along_u, along_v, half, p):
     """A flat side, whose u and v go along axes."""
     du, dv = per_extent(along_u, half), per_extent(along_v, half)
@@ -43,19 +43,19 @@ def place_on_side(normal, along_u, along_v, half, p):
     return normal, (u, v), du, dv
 
 
-@inner
+@law
 def per_extent(axis, half):
     """An axis over the full extents."""
     return ratio(axis[0], 2.0 * half[0]), ratio(axis[1], 2.0 * half[1]), ratio(axis[2], 2.0 * half[2])
 
 
-@inner
+@law
 def ratio(a, b):
     """a / b, and 0 where there is no extent to divide by."""
     return a / b if b > 1e-300 else 0.0
 
 
-@inner
+@law
 def place_on_box(part, half, p):
     """The sides -x, +x, -y, +y, -z, +z."""
     if part == 0:
@@ -71,7 +71,7 @@ def place_on_box(part, half, p):
     return place_on_side((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), half, p)
 
 
-@inner
+@law
 def place_on_sphere(half, p):
     """Longitude and latitude on the unit sphere that is scaled to the ellipsoid."""
     x, y, z = p[0] / half[0], p[1] / half[1], p[2] / half[2]
@@ -80,7 +80,7 @@ def place_on_sphere(half, p):
     return normal, (u, v), (ux / half[0], 0.0, -uz / half[2]), (0.0, vy / half[1], 0.0)
 
 
-@inner
+@law
 def longitude_latitude(x, y, z):
     """(u, v) of a direction of unit length, and du/dx, du/dz, dv/dy."""
     around = max(x * x + z * z, POLE)
@@ -88,7 +88,7 @@ def longitude_latitude(x, y, z):
     return u, v, z / (around * TURN), -x / (around * TURN), 1.0 / (math.pi * math.sqrt(around))
 
 
-@inner
+@law
 def place_on_cylinder(part, half, p):
     """The side, or an end."""
     if part != SIDE:
@@ -102,7 +102,7 @@ def place_on_cylinder(part, half, p):
     return normal, (u, 0.5 + p[2] * down), (y / around / half[0], -x / around / half[1], 0.0), (0.0, 0.0, down)
 
 
-@inner
+@law
 def place_on_mesh(world, triangle, b1, b2):
     """A triangle; its normal is that of its plane (`smooth_normal` has the other)."""
     e1, e2 = triple(world.corners, triangle, 1), triple(world.corners, triangle, 2)
@@ -121,7 +121,7 @@ def place_on_mesh(world, triangle, b1, b2):
     return unit(across), uv, du, dv
 
 
-@inner
+@law
 def smooth_normal(world, triangle, b1, b2, flat):
     """The normal between those of the corners, on the side of the plane's; that one where they cancel out."""
     n0, n1 = triple(world.triangle_normals, triangle, 0), triple(world.triangle_normals, triangle, 1)
@@ -134,19 +134,19 @@ def smooth_normal(world, triangle, b1, b2, flat):
     return unit(mixed) if dot(mixed, flat) > 0.0 else flat
 
 
-@inner
+@law
 def cross(a, b):
     """a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inner
+@law
 def dot(a, b):
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inner
+@law
 def unit(a):
     """a of length 1; what has no length faces the front."""
     length = math.sqrt(dot(a, a))

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.scenes.rays.compiler import law
 
 SLACK = 1e-12  # of b1, b2: no ray slips between two triangles
 
 
-@inner
+@law
 def meet_mesh(world, root, o, d, nearest, stack):
     """(t, triangle, b1, b2), t infinite if nothing is nearer than `nearest`; `stack` is int64 [STACK] to work in."""
     way = inverse(d[0]), inverse(d[1]), inverse(d[2])
@@ -47,13 +47,13 @@ def meet_mesh(world, root, o, d, nearest, stack):
     return (best if found >= 0 else math.inf), found, b1, b2
 
 
-@inner
+@law
 def inverse(d):
     """1 / d, and a number too large to matter, but not infinite, where d is 0."""
     return 1.0 / d if abs(d) > 1e-300 else 1e300
 
 
-@inner
+@law
 def enters(bounds, node, o, way, nearest):
     """When a ray enters a box; infinite if it does not before `nearest`."""
     x0, x1 = (bounds[node, 0] - o[0]) * way[0], (bounds[node, 3] - o[0]) * way[0]
@@ -65,7 +65,7 @@ def enters(bounds, node, o, way, nearest):
     return near if near <= far + 1e-12 * abs(far) and far >= 0.0 and near <= nearest else math.inf
 
 
-@inner
+@law
 def meet_triangle(corners, triangle, o, d):
     """(t, b1, b2), t infinite for a miss."""
     e1x, e1y, e1z = triple(corners, triangle, 1)
@@ -84,7 +84,7 @@ def meet_triangle(corners, triangle, o, d):
     return (t, b1, b2) if inside else (math.inf, 0.0, 0.0)
 
 
-@inner
+@law
 def triple(values, i, j):
     """Three numbers of an array [n, 3, 3]."""
     return values[i, j, 0], values[i, j, 1], values[i, j, 2]

@@ -8,26 +8,22 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.scenes.rays.edges import light_of_parts, measure, scratch_for
-from vid2ev.scenes.rays.layout import STACK
+from vid2ev.scenes.rays.compiler import law, walk
+from vid2ev.scenes.rays.edges import light_of_parts, measure
 from vid2ev.scenes.rays.meet import key_of, meet
 from vid2ev.scenes.rays.pixel import light_of, shadows_of
 
 TILE = 16
 
 
-@compiled
-def trace_band(world, rays, first, last, light, depth, thing, keys):
+@walk
+def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
     """Light, depth, thing and key at the centres of the rows first ... last - 1 of `rays` (the margin is row 0).
 
     rays   float64 [H + 2, W + 2, 2]: (x, y) of the rays (x, y, 1) through the centres of the pixels and of a margin
     light  float32 [H, W, 3]; depth float32 [H, W]; thing int32 [H, W]; keys int64 [H + 2, W + 2]
     """
     height, width = rays.shape[0], rays.shape[1]
-    scratch = scratch_for(world, 1)
     for left in range(0, width, TILE):
         right = min(left + TILE, width)
         count = things_in_tile(world, rays, first, last, left, right, scratch.things)
@@ -47,11 +43,10 @@ def trace_band(world, rays, first, last, light, depth, thing, keys):
                     thing[line - 1, column - 1] = meeting[0]
 
 
-@compiled
-def smooth_band(world, rays, first, last, cells, light, keys):
+@walk
+def smooth_band(world, rays, first, last, cells, light, keys, scratch):
     """Light anew where the keys of rows first ... last - 1 differ from a neighbour's; each pixel is cut into cells."""
     height, width = rays.shape[0], rays.shape[1]
-    scratch = scratch_for(world, cells)
     for left in range(0, width, TILE):
         right, count = min(left + TILE, width), -1
         for line in range(max(first, 1), min(last, height - 1)):
@@ -67,16 +62,15 @@ def smooth_band(world, rays, first, last, cells, light, keys):
                     light[line - 1, column - 1, 2] = b
 
 
-@compiled
-def cast(world, rays, depth, thing):
+@walk
+def cast(world, rays, depth, thing, scratch):
     """Depth and thing of single rays [n, 2]."""
-    stack = np.empty(STACK, np.int64)
     for k in range(len(rays)):
-        meeting = meet(world, world.order, len(world.order), rays[k, 0], rays[k, 1], stack)
+        meeting = meet(world, world.order, len(world.order), rays[k, 0], rays[k, 1], scratch.stack)
         depth[k], thing[k] = meeting[1], meeting[0]
 
 
-@inner
+@law
 def differs(keys, line, column):
     """Whether any of the eight neighbours has another key."""
     key, same = keys[line, column], True
@@ -86,7 +80,7 @@ def differs(keys, line, column):
     return not same
 
 
-@inner
+@law
 def steps(rays, line, column):
     """How a ray turns from pixel to pixel, across and down."""
     return (
@@ -98,7 +92,7 @@ def steps(rays, line, column):
     )
 
 
-@inner
+@law
 def things_in_tile(world, rays, first, last, left, right, things):
     """Put the things that a tile may see into `things`, the nearest first; how many."""
     ax, ay, az, widest = cone(rays, first, last, left, right)
@@ -117,7 +111,7 @@ def things_in_tile(world, rays, first, last, left, right, things):
     return count
 
 
-@inner
+@law
 def cone(rays, first, last, left, right):
     """The middle of a tile's rays, a unit vector, and the angle within which they are, with half a pixel around."""
     x, y, z, widest = 0.0, 0.0, 0.0, 0.0
