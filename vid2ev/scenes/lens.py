@@ -30,13 +30,8 @@ def rays_of_pixels(intrinsics: Intrinsics) -> np.ndarray:
 def rays_of(pixels: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
     """x, y [n, 2] of the rays (x, y, 1) through places [n, 2, px] of the picture."""
     pixels = np.asarray(pixels, np.float64)
-    straight = (pixels - intrinsics.centre_px) / intrinsics.focal_px
-    if (
-        intrinsics.model == "none"
-        or (not any(intrinsics.distortion) and intrinsics.model == "radtan")
-        or not len(pixels)
-    ):
-        return straight
+    if intrinsics.model == "none" or not len(pixels):
+        return (pixels - intrinsics.centre_px) / intrinsics.focal_px
     import cv2
 
     matrix, distortion = intrinsics.matrix, np.array(intrinsics.distortion)

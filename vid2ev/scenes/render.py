@@ -72,11 +72,15 @@ def render(
 
 def _in_bands(work: Work, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:
     """Do the work for all bands of rows."""
-    bands = [(first, min(first + TILE, height)) for first in range(0, height, TILE)]
-    threads = min(threads or os.cpu_count() or 1, len(bands))
+
+    def band(first: int) -> None:
+        work(first, min(first + TILE, height), scratch())
+
+    firsts = range(0, height, TILE)
+    threads = min(threads or os.cpu_count() or 1, len(firsts))
     if threads == 1:
-        for band in bands:
-            work(*band, scratch())
+        for first in firsts:
+            band(first)
         return
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda band: work(*band, scratch()), bands))
+        list(pool.map(band, firsts))
