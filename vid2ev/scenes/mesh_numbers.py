@@ -38,7 +38,7 @@ def numbers_of(mesh: Mesh) -> MeshNumbers:
         _at_corners(mesh.uv, triangles, np.zeros((n, 3, 2))),
         _at_corners(mesh.normals, triangles, np.repeat(flat[:, None], 3, axis=1)),
         _at_corners(mesh.colours, triangles, np.ones((n, 3, 3))),
-        _planes(flat, spots) if mesh.normals is None else np.zeros(n, np.int32),
+        _planes(flat, spots) if mesh.normals is None else _smooth_parts(mesh.vertices, mesh.normals, triangles),
     )
 
 
@@ -68,6 +68,21 @@ def _planes(flat: np.ndarray, spots: np.ndarray) -> np.ndarray:
     size = max(float(np.ptp(spots)), 1e-300)
     plane = np.column_stack([flat, np.einsum("ij,ij->i", flat, spots[:, 0]) / size])
     return np.unique(np.round(plane, 6), axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
+
+
+def _smooth_parts(vertices: np.ndarray, normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """One number for all triangles that lead to each other over corners with the same place and normal."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    _, number = np.unique(np.column_stack([vertices, np.round(normals, 4)]), axis=0, return_inverse=True)
+    a, b, c = number.reshape(-1)[triangles].T
+    ways = np.concatenate([a, b]), np.concatenate([b, c])
+    count = int(number.max()) + 1
+    _, label = connected_components(
+        coo_array((np.ones(2 * len(a), np.int8), ways), shape=(count, count)), directed=False
+    )
+    return label[a].astype(np.int32)
 
 
 _NONE = MeshNumbers(

@@ -123,6 +123,12 @@ class Mesh:
         return np.ptp(self.vertices, axis=0)
 
     @cached_property
+    def ball(self) -> tuple[np.ndarray, float]:
+        """The centre [3] and radius of a ball around it."""
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        return (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+
+    @cached_property
     def numbers(self) -> MeshNumbers:
         """The triangles in a hierarchy of boxes, as rays meet them."""
         from vid2ev.scenes.mesh_numbers import numbers_of

@@ -70,7 +70,7 @@ def key_at(world, rays, x, y, count, scratch):
     """The key at any place of the picture."""
     rx, ry = ray_at(rays, x, y)
     meeting = meet(world, scratch.things, count, rx, ry, scratch.stack)
-    return key_of(world, meeting[0], meeting[2], shadows_of(world, meeting, rx, ry, scratch.stack))
+    return key_of(world, meeting[0], meeting[1], meeting[2], shadows_of(world, meeting, rx, ry, scratch.stack))
 
 
 @law
@@ -185,7 +185,7 @@ def light_of_part(world, rays, part, across, down, count, scratch):
     eye, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
     t, face, b1, b2 = meet_thing(world, thing, eye, d, math.inf, scratch.stack)
     meeting = thing, t, face, b1, b2
-    if not (t < math.inf and key_of(world, thing, face, shadows) == key):
+    if not (t < math.inf and key_of(world, thing, t, face, shadows) == key):
         x, y = ray_at(rays, scratch.parts[part, AT_X], scratch.parts[part, AT_Y])
         meeting = meet(world, scratch.things, count, x, y, scratch.stack)
     return light_of(world, meeting, x, y, across, down, shadows)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import BOX, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
+from vid2ev.scenes.rays.layout import BOX, LAYERS, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
 from vid2ev.scenes.rays.shapes import meet_box, meet_cylinder, meet_plane, meet_sphere
 from vid2ev.scenes.rays.triangles import meet_mesh
 
@@ -65,12 +65,13 @@ def meet(world, things, count, x, y, stack):
 
 
 @law
-def key_of(world, thing, part, shadows):
+def key_of(world, thing, t, part, shadows):
     """The key of a meeting."""
     if thing < 0:
         return -1
-    smooth = world.triangle_part[part] if world.kind[thing] == MESH else part
-    return thing * THING + smooth * PART + shadows
+    if world.kind[thing] == MESH:
+        part = world.triangle_part[part] * LAYERS + int(t / world.layer[thing]) % LAYERS
+    return thing * THING + part * PART + shadows
 
 
 @law

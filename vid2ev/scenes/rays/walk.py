@@ -32,7 +32,7 @@ def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
                 x, y = rays[line, column, 0], rays[line, column, 1]
                 meeting = meet(world, scratch.things, count, x, y, scratch.stack)
                 shadows = shadows_of(world, meeting, x, y, scratch.stack)
-                keys[line, column] = key_of(world, meeting[0], meeting[2], shadows)
+                keys[line, column] = key_of(world, meeting[0], meeting[1], meeting[2], shadows)
                 if 0 < line < height - 1 and 0 < column < width - 1:
                     across, down = steps(rays, line, column)
                     r, g, b = light_of(world, meeting, x, y, across, down, shadows)
