@@ -1,0 +1,85 @@
+"""What is wrong with a scene file, in one sentence: the file, the key, the value, what is possible."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import reprlib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+TAGS = ("fixed", "straight", "spin", "orbit", "keyframes", "shake", "look-at", "str", "Pattern")  # of unions
+
+
+def sentence(error: ValidationError, tables: Mapping[str, Any], name: str, scene: type[BaseModel]) -> str:
+    """The first of pydantic's complaints about the tables of a file."""
+    complaints = error.errors()
+    # (of a value that may be several things, the complaint that went deepest knows best what was meant)
+    first = complaints[0]["loc"][:3]
+    complaint = max((c for c in complaints if c["loc"][:3] == first), key=lambda c: len(c["loc"]))
+    path = _path(complaint["loc"], tables)
+    kind, value = complaint["type"], reprlib.repr(complaint["input"])
+    if kind == "extra_forbidden":
+        hint = nearest(path.rpartition(".")[2], all_keys(scene))
+        return f"{name}: key '{path}' is unknown{hint}"
+    if kind == "missing":
+        return f"{name}: {path} is missing; give it a value"
+    if kind == "union_tag_not_found":
+        return f"{name}: {path} has no kind; give it one of {_tags(complaint)}"
+    if kind == "union_tag_invalid":
+        tag = complaint.get("ctx", {}).get("tag")
+        return f"{name}: {path}.kind = {tag!r} is impossible: it must be one of {_tags(complaint)}"
+    if isinstance(complaint["input"], dict):
+        return f"{name}: {path}: {plain(complaint['msg'])}"
+    return f"{name}: {path} = {value} is impossible: {plain(complaint['msg'])}"
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """A word that may have been meant, in brackets."""
+    close = difflib.get_close_matches(word, list(words), n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def plain(message: str) -> str:
+    """Pydantic's message as a clause within a sentence."""
+    message = message.removeprefix("Value error, ").rstrip(".").replace("\n", " ")
+    message = re.sub(r", (unable|got) .*", "", message)
+    message = re.sub(r"Input should be a valid tuple", "it must be a list", message)
+    message = re.sub(r"^Tuple should have at (least|most) (\d+) items?.*", r"it must have at \1 \2 entries", message)
+    return re.sub(r"^Input should (be|have)", r"it must \1", message).replace("valid dictionary", "table")
+
+
+@cache
+def all_keys(scene: type[BaseModel]) -> frozenset[str]:
+    """The keys of all tables of a scene file."""
+    from vid2ev.scenes.part import Part
+
+    parts, found = [Part], set(scene.model_fields)
+    while parts:
+        part = parts.pop()
+        found |= set(part.model_fields)
+        parts += part.__subclasses__()
+    return frozenset(found | {"count"})
+
+
+def _path(loc: tuple[int | str, ...], tables: Any) -> str:
+    """Where in the file: entries of lists by their names, if they have some."""
+    words: list[str] = []
+    node: Any = tables
+    for step in loc:
+        if isinstance(node, list) and isinstance(step, int):
+            node = node[step] if step < len(node) else None
+            words.append(str(node["name"]) if isinstance(node, Mapping) and "name" in node else str(step))
+        elif isinstance(node, Mapping) and step in node:
+            node = node[step]
+            words.append(str(step))
+        elif not isinstance(step, str) or (step not in TAGS and not step.startswith("function-")):
+            words.append(str(step))
+    return ".".join(words) or "the file"
+
+
+def _tags(complaint: Any) -> str:
+    return str(complaint.get("ctx", {}).get("expected_tags", ", ".join(TAGS[:7]))).replace("'", "")

@@ -1,0 +1,199 @@
+"""Scene files by name: the predefined ones, a person's own TOML file, and `key=value` on top of either.
+
+A key is the way to it: `scene.duration_s` or just `duration_s`, `camera.fov_deg`, `objects.NAME.count`,
+`lights.NAME.flicker.frequency_hz`.  A value is written as in TOML, ranges too; a bare word is a string.
+"""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.scenes.complaints import nearest, sentence
+from vid2ev.scenes.ranges import Chance, chance_of, drawn, extremes, is_range
+from vid2ev.scenes.scene import Scene
+from vid2ev.scenes.textures import ANY, IN_COLOUR, PHOTOGRAPHS
+
+PREDEFINED = Path(__file__).with_name("predefined")
+LISTS = ("objects", "lights")
+MOST = 1000  # of anything that has a count
+LARGEST_SEED = (1 << 63) - 1
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file as read, with its ranges; `name` is what it was found by."""
+
+    name: str
+    path: Path
+    tables: Mapping[str, Any]
+
+    def resolved(self, seed: int = 0) -> Scene:
+        """The scene of a seed, every number settled.  Raises UsageError if there can be none."""
+        if not 0 <= seed <= LARGEST_SEED:
+            raise UsageError(f"{self.name}: seed {seed}, expected a whole number from 0 to 2**63 - 1")
+        return self._scene(chance_of(seed))
+
+    def check(self) -> None:
+        """Draw all ranges at both their ends, and every choice.  Raises UsageError for what is impossible there."""
+        for chance in extremes(self.tables):
+            self._scene(chance)
+
+    def title(self) -> str:
+        """What the file says it is, on one line."""
+        about = self.tables.get("about")
+        return str(about.get("title", "")) if isinstance(about, Mapping) else ""
+
+    def _scene(self, chance: Chance) -> Scene:
+        try:
+            tables = {
+                name: list(self._things(name, table, chance)) if name in LISTS else drawn(table, chance, name)
+                for name, table in self.tables.items()
+            }
+        except UsageError as error:
+            raise UsageError(f"{self.name}: {error}") from error
+        self._find_files(tables, chance)
+        try:
+            return Scene.model_validate(_frozen(tables))
+        except ValidationError as error:
+            raise UsageError(sentence(error, tables, self.name, Scene)) from error
+
+    def _things(self, kind: str, things: Any, chance: Chance) -> Iterator[Any]:
+        """Each of a list of objects or lights, as often as its count says."""
+        if not isinstance(things, list) or not all(isinstance(thing, Mapping) for thing in things):
+            raise UsageError(f"{kind} = {things!r}: expected tables, each under a line [[{kind}]]")
+        for index, thing in enumerate(things):
+            name = thing.get("name", f"{thing.get('kind', kind)}-{index}")
+            path = f"{kind}.{name}"
+            content = {key: value for key, value in thing.items() if key not in ("count", "name")}
+            count = drawn(thing["count"], chance, f"{path}.count") if "count" in thing else 1
+            if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MOST:
+                raise UsageError(f"{path}.count = {count!r}: expected a whole number from 0 to {MOST}")
+            for k in range(count):
+                numbered = f"{name}-{k + 1}" if "count" in thing else name
+                yield {"name": numbered} | drawn(content, chance, f"{path}#{k}", (k, count))
+
+    def _find_files(self, tables: dict[str, Any], chance: Chance) -> None:
+        """Make names of files those of this folder; of a folder of photographs, one is drawn."""
+        for kind in LISTS:
+            for thing in tables.get(kind, []):
+                for key in ("texture", "file"):
+                    if isinstance(thing.get(key), str):
+                        thing[key] = self._found(thing[key], chance, f"{kind}.{thing['name']}.{key}")
+        setting = tables.get("scene")
+        for key in ("environment", "rig"):
+            if isinstance(setting, dict) and isinstance(setting.get(key), str):
+                setting[key] = self._found(setting[key], chance, f"scene.{key}")
+
+    def _found(self, text: str, chance: Chance, path: str) -> str:
+        if text in PHOTOGRAPHS:
+            return text
+        if text == ANY:
+            return IN_COLOUR[int(chance(f"{path}.any") * len(IN_COLOUR))]
+        file = (self.path.parent / text).absolute()
+        if file.is_dir() and path.endswith(("texture", "environment")):
+            return str(_one_of(file, chance(f"{path}.any"), f"{self.name}: {path}"))
+        if not file.is_file():
+            names = f"; photographs that come along are {', '.join(PHOTOGRAPHS)}" if "texture" in path else ""
+            hint = nearest(text, [*PHOTOGRAPHS, ANY]) if names else ""
+            raise UsageError(f"{self.name}: {path} = '{text}'{hint}: no such file{names}")
+        return str(file)
+
+
+def _frozen(node: Any) -> Any:
+    """A tree with tuples in the place of lists."""
+    if isinstance(node, Mapping):
+        return {key: _frozen(value) for key, value in node.items()}
+    return tuple(map(_frozen, node)) if isinstance(node, list) else node
+
+
+def _one_of(folder: Path, u: float, where: str) -> Path:
+    from vid2ev.light.recognise import PICTURE_SUFFIXES
+
+    found = sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != ".")
+    if not found:
+        raise UsageError(f"{where}: no pictures in {folder}; expected {', '.join(PICTURE_SUFFIXES)}")
+    return found[int(u * len(found))]
+
+
+def scene_names() -> list[str]:
+    """The names of the predefined scenes."""
+    return sorted(path.stem for path in PREDEFINED.glob("*.toml"))
+
+
+def read_scene(name_or_path: str | Path, settings: Sequence[str] = ()) -> SceneFile:
+    """A scene file, changed by `key=value` texts, and checked at the ends of all its ranges.
+
+    Raises UsageError for an unknown scene or key and for a value that cannot be, DataError for a file that is no TOML.
+    """
+    name, path = _find(str(name_or_path))
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"scene {path} cannot be read ({error.strerror}); give a readable TOML file") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"scene {path} cannot be read (it is not UTF-8 text); give a TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"scene {path} is not valid TOML: {error}; correct that line") from error
+    for text in settings:
+        tables = changed(tables, text, name)
+    file = SceneFile(name, path, tables)
+    file.check()
+    return file
+
+
+def changed(tables: Mapping[str, Any], setting: str, name: str) -> dict[str, Any]:
+    """The tables with one `key=value` set.  Raises UsageError."""
+    key, equals, value = (part.strip() for part in setting.partition("="))
+    if not equals or not key or not value:
+        raise UsageError(f"setting '{setting}' is not of the form key=value; write for example duration_s=1")
+    steps = key.split(".") if "." in key else ["scene", key]
+    whole = copy.deepcopy(dict(tables))
+    node: Any = whole
+    for depth, step in enumerate(steps[:-1]):
+        node = _entered(node, step, steps[:depth], f"{name}: setting '{setting}'")
+    if not isinstance(node, dict) or is_range(node):
+        raise UsageError(f"{name}: setting '{setting}': {'.'.join(steps[:-1])} is no table; set it as a whole")
+    node[steps[-1]] = _parsed(value)
+    return whole
+
+
+def _entered(node: Any, step: str, before: Sequence[str], where: str) -> Any:
+    """The table below a step of a key; tables that are not there yet are made, things that are not there are not."""
+    if isinstance(node, list):
+        names = [str(thing.get("name", k)) if isinstance(thing, dict) else str(k) for k, thing in enumerate(node)]
+        if step in names:
+            return node[names.index(step)]
+        raise UsageError(f"{where}: no '{step}'{nearest(step, names)}; {'.'.join(before)} are {', '.join(names)}")
+    if not isinstance(node, dict):
+        raise UsageError(f"{where}: {'.'.join(before)} is no table; set it as a whole")
+    return node.setdefault(step, [] if not before and step in LISTS else {})
+
+
+def _parsed(text: str) -> Any:
+    """A TOML value, or the text itself."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return parsed["value"] if list(parsed) == ["value"] else text
+
+
+def _find(name_or_path: str) -> tuple[str, Path]:
+    names = scene_names()
+    if name_or_path in names:
+        return name_or_path, PREDEFINED / f"{name_or_path}.toml"
+    path = Path(name_or_path)
+    if path.is_file():
+        return str(path), path
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        raise UsageError(f"scene file {path} does not exist; give an existing TOML file or one of {', '.join(names)}")
+    hint = nearest(name_or_path, names)
+    raise UsageError(f"scene '{name_or_path}' is unknown{hint}; scenes are {', '.join(names)}, or give a TOML file")

@@ -1,0 +1,44 @@
+"""Tables as TOML text, which `tomllib` reads back as they were.
+
+Lists of tables become [[headings]], tables within them stand on their line.  Source: TOML 1.0.0, toml.io.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """The text of a file: each value of `tables` is a table, or a list of tables."""
+    blocks = []
+    for name, table in tables.items():
+        heading = f"[[{_key(name)}]]" if isinstance(table, list) else f"[{_key(name)}]"
+        for one in table if isinstance(table, list) else [table]:
+            lines = [f"{_key(key)} = {_value(value)}" for key, value in one.items() if value is not None]
+            blocks.append("\n".join([heading, *lines]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        inside = ", ".join(f"{_key(key)} = {_value(child)}" for key, child in value.items() if child is not None)
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_value(child) for child in value)}]"
+    if isinstance(value, str):
+        return _string(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _string(key)
+
+
+def _string(text: str) -> str:
+    """Strings of TOML are those of JSON, but for the sign DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
