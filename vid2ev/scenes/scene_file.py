@@ -7,6 +7,7 @@ A key is the way to it: `scene.duration_s` or just `duration_s`, `camera.fov_deg
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -163,6 +164,12 @@ def changed(tables: Mapping[str, Any], setting: str, name: str) -> dict[str, Any
         raise UsageError(f"{name}: setting '{setting}': {'.'.join(steps[:-1])} is no table; set it as a whole")
     node[steps[-1]] = _parsed(value)
     return whole
+
+
+def plain_size(setting: str) -> str:
+    """`size=640x480` as the setting of the camera that it means."""
+    said = re.fullmatch(r"\s*(?:camera\.)?size\s*=\s*(\d{1,6})x(\d{1,6})\s*", setting)
+    return f"camera.size=[{said[1]}, {said[2]}]" if said else setting
 
 
 def _entered(node: Any, step: str, before: Sequence[str], where: str) -> Any:

@@ -1,5 +1,5 @@
-"""Where frames come from: videos, images, arrays, a photograph in motion, a camera, synthetic clips; all linear light
-with exact times.
+"""Where frames come from: videos, images, arrays, a photograph in motion, a camera, synthetic clips, rendered scenes;
+all linear light with exact times.
 
     source -> cut (start, stop) -> slowed -> cropped, brought to a size
 
@@ -18,7 +18,7 @@ from vid2ev.stream.frames import Colour, Frame
 
 __all__ = ["OPTIONS", "Source", "open_source"]
 
-SYNTHETIC_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "camera:", "-"
+SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "scene:", "camera:", "-"
 OPTIONS = ("transfer", "fps", "colour", "slowdown", "start", "stop", "crop", "size", "motion")  # of `open_source`
 
 
@@ -68,8 +68,8 @@ def open_source(
     size: str | None = None,
     motion: str | None = None,
 ) -> Source:
-    """The source behind a path: a folder of images, a TIFF with pages, a .npy or .npz, `synthetic:NAME`, `-` for
-    standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
+    """The source behind a path: a folder of images, a TIFF with pages, a .npy or .npz, `synthetic:NAME`, `scene:NAME`
+    or a scene file, `-` for standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
 
     transfer     what codes mean: "srgb", "bt709", "pq", "hlg", "linear", "gamma:G" and others; "auto" is the tag of a
                  video, BT.709 without one, sRGB for images, linear light for floating point, and a refusal for integer
@@ -110,6 +110,8 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
     """The source of a name, unedited."""
     if name.startswith(SYNTHETIC_PREFIX):
         return _synthetic(name, transfer, fps, colour)
+    if name.startswith(SCENE_PREFIX) or _is_scene_file(name):
+        return _scene(name.removeprefix(SCENE_PREFIX), transfer, fps, colour)
     if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
         from vid2ev.sources.live import open_camera, open_standard_input
         from vid2ev.sources.video import Video
@@ -172,6 +174,19 @@ def _synthetic(text: str, transfer: str, fps: float | Fraction | None, colour: C
     name = text.removeprefix(SYNTHETIC_PREFIX)
     clip = parse_synthetic(name if fps is None else f"{name},fps={float(fps)}")
     return clip if colour == "luminance" else Grey(clip)
+
+
+def _scene(text: str, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
+    from vid2ev.scenes.source import open_scene
+
+    if transfer not in ("auto", "linear"):
+        raise UsageError(f"{text}: transfer '{transfer}' for light that is linear already; leave it out")
+    return open_scene(text, fps=fps, colour=colour)
+
+
+def _is_scene_file(name: str) -> bool:
+    """Whether this is a text of TOML: nothing else that can be read has this suffix."""
+    return name.endswith(".toml") and Path(name).is_file()
 
 
 def _existing(path: Path) -> Path:

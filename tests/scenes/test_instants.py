@@ -1,0 +1,97 @@
+"""Instants: little changes from one to the next, and each is found without the others."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vid2ev.errors import UsageError
+from vid2ev.scenes.instants import Instants
+from vid2ev.scenes.world import World
+
+SMALL = ["camera.size=[96, 72]", "duration_s=0.25", "min_fps=1"]
+STILL = (
+    '[[objects]]\nname = "wall"\nkind = "plane"\nsize_m = 9\ntrajectory = { kind = "fixed", position_m = [0, 0, 2] }\n'
+)
+
+
+@pytest.mark.parametrize("name", ["flying-shapes", "spinning-shapes", "parallax", "room", "close-object"])
+def test_nothing_moves_farther_than_was_asked_for(name: str) -> None:
+    world = World.of(name, 1, [*SMALL, "max_shift_px=0.4"])
+    instants = Instants(world)
+    times = [instants[k] for k in range(len(instants))]
+    assert times[0] == 0 and times[-1] == world.duration_ns
+    assert min(later - earlier for earlier, later in pairwise(times)) > 0
+    largest = 0.0
+    for k in range(0, len(times) - 1, max(1, len(times) // 8)):
+        shift, seen = world.flow(times[k], times[k + 1], world.render(times[k]))
+        largest = max(largest, float(np.nanmax(np.where(seen, np.hypot(shift[..., 0], shift[..., 1]), 0))))
+    assert 0.1 < largest <= 0.42
+
+
+def test_light_is_sampled_as_densely_as_it_flickers() -> None:
+    world = World.of("flicker", 3, SMALL)
+    fastest = max(light.flicker.frequency_hz for light in world.scene.lights if light.flicker)
+    instants = Instants(world)
+    steps = np.diff([instants[k] for k in range(len(instants))])
+    assert steps.max() * 1e-9 <= 1 / (32 * fastest)
+    assert steps.max() * 1e-9 > 1 / (200 * fastest)
+
+
+def test_lamps_change_light_in_small_steps() -> None:
+    world = World.of("specular", 0, SMALL)
+    instants = Instants(world)
+    light = [world.render(instants[k]).light.max(axis=-1) for k in range(4)]
+    steps = [np.abs(np.log((after + 0.01) / (before + 0.01))) for before, after in pairwise(light)]
+    assert 0.001 < np.max(steps) < 0.3  # (highlights between the pixels of the grid may be a little faster)
+
+
+def test_nothing_happens_at_the_least_rate(tmp_path: Path) -> None:
+    file = tmp_path / "still.toml"
+    file.write_text(f"[scene]\nduration_s = 2\nmin_fps = 10\n{STILL}")
+    instants = Instants(World.of(file))
+    assert [instants[k] for k in range(len(instants))] == [k * 10**8 for k in range(21)]
+
+
+def test_what_is_too_fast_is_limited(tmp_path: Path) -> None:
+    file = tmp_path / "fast.toml"
+    file.write_text(
+        f"[scene]\nduration_s = 0.1\nmax_fps = 1000\n{STILL}"
+        '[[objects]]\nname = "disc"\nkind = "box"\ntrajectory = [{ kind = "fixed", position_m = [0, 0, 2] },'
+        '{ kind = "spin", rate_deg_s = 9000 }]\n'
+    )
+    instants = Instants(World.of(file))
+    assert len(instants) == 101 and instants.fastest_hz == 1000
+
+
+@pytest.mark.parametrize("fps", [None, 30, 240])
+def test_the_first_instant_after_another_is_found(fps: float | None) -> None:
+    instants = Instants(World.of("parallax", 0, SMALL), fps)
+    times = [instants[k] for k in range(len(instants))]
+    for t_ns in (-5, 0, 1, times[3], times[3] + 1, times[-1], times[-1] + 1):
+        assert instants.first_from(t_ns) == int(np.searchsorted(times, t_ns))
+    if fps:
+        assert times == [round(k * 10**9 / fps) for k in range(len(times))] and times[-1] <= 250_000_000
+    with pytest.raises(IndexError):
+        instants[len(instants)]
+
+
+def test_small_things_between_the_pixels_of_the_grid_count(tmp_path: Path) -> None:
+    file = tmp_path / "fly.toml"
+    file.write_text(
+        f"[scene]\nduration_s = 0.1\nmin_fps = 1\n[camera]\nsize = [640, 480]\nfocal_px = [500, 500]\n{STILL}"
+        '[[objects]]\nname = "fly"\nkind = "sphere"\nsize_m = 0.006\n'
+        'trajectory = { kind = "straight", position_m = [0, 0.003, 1], velocity_m_s = [1, 0, 0] }\n'
+    )
+    instants = Instants(World.of(file))
+    assert (len(instants) - 1) / 0.1 == pytest.approx(1.15 * 500 / 0.5, rel=0.03)
+
+
+def test_rates_that_cannot_be_meant_are_refused() -> None:
+    world = World.of("parallax", 0, SMALL)
+    for fps in (0, -1, float("nan")):
+        with pytest.raises(UsageError, match="frames per second"):
+            Instants(world, fps)

@@ -1,0 +1,194 @@
+"""`vid2ev scene`: what it writes, that it is whole or not there, and that `convert` reads it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from scipy.spatial.transform import Rotation
+
+from vid2ev.commands import Commands
+from vid2ev.commands.convert import convert
+from vid2ev.commands.scene import scene
+from vid2ev.scenes import folder as folder_module
+from vid2ev.scenes.scene_file import read_scene, scene_names
+from vid2ev.scenes.world import World
+from vid2ev.sources import open_source
+
+QUICK = ["--size", "48x36", "--duration", "0.05", "--fps", "100", "--no-preview"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Both(Commands):
+    """The command line with these two commands."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return ["convert", "scene"]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        return {"convert": convert, "scene": scene}.get(cmd_name)
+
+
+def vid2ev(*arguments: str) -> Result:
+    result = CliRunner().invoke(Both("vid2ev"), arguments)
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def refused(exit_code: int, sentence: str, *arguments: str) -> None:
+    """The error of a command, which must be one line and leave the folder as it was."""
+    before = sorted(Path().rglob("*"))
+    result = vid2ev("scene", *arguments)
+    assert result.exit_code == exit_code, result.output
+    line = result.stderr.strip()
+    assert line.startswith("error: ") and "\n" not in line and sentence in line, line
+    assert sorted(Path().rglob("*")) == before
+
+
+def test_the_list_names_all_scenes() -> None:
+    shown = vid2ev("scene", "list").stdout
+    assert all(f"{name} " in shown for name in scene_names())
+    assert set(json.loads(vid2ev("scene", "list", "--json").stdout)) == set(scene_names())
+
+
+def test_a_scene_is_written_with_its_truth() -> None:
+    arguments = ["scene", "flying-shapes", "-o", "out", "--seed", "5", "--truth", "depth,flow,poses", *QUICK]
+    assert vid2ev(*arguments).exit_code == 0
+    out = Path("out")
+    world = World.of(out / "scene.toml")
+    assert world.scene == read_scene("flying-shapes", ["camera.size=[48, 36]", "duration_s=0.05"]).resolved(5)
+    times = [int(line) for line in (out / "timestamps.txt").read_text().splitlines()[1:]]
+    assert times == [k * 10**7 for k in range(6)]
+    assert sorted(path.name for path in out.glob("*.png")) == [f"{k:06d}.png" for k in range(6)]
+    assert len(list((out / "depth").iterdir())) == 6 and len(list((out / "flow").iterdir())) == 5
+    picture = world.render(times[2])
+    assert np.array_equal(np.load(out / "depth/000002.npy"), picture.depth)
+    shift, _ = world.flow(times[2], times[3], picture)
+    assert np.array_equal(np.load(out / "flow/000002.npy"), shift, equal_nan=True)
+    poses = np.loadtxt(out / "poses.txt")
+    assert poses.shape == (6, 8) and np.allclose(poses[:, 0], 1e-9 * np.array(times), atol=1e-12)
+    for row, t_ns in zip(poses, times, strict=True):
+        pose = world.camera_pose(t_ns)
+        assert np.allclose(row[1:4], pose.translation_m, atol=1e-9)
+        assert np.allclose(Rotation.from_quat(row[4:]).as_matrix(), pose.rotation, atol=1e-8)
+    assert json.loads((out / "intrinsics.json").read_text())["size"] == [48, 36]
+
+
+@pytest.mark.parametrize(("kind", "error"), [("png", 1 / 255), ("png16", 1 / 65535), ("tiff", 1e-7), ("exr", 1e-7)])
+def test_frames_are_read_again_as_they_were_rendered(kind: str, error: float) -> None:
+    if kind == "exr":
+        pytest.importorskip("OpenEXR")
+    assert vid2ev("scene", "low-light", "-o", "out", "--frames", kind, *QUICK).exit_code == 0
+    source = open_source("out", colour="rgb")
+    rendered = open_source("scene:low-light,size=48x36,duration_s=0.05", fps=100, colour="rgb")
+    brightest = 0.0
+    for read, frame in zip(source.frames(), rendered.frames(), strict=True):
+        assert read.t_ns == frame.t_ns
+        light = frame.light if kind in ("tiff", "exr") else np.clip(frame.light, 0, 1)
+        assert np.abs(read.light - light).max() <= 1.2 * error
+        brightest = max(brightest, float(read.light.max()))
+    assert (brightest > 10) == (kind in ("tiff", "exr"))
+
+
+def test_convert_reads_the_folder_and_many_of_them() -> None:
+    fast = ["--size", "48x36", "--duration", "0.03", "--fps", "300"]
+    assert vid2ev("scene", "spinning-shapes", "-o", "many", "--count", "2", "--seed", "8", *fast).exit_code == 0
+    assert {path.name for path in Path("many").iterdir()} == {"spinning-shapes-0008", "spinning-shapes-0009"}
+    assert "preview.mp4" in {path.name for path in Path("many/spinning-shapes-0008").iterdir()}
+    result = vid2ev("convert", "many", "-o", "events", "--upsample", "none", "--threads", "1", "--sensor", "ideal")
+    assert result.exit_code == 0, result.output
+    for name in ("spinning-shapes-0008", "spinning-shapes-0009"):
+        manifest = json.loads(Path(f"events/{name}_events/manifest.json").read_text())
+        assert manifest["counts"]["frames"] == 10 and manifest["counts"]["events"] > 20
+    assert (
+        vid2ev(
+            "convert", "many/spinning-shapes-0008", "-o", "one", "--upsample", "none", "--sensor", "ideal", "-q"
+        ).exit_code
+        == 0
+    )
+
+
+def test_the_preview_is_a_film_of_the_scene() -> None:
+    options = ["--size", "49x35", "--duration", "0.1", "--fps", "60"]  # (odd sides)
+    assert vid2ev("scene", "spinning-shapes", "-o", "out", *options).exit_code == 0
+    film = cv2.VideoCapture("out/preview.mp4")
+    shown = [film.read()[1] for _ in range(int(film.get(cv2.CAP_PROP_FRAME_COUNT)))]
+    assert len(shown) == 4 and shown[0].shape[:2] == (34, 48)
+    first = cv2.imread("out/000000.png")[:34, :48].astype(float)
+    assert np.abs(shown[0] - first).mean() < 12
+
+
+def test_many_scenes_go_on_where_they_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ["scene", "flying-shapes", "-o", "many", "--count", "3", *QUICK]
+    write, written = folder_module._write_all, list[Path]()
+
+    def break_down(partial: Path, *rest: object) -> None:
+        if len(written) == 1:
+            raise KeyboardInterrupt
+        written.append(partial)
+        write(partial, *rest)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(folder_module, "_write_all", break_down)
+        assert vid2ev(*arguments).exit_code == 130
+    assert [path.name for path in Path("many").iterdir()] == ["flying-shapes-0000"]
+    changed_ns = Path("many/flying-shapes-0000/scene.toml").stat().st_mtime_ns
+    refused(2, "--resume leaves it", *arguments[1:])
+    result = vid2ev(*arguments, "--resume")
+    assert result.exit_code == 0 and "flying-shapes-0000: is there already" in result.stdout
+    assert len(list(Path("many").iterdir())) == 3
+    assert Path("many/flying-shapes-0000/scene.toml").stat().st_mtime_ns == changed_ns
+    refused(2, "made with other options", *arguments[1:], "--resume", "--truth", "none")
+    assert vid2ev(*arguments, "--overwrite", "--truth", "none").exit_code == 0
+    assert not Path("many/flying-shapes-0002/poses.txt").exists()
+
+
+def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(folder_module, "_write_all", full)
+    refused(1, "out cannot be written: No space left on device", "flying-shapes", "-o", "out", *QUICK)
+
+
+def test_what_cannot_be_meant_is_one_sentence() -> None:
+    refused(2, "did you mean room?", "rooom")
+    refused(2, "truth 'colour': expected some of depth, flow, poses", "room", "--truth", "colour", *QUICK)
+    refused(2, "size 'big': expected WIDTHxHEIGHT", "room", "--size", "big")
+    refused(2, "no 'lamb' (did you mean lamp?)", "room", "--set", "lights.lamb.reach_m=3")
+    Path("taken").mkdir()
+    Path("taken/mine.txt").write_text("mine")
+    refused(2, "is no rendered scene", "room", "-o", "taken", "--overwrite", *QUICK)
+    Path("bad.toml").write_text("[scene]\nduration = 2\n")
+    refused(2, "did you mean duration_s?", "bad.toml")
+
+
+def test_a_dry_run_prints_the_scene_and_does_nothing() -> None:
+    result = vid2ev("scene", "parallax", "--dry-run", "--seed", "4")
+    Path("again.toml").write_text(result.stdout)
+    assert read_scene("again.toml").resolved(0) == read_scene("parallax").resolved(4)
+    assert [path.name for path in Path().iterdir()] == ["again.toml"]
+
+
+def test_the_listing_loads_no_renderer() -> None:
+    import subprocess
+
+    program = (
+        "import sys; from vid2ev.commands.scene import scene; print('numba' in sys.modules, 'numpy' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2]
+    )
+    assert done.stdout.split() == ["False", "False"]

@@ -1,0 +1,156 @@
+"""Instants: when a scene is rendered, so that little changes from one picture to the next.
+
+The rate at t is the greatest of
+
+    fastest thing seen [px/s] / max_shift_px            motion
+    d ln light / dt by the lamps / max_light_step       lamps that move, and highlights with them
+    samples_per_period * frequency of every flicker
+    min_fps
+
+and at most max_fps.  It is found at knots 8 ms apart, where the true flow and the change of light are measured over a
+small step on a grid of pixels, and the motion of the corners of all things in view beside it, for those that fall
+between the pixels of the grid.  Between two knots the greater of their rates R holds, and instant k of N + 1 is where
+
+    integral of R dt = k (integral over all of the scene) / N,    N rounded up,
+
+so that the first instant is the beginning, the last one the end.  All this is a function of the scene alone; any
+instant is found without those before it.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
+from vid2ev.scenes.render import Picture, render
+from vid2ev.scenes.scene import LightSource, Object
+from vid2ev.scenes.snapshot import Thing
+from vid2ev.scenes.world import World, is_still
+
+KNOT_NS = 8_000_000
+STEP_NS = 50_000  # over which motion is measured
+GRID = 64  # pixels across, of the pictures in which it is measured
+MARGIN = 1.15  # for what the grid misses
+SMOOTH = 4  # cells along a pixel at an edge, where changes of light are measured
+DARK = 0.01  # light of which changes do not count
+CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
+NEAREST_M = 0.05
+
+
+class Instants:
+    """The instants of a world [ns]; with `fps` at k / fps, otherwise as motion and light ask for."""
+
+    def __init__(self, world: World, fps: float | Fraction | None = None):
+        self._end_ns = world.duration_ns
+        self._fps = None if fps is None else _rate(fps)
+        if self._fps is not None:
+            self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
+            return
+        knots = np.linspace(0, self._end_ns, max(1, math.ceil(self._end_ns / KNOT_NS)) + 1)
+        rates = np.array([rate_hz(world, round(t_ns)) for t_ns in knots])
+        self.slowest_hz, self.fastest_hz = float(rates.min()), float(rates.max())
+        spans = 1e-9 * np.diff(knots) * np.maximum(rates[1:], rates[:-1])
+        self._knots, self._steps = knots, np.concatenate([[0.0], np.cumsum(spans)])
+        self.count = max(1, math.ceil(self._steps[-1] - 1e-9)) + 1
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, k: int) -> int:
+        """Instant k [ns]."""
+        if not 0 <= k < self.count:
+            raise IndexError(k)
+        if self._fps is not None:
+            return round(k / self._fps * 10**9)
+        steps = self._steps[-1] * k / (self.count - 1)
+        return round(float(np.interp(steps, self._steps, self._knots)))
+
+    def first_from(self, t_ns: int) -> int:
+        """The index of the first instant that is not before t_ns; `len` if there is none."""
+        return bisect_left(range(self.count), t_ns, key=self.__getitem__)
+
+
+def rate_hz(world: World, t_ns: int) -> float:
+    """Instants per second that motion and light ask for at an instant."""
+    setting = world.scene.scene
+    lit: list[LightSource | Object] = [*world.scene.lights, *world.scene.objects]
+    asked = [
+        setting.min_fps,
+        *(setting.samples_per_period * thing.flicker.frequency_hz for thing in lit if thing.flicker),
+        speed_px_s(world, t_ns) / setting.max_shift_px,
+    ]
+    if any(light.flicker or not is_still(light) for light in world.scene.lights):
+        asked.append(light_rate(world, t_ns) / setting.max_light_step)
+    return min(max(asked), setting.max_fps)
+
+
+def speed_px_s(world: World, t_ns: int) -> float:
+    """The fastest that anything moves in the picture of the reference camera [px/s]."""
+    coarse = _coarse(world.intrinsics)
+    scale = world.intrinsics.size[0] / coarse.size[0]
+    shift, _ = world.flow(t_ns, t_ns + STEP_NS, _seen(world, t_ns, coarse), coarse)
+    lengths = np.hypot(shift[..., 0], shift[..., 1])
+    on_grid = scale * float(np.nanmax(lengths, initial=0.0))
+    return MARGIN * max(on_grid, _fastest_corner(world, t_ns)) / (1e-9 * STEP_NS)
+
+
+def light_rate(world: World, t_ns: int) -> float:
+    """How fast lamps change the light of what is seen, everything else standing still [nat/s]."""
+    coarse = _coarse(world.intrinsics)
+    # (with smooth edges, so that shadows that move change the light of the pixels at their edge)
+    pictures = [_seen(world, t_ns, coarse, lamps_ns, SMOOTH) for lamps_ns in (t_ns, t_ns + STEP_NS)]
+    before, after = (picture.light.max(axis=-1) for picture in pictures)
+    change = np.abs(np.log((after + DARK) / (before + DARK)))
+    return MARGIN * float(change.max()) / (1e-9 * STEP_NS)
+
+
+def _seen(world: World, t_ns: int, intrinsics: Intrinsics, lamps_ns: int | None = None, samples: int = 1) -> Picture:
+    snapshot = world.snapshot(t_ns, lamps_ns)
+    return render(snapshot, intrinsics, world.camera_pose(t_ns), samples=samples, threads=world.threads)
+
+
+def _fastest_corner(world: World, t_ns: int) -> float:
+    """How far the corner of any thing in view moves within the step [px]."""
+    from_world = [world.camera_pose(t).inverse() for t in (t_ns, t_ns + STEP_NS)]
+    pairs = zip(world.snapshot(t_ns).things, world.snapshot(t_ns + STEP_NS).things, strict=True)
+    return max((_shift(before, after, from_world, world.intrinsics) for before, after in pairs), default=0.0)
+
+
+def _shift(before: Thing, after: Thing, from_world: list[Pose], intrinsics: Intrinsics) -> float:
+    corners = _corners(before)
+    places = [(view @ thing.pose).apply(corners) for view, thing in zip(from_world, (before, after), strict=True)]
+    if min(place[:, 2].min() for place in places) < NEAREST_M:
+        return 0.0
+    pixels = [place[:, :2] / place[:, 2:] * intrinsics.focal_px + intrinsics.centre_px for place in places]
+    inside = np.all((pixels[0] > -20) & (pixels[0] < np.array(intrinsics.size) + 20), axis=1)
+    return float(np.linalg.norm(pixels[1] - pixels[0], axis=1)[inside].max(initial=0.0))
+
+
+def _corners(thing: Thing) -> np.ndarray:
+    """The corners [8, 3] of a thing's box, in its own coordinates."""
+    mesh = thing.shape.mesh
+    if mesh is None:
+        size = thing.shape.size_m
+        return CORNERS * (size[0], size[1], 0.0 if thing.shape.kind == "plane" else size[2])
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    return (low + high) / 2 + CORNERS * (high - low)
+
+
+def _coarse(intrinsics: Intrinsics) -> Intrinsics:
+    """The same field with few pixels."""
+    width, height = intrinsics.size
+    across = min(GRID, width)
+    return intrinsics.scaled_to((across, max(1, round(height * across / width))))
+
+
+def _rate(fps: float | Fraction) -> Fraction:
+    if not math.isfinite(fps) or not 0 < fps <= 10**9:
+        raise UsageError(f"fps {fps}: expected more than 0 and at most 1e9 frames per second")
+    return Fraction(str(fps))

@@ -1,0 +1,161 @@
+"""A scene as a source of frames: rendered at instants that follow its motion, so that nothing is made up in between.
+
+On the command line `scene:NAME`, with settings after commas: `scene:room,seed=3,size=346x260,camera.fov_deg=70`, or a
+scene file.  Besides the keys of scene files there are `seed` and `size`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from vid2ev.errors import UsageError
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
+from vid2ev.scenes.instants import Instants
+from vid2ev.scenes.render import Picture
+from vid2ev.scenes.scene_file import plain_size, read_scene
+from vid2ev.scenes.world import World
+from vid2ev.stream.frames import LUMINANCE, Colour, Frame
+
+
+class Request(NamedTuple):
+    """What is asked of a scene: `name` or path, `seed` and `key=value` settings."""
+
+    name: str
+    seed: int
+    settings: list[str]
+
+
+class Pictures(NamedTuple):
+    """What the cameras of a rig see at an instant, each with its depth."""
+
+    t_ns: int
+    pictures: list[Picture]
+
+
+class SceneSource:
+    """Frames of a world, as the reference camera sees it.
+
+    name   what it was opened by
+    fps    frames per second, instead of instants that follow the motion
+
+    Raises UsageError for a rate that cannot be meant.
+    """
+
+    rewindable = True
+    dense = True  # in time: light is a straight line between two frames, as near as it was asked for
+
+    def __init__(
+        self,
+        world: World,
+        name: str = "scene",
+        *,
+        seed: int = 0,
+        fps: float | Fraction | None = None,
+        colour: Colour = "luminance",
+    ):
+        self.world, self.name, self.seed, self.colour = world, name, seed, colour
+        self.instants = Instants(world, fps)
+        self.size = world.intrinsics.size
+        self.warnings: list[str] = []
+        limit = world.scene.scene.max_fps
+        if fps is None and self.instants.fastest_hz >= limit:
+            self.warnings.append(
+                f"{name}: more changes between two instants than was asked for, as there are {limit:g} a second at"
+                " most; raise max_fps"
+            )
+
+    @property
+    def frames_expected(self) -> int:
+        """How many instants there are."""
+        return len(self.instants)
+
+    @property
+    def duration_expected_s(self) -> float:
+        """From the first instant to the last [s]."""
+        return 1e-9 * self.instants[len(self.instants) - 1]
+
+    def describe(self) -> dict[str, Any]:
+        """What the scene is, every number settled, for the manifest."""
+        return {
+            "kind": "scene",
+            "path": self.name,
+            "seed": self.seed,
+            "size": list(self.size),
+            "frames_expected": self.frames_expected,
+            "duration_expected_s": self.duration_expected_s,
+            "scene": self.world.scene.tables(),
+        }
+
+    def frames(self, start: int = 0) -> Iterator[Frame]:
+        """The frames from index `start` on; earlier ones are not rendered."""
+        return self.frames_between(None, None, start)
+
+    def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
+        """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
+        for k in self._indices(since_ns, until_ns, start):
+            t_ns = self.instants[k]
+            light = self.world.render(t_ns).light
+            yield Frame(light if self.colour == "rgb" else light @ LUMINANCE, t_ns)
+
+    def views(
+        self,
+        cameras: Sequence[tuple[Intrinsics, Pose]],
+        since_ns: int | None = None,
+        until_ns: int | None = None,
+        start: int = 0,
+    ) -> Iterator[Pictures]:
+        """The same instants, seen by cameras with poses in the coordinates of the reference camera."""
+        for k in self._indices(since_ns, until_ns, start):
+            t_ns = self.instants[k]
+            yield Pictures(t_ns, [self.world.render(t_ns, intrinsics, pose) for intrinsics, pose in cameras])
+
+    def _indices(self, since_ns: int | None, until_ns: int | None, start: int) -> range:
+        first = 0 if since_ns is None else self.instants.first_from(since_ns)
+        end = len(self.instants) if until_ns is None else self.instants.first_from(until_ns + 1)
+        return range(first + start, end)
+
+
+def open_scene(text: str, *, fps: float | Fraction | None = None, colour: Colour = "luminance") -> SceneSource:
+    """The source of `NAME,key=value,...` or of a scene file.  Raises UsageError, DataError."""
+    request = parse_request(text)
+    world = World(read_scene(request.name, request.settings), request.seed)
+    name = f"scene:{text}" if not Path(text).exists() else text
+    return SceneSource(world, name, seed=request.seed, fps=fps, colour=colour)
+
+
+def parse_request(text: str) -> Request:
+    """What `NAME,key=value,...` asks for; commas within brackets and quotes belong to a value.  Raises UsageError."""
+    if Path(text).is_file():
+        return Request(text, 0, [])
+    name, *parts = split_outside(text)
+    seed, settings = 0, []
+    for part in parts:
+        key, _, value = part.partition("=")
+        if key.strip() == "seed":
+            if not re.fullmatch(r"\s*\d{1,19}\s*", value):
+                raise UsageError(f"scene:{text}: seed '{value}', expected a whole number from 0")
+            seed = int(value)
+        else:
+            settings.append(plain_size(part))
+    return Request(name, seed, settings)
+
+
+def split_outside(text: str) -> list[str]:
+    """The parts of a text between commas, but for those within brackets and quotes."""
+    parts, depth, quote = [""], 0, ""
+    for sign in text:
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'":
+            quote = sign
+        depth += (sign in "[{") - (sign in "]}") if not quote else 0
+        if sign == "," and depth == 0 and not quote:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return parts
