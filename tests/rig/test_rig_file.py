@@ -133,7 +133,7 @@ def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pyte
         (f"{CAMERA}fov_deg = 60\nfocal_px = [1, 2]", "keep one of them"),
         (f"{CAMERA}centre_px = [1, 2]", "centre_px needs focal_px"),
         (f"{CAMERA}focal_px = [1, 2]", "focal_px needs size"),
-        (f"{CAMERA}distortion = [1, 2]", "no distortion_model takes 0 coefficients of distortion, not 2"),
+        (f"{CAMERA}distortion = [1, 2]", "distortion needs distortion_model beside it"),
         (f"{CAMERA}distortion_model = 'fisheye'", "it must be 'none', 'radtan' or 'equidistant'"),
         (f"{CAMERA}distortion_model = 'radtan'", "'radtan' takes 4 or 5 or 8 coefficients"),
         (f"{CAMERA}rotation_deg = [0, 0, inf]", "rotation_deg = [0, 0, inf] is impossible"),
@@ -160,7 +160,7 @@ def test_a_bad_rig_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> 
 
 
 @pytest.mark.parametrize(
-    "name", ["", ".", "..", "a/b", "/", "a b", "-a", "a.b", "con", "COM1", "truth", "Rig", "x" * 65]
+    "name", ["", ".", "..", "a/b", "/", "a b", "-a", "_a", "frames", "a.b", "con", "COM1", "truth", "Rig", "x" * 65]
 )
 def test_names_that_are_no_folders_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(UsageError, match=r"name = .* is impossible"):

@@ -34,8 +34,8 @@ NEARLY_A_ROTATION = 1e-3  # how far R'R may be from 1: matrices of files have fe
 LATEST_US = 10**15  # thirty years; what is added to an instant stays far within 64 bits
 
 # A camera's name is the name of its folder, on every system, and no other file of a recording.
-NAME = re.compile(r"\w[\w-]{0,63}")
-RESERVED = {"source", "truth", "rig", "whole", "replaced", "lock", "con", "prn", "aux", "nul"}
+NAME = re.compile(r"[^\W_][\w-]{0,63}")
+RESERVED = {"source", "truth", "rig", "frames", "whole", "replaced", "lock", "con", "prn", "aux", "nul"}
 DEVICES = re.compile(r"(com|lpt)\d")  # (names that Windows keeps for itself)
 
 
@@ -63,10 +63,14 @@ class Optics(BaseModel):
             raise ValueError("fov_deg and focal_px both say how wide it sees: keep one of them")
         if self.centre_px is not None and self.focal_px is None:
             raise ValueError("centre_px needs focal_px beside it")
+        if self.distortion and self.distortion_model is None:
+            raise ValueError("distortion needs distortion_model beside it, to say what its coefficients mean")
         if len(self.distortion) not in COUNTS[self.distortion_model or "none"]:
             wanted = " or ".join(map(str, COUNTS[self.distortion_model or "none"]))
-            model = f"distortion_model '{self.distortion_model}'" if self.distortion_model else "no distortion_model"
-            raise ValueError(f"{model} takes {wanted} coefficients of distortion, not {len(self.distortion)}")
+            raise ValueError(
+                f"distortion_model '{self.distortion_model}' takes {wanted} coefficients of distortion, not"
+                f" {len(self.distortion)}"
+            )
         return self
 
     def lens(self, size: tuple[int, int]) -> Intrinsics | None:
