@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.calibration import FORMATS, calibration_format, left_out, read_calibration, write_calibration
-from vid2ev.rig.camera import Camera, Rig, Viewpoint
+from vid2ev.rig.camera import Camera, Rig, Source, Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
 
 HELD = {  # coefficients of distortion that a format can hold
@@ -402,6 +402,17 @@ def test_a_lens_that_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_field_that_is_the_videos_is_written(tmp_path: Path) -> None:
+    """Its width in degrees is enough, whatever the size of the video."""
+    seen = Rig(source=Source(fov_deg=80.0), cameras=(Camera(name="a", kind="dvs", size=(64, 48)),))
+    write_calibration(tmp_path / "calibration", seen, "kalibr")
+    found = read_calibration(tmp_path / "calibration").rig.cameras[0]
+    assert found.focal_px == pytest.approx(seen.resolved((1280, 720)).viewpoints[0].intrinsics.focal_px)
+    for source in (Source(), Source(focal_px=(100, 100)), Source(size=(640, 480))):
+        with pytest.raises(UsageError, match="camera a has no size with fov_deg or focal_px"):
+            write_calibration(tmp_path / "calibration", Rig(source=source, cameras=seen.cameras), "kalibr")
+
+
 def test_names_become_names_of_folders(tmp_path: Path) -> None:
     write_calibration(tmp_path / "calibration", pair(), "dv")
     tree = json.loads((tmp_path / "calibration").read_text())
@@ -417,21 +428,9 @@ def test_names_become_names_of_folders(tmp_path: Path) -> None:
 
 def test_files_of_no_format_are_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "calibration"
-    for text in (
-        "",
-        "3",
-        "[]",
-        "{}",
-        "{",
-        "a: [",
-        "a: 1",
-        "\t",
-        "&a [*a]",
-        "[" * 5000,
-        "{" * 5000,
-        "cameras: 3",
-        "- 1",
-    ):
+    texts = ["", "3", "[]", "{}", "{", "a: [", "a: 1", "- 1", "\t", "&a [*a]", "[" * 5000, "{" * 5000]
+    texts += ["cameras: 3", "cameras: []", "cameras: {}", "cameras: []\nK: 1", "cam0: 1", "intrinsics: {cam0: 1}"]
+    for text in texts:
         path.write_text(text)
         with pytest.raises(DataError) as refusal:
             read_calibration(path)

@@ -79,7 +79,7 @@ def test_what_is_left_out_is_named() -> None:
         (1, "is no calibration file of a known format", ["text.yaml", "out.toml"]),
         (2, "camchain.yaml counts in m; leave --unit mm out", ["camchain.yaml", "out.toml", "--unit", "mm"]),
         (2, "rig.toml exists; --overwrite replaces it", ["camchain.yaml", "rig.toml"]),
-        (2, "camera dvs has no", ["example.toml", "out.json"]),
+        (2, "camera cis has no", ["example.toml", "out.json"]),
         (1, "cannot be written", ["rig.toml", "nowhere/out.json"]),
     ],
 )

@@ -18,7 +18,8 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.calibration.calibrated import Calibrated, CalibrationFormat, rig_of
 from vid2ev.rig.calibration.node import read_tree
-from vid2ev.rig.camera import Rig, Viewpoint
+from vid2ev.rig.camera import Camera, Rig, Viewpoint
+from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.rig_file import is_rig_file, read_rig, write_rig, write_text
 
@@ -73,6 +74,8 @@ def read_calibration(path: str | Path, unit: str | None = None) -> Calibration:
     if kind is None:
         raise DataError(f"{path} is no calibration file of a known format; expected one of {', '.join(FORMATS)}")
     cameras = kind.read(tree)
+    if not cameras:
+        raise DataError(f"{path} holds no camera; complete or replace the file")
     notes = []
     if kind.says_unit(tree):
         if unit not in (None, "m"):
@@ -96,7 +99,8 @@ def write_calibration(path: str | Path, rig: Rig, name: str, overwrite: bool = F
     if name == "rig":
         write_rig(path, rig, overwrite)
     else:
-        write_text(Path(path), calibration_format(name).write(_viewpoints(rig)), overwrite)
+        views = [Viewpoint(camera, _lens(rig, camera), camera.pose) for camera in rig.cameras]
+        write_text(Path(path), calibration_format(name).write(views), overwrite)
 
 
 def left_out(rig: Rig, name: str) -> list[str]:
@@ -118,20 +122,16 @@ def _moves(rig: Rig) -> bool:
     return bool(np.abs(pose.translation_m).max() > 0 or np.abs(pose.rotation - np.eye(3)).max() > 0)
 
 
-def _viewpoints(rig: Rig) -> list[Viewpoint]:
-    """The cameras with their intrinsics, which a calibration file cannot leave to the video."""
-    if rig.source.size is not None:
-        return list(rig.resolved(rig.source.size).viewpoints)
-    views = []
-    for camera in rig.cameras:
-        lens = camera.lens(camera.size) if camera.size else None
-        if lens is None:
-            raise UsageError(
-                f"camera {camera.name} has no size with fov_deg or focal_px, which a calibration file needs; complete"
-                " the rig, or state the size of the video in [source]"
-            )
-        views.append(Viewpoint(camera, lens, camera.pose))
-    return views
+def _lens(rig: Rig, camera: Camera) -> Intrinsics:
+    """The intrinsics of a camera, which a calibration file cannot leave to the video.  Raises UsageError."""
+    source, size = rig.source, camera.size or rig.source.size
+    stated = source.fov_deg or (source.focal_px and source.size)
+    if size is None or not (camera.lens(size) or stated):
+        raise UsageError(
+            f"camera {camera.name} has no size with fov_deg or focal_px, which a calibration file needs; complete"
+            " the rig, or state the size and fov_deg of the video in [source]"
+        )
+    return camera.intrinsics(source.intrinsics(source.size or size))  # (a field in degrees is that of any size)
 
 
 def _scaled(camera: Calibrated, unit_m: float) -> Calibrated:

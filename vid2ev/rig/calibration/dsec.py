@@ -54,7 +54,7 @@ def read(tree: Node) -> list[Calibrated]:
     locations = [_location(tree["intrinsics"][key]) for key in keys]
     named = all(locations) and len(set(locations)) == len(keys)  # (DSEC's say left twice, and right twice)
     found: list[Calibrated] = []
-    for index, key in enumerate(keys or ["cam0"]):
+    for index, key in enumerate(keys):
         node = tree["intrinsics"][key]
         name = locations[index] if named else key
         found.append(Calibrated(name, _intrinsics(node), _from_first(tree, key, keys, found), _kind(node)))

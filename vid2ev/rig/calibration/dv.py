@@ -43,8 +43,7 @@ COUNTS = {"none": [0], "radtan": [4, 5], "equidistant": [4]}
 def read(tree: Node) -> list[Calibrated]:
     """The cameras of a set, in the order of their keys.  Raises DataError."""
     cameras = dict(tree["cameras"].items())
-    order = sorted(cameras, key=lambda key: int(match[1]) if (match := re.fullmatch(r"C(\d{1,6})", key)) else 1 << 20)
-    found = [_camera(cameras[key], key) for key in order or ["C0"] if cameras or tree["cameras"]["C0"]]
+    found = [_camera(cameras[key], key) for key in sorted(cameras, key=_number)]
     first = found[0].from_first.inverse()  # (that of C0 is 1; a set may begin with another camera)
     return [Calibrated(camera.name, camera.intrinsics, camera.from_first @ first) for camera in found]
 
@@ -67,6 +66,11 @@ def write(views: Sequence[Viewpoint]) -> str:
             "transformationToC0": _texts(_sixteen(pose)),
         }
     return json.dumps({"version": "2.0", "cameras": cameras}, indent=4, ensure_ascii=False) + "\n"
+
+
+def _number(key: str) -> int:
+    """Of C0, C1, ...; other keys come last."""
+    return int(key[1:]) if re.fullmatch(r"C\d{1,6}", key) else 10**6
 
 
 def _camera(node: Node, key: str) -> Calibrated:

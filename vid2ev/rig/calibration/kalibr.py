@@ -84,7 +84,7 @@ def write(views: Sequence[Viewpoint]) -> str:
 def _keys(tree: Node) -> list[str]:
     """cam0, cam1, ... as far as they go on."""
     keys = [key for key, _ in tree.items() if re.fullmatch(r"cam\d{1,4}", key)]
-    return sorted(keys, key=lambda key: int(key[3:])) or ["cam0"]
+    return sorted(keys, key=lambda key: int(key[3:]))
 
 
 def _intrinsics(node: Node) -> Any:

@@ -169,7 +169,7 @@ def _first_eight(place: Node, values: list[float]) -> list[float]:
 def _recognises(tree: Node) -> bool:
     cameras = tree["cameras"].value if "cameras" in tree else None
     keys = ["camera_matrix", "cameraMatrix", "K", *(pattern.format(1) for pattern in MATRICES)]
-    return isinstance(cameras, list) or any(key in tree for key in keys)
+    return bool(cameras and isinstance(cameras, list)) or any(key in tree for key in keys)
 
 
 FORMAT = CalibrationFormat(
