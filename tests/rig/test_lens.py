@@ -47,7 +47,7 @@ def test_lenses_bend_as_those_of_opencv(name: str) -> None:
 
 @pytest.mark.parametrize("name", LENSES)
 def test_every_pixel_finds_its_ray_again(name: str) -> None:
-    camera, grid = lens(name), pixel_grid(SIZE)
+    camera, grid = lens(name), pixel_grid(SIZE)[::3, ::3]
     rays = rays_of(grid, camera)
     np.testing.assert_allclose(pixels_of(rays, camera), grid, atol=1e-6)
     np.testing.assert_allclose(opencv_pixels(rays.reshape(-1, 3), camera), grid.reshape(-1, 2), atol=1e-4)

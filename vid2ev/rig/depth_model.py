@@ -1,0 +1,102 @@
+"""Depth from single pictures, by a monocular model of the package transformers (`pip install 'vid2ev[depth]'`).
+
+    model:depth-anything/Depth-Anything-V2-Small-hf     a name on the Hugging Face hub, downloaded at its first use
+    model:FOLDER                                        a folder with config.json, weights, preprocessor_config.json
+
+Any model for depth estimation that `AutoModelForDepthEstimation` loads will do.  Most give relative depth v, which
+grows with nearness but has no unit: 1 / Z = scale v + shift.  Nobody knows scale and shift but the user, who has to
+give the scale: two distances Z1, Z2 measured in the scene at places with v1, v2 give both.  Models of metric depth
+(`depth_estimation_type` "metric", ZoeDepth, GLPN, Depth Pro) need neither.
+
+The model sees a picture as sRGB of 8 bits, light above 1 as white, and the map comes back in the picture's size.  It is
+run once for each frame of the video; depth in between is interpolated.
+
+Source: L. Yang et al., "Depth Anything V2", NeurIPS 2024; the checkpoint named above has the licence Apache 2.0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.light.transfer import parse_transfer
+from vid2ev.rig.depth import DepthScale, between
+
+EXAMPLE = "depth-anything/Depth-Anything-V2-Small-hf"
+METRIC = ("zoedepth", "glpn", "depth_pro")
+KEPT = 2
+
+
+class ModelDepth:
+    """Depth maps that a model makes of the frames.
+
+    Raises UsageError without the package, or without a scale where the model is relative; DataError for a model that
+    cannot be loaded.
+    """
+
+    plane_m: float | None = None
+
+    def __init__(self, name: str, size: tuple[int, int], scale: DepthScale):
+        if not name:
+            raise UsageError(f"depth 'model:' without a name; expected a folder or a name, such as model:{EXAMPLE}")
+        self.name, self.size = name, size
+        self._processor, self._model = _loaded(name)
+        metric = is_metric(self._model.config)
+        if not metric and scale.scale is None:
+            raise UsageError(f"model:{name} gives relative depth v; give the scale in 1 / Z = scale v + shift")
+        self.scale = replace(scale, kind="depth" if metric else "inverse")
+        self._to_signal = parse_transfer("srgb").to_signal
+        self._kept: dict[int, np.ndarray] = {}
+
+    def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
+        """The map of frame `index`, or after `share` of the interval to the next, of the lights of these frames."""
+        here = self._of_frame(index, lights[:1])
+        return between(here, self._of_frame(index + 1, lights[1:2]), share) if share else here
+
+    def values(self, light: np.ndarray) -> np.ndarray:
+        """What the model says of light [H, W] or [H, W, 3]: [H, W] float32."""
+        import torch
+
+        codes = np.rint(255 * self._to_signal(np.clip(np.nan_to_num(light), 0, 1))).astype(np.uint8)
+        picture = codes if codes.ndim == 3 else np.repeat(codes[..., None], 3, axis=-1)
+        batch = self._processor(images=picture, return_tensors="pt", input_data_format="channels_last")
+        sizes: dict[str, Any] = {"target_sizes": [picture.shape[:2]]}
+        if self._model.config.model_type == "zoedepth":
+            sizes["source_sizes"] = sizes["target_sizes"]
+        with torch.inference_mode():
+            outputs = self._model(**batch)
+            made = self._processor.post_process_depth_estimation(outputs, **sizes)[0]["predicted_depth"]
+        return made.float().numpy()
+
+    def _of_frame(self, index: int, lights: Sequence[np.ndarray]) -> np.ndarray:
+        if index not in self._kept:
+            if not lights:
+                raise UsageError(f"model:{self.name}: depth of frame {index} without its picture; give its light")
+            depth_m = self.scale.depth_m(self.values(lights[0]))
+            self._kept = {k: kept for k, kept in self._kept.items() if abs(k - index) < KEPT} | {index: depth_m}
+        return self._kept[index]
+
+
+def is_metric(config: Any) -> bool:
+    """Whether a model's numbers are metres."""
+    return config.model_type in METRIC or getattr(config, "depth_estimation_type", "relative") == "metric"
+
+
+def _loaded(name: str) -> tuple[Any, Any]:
+    try:
+        from transformers import AutoImageProcessor, AutoModelForDepthEstimation
+        from transformers.utils.logging import disable_progress_bar
+    except ImportError as error:
+        raise UsageError(f"model:{name} needs a package that is not installed; pip install 'vid2ev[depth]'") from error
+    disable_progress_bar()  # (of weights that are read from disk within a second)
+    try:
+        processor = AutoImageProcessor.from_pretrained(name, backend="pil")
+        model = AutoModelForDepthEstimation.from_pretrained(name)
+    except Exception as error:  # (of the hub, of JSON, of safetensors, of configurations)
+        said = (str(error).splitlines() or [type(error).__name__])[0]
+        raise DataError(f"model:{name} cannot be loaded ({said}); give a folder or a name, as {EXAMPLE}") from error
+    return processor, model.eval()
