@@ -21,7 +21,7 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.lens import rays_of_pixels
-from vid2ev.scenes.rays.edges import Scratch, scratch_for
+from vid2ev.scenes.rays.scratch import Scratch, scratch_for
 from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world_numbers import numbers_of
