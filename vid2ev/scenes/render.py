@@ -5,7 +5,7 @@
                    within a pixel or beside it, the light of each weighted with its area in the pixel
 
 A picture is a function of its arguments alone, and light changes smoothly while things move.  What is narrower than
-half a pixel (1 / samples) may be missed.
+a sixth of a pixel may be missed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
+from vid2ev.scenes.details import details_of
 from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.rays.scratch import Scratch, scratch_for
 from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
@@ -27,6 +28,7 @@ from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world_numbers import numbers_of
 
 SAMPLES = 2
+FINE = 6  # the same, of pixels with corners of things and of small things
 Work = Callable[[int, int, Scratch], Any]  # on rows first ... last - 1
 
 
@@ -62,11 +64,12 @@ def render(
         trace_band(world, rays, first, last, light, depth, thing, keys, scratch)
 
     def smooth(first: int, last: int, scratch: Scratch) -> Any:
-        smooth_band(world, rays, first, last, samples, light, keys, scratch)
+        smooth_band(world, rays, first, last, cells, details, light, keys, scratch)
 
     works: list[Work] = [trace, smooth] if samples > 1 else [trace]
+    cells, details = (samples, max(samples, FINE)), details_of(snapshot, world, intrinsics, pose)
     for work in works:
-        _in_bands(work, height + 2, lambda: scratch_for(len(world.kind), samples), threads)
+        _in_bands(work, height + 2, lambda: scratch_for(len(world.kind), cells[1]), threads)
     return Picture(light, depth, thing)
 
 

@@ -23,6 +23,7 @@ from vid2ev.scenes.rays.scratch import AREA, AT_X, AT_Y, X, Y
 @law
 def measure(world, rays, column, line, cells, count, scratch):
     """Fill `keys` and `parts` with what is in a pixel; how many."""
+    scratch.odd[0] = 0
     left, top, size = column - 0.5, line - 0.5, 1.0 / cells
     for j in range(cells + 1):
         for i in range(cells + 1):
@@ -32,9 +33,11 @@ def measure(world, rays, column, line, cells, count, scratch):
         for i in range(cells + 1):
             x, y, key = left + i * size, top + j * size, scratch.corners[j, i]
             if i < cells and scratch.corners[j, i + 1] != key:
-                scratch.across[j, i] = change_between(world, rays, x, y, x + size, y, key, count, scratch)
+                beside = scratch.corners[j, i + 1]
+                scratch.across[j, i] = change_between(world, rays, x, y, x + size, y, key, beside, count, scratch)
             if j < cells and scratch.corners[j + 1, i] != key:
-                scratch.down[j, i] = change_between(world, rays, x, y, x, y + size, key, count, scratch)
+                below = scratch.corners[j + 1, i]
+                scratch.down[j, i] = change_between(world, rays, x, y, x, y + size, key, below, count, scratch)
     found = 0
     for j in range(cells):
         for i in range(cells):

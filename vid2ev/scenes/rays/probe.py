@@ -36,13 +36,19 @@ def key_at(world, rays, x, y, count, scratch):
 
 
 @law
-def change_between(world, rays, x0, y0, x1, y1, key, count, scratch):
-    """The share of the way from one place to another at which the key is no longer that of the first."""
-    low, high = 0.0, 1.0
+def change_between(world, rays, x0, y0, x1, y1, key, next_key, count, scratch):
+    """The share of the way from one place to another at which the key is no longer that of the first.
+
+    Sets `scratch.odd` if it is not that of the second either: a third is between them.
+    """
+    low, high, beyond = 0.0, 1.0, next_key
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if key_at(world, rays, x0 + middle * (x1 - x0), y0 + middle * (y1 - y0), count, scratch) == key:
+        found = key_at(world, rays, x0 + middle * (x1 - x0), y0 + middle * (y1 - y0), count, scratch)
+        if found == key:
             low = middle
         else:
-            high = middle
+            high, beyond = middle, found
+    if beyond != next_key:
+        scratch.odd[0] = 1
     return 0.5 * (low + high)

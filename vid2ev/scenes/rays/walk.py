@@ -44,18 +44,25 @@ def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
 
 
 @walk
-def smooth_band(world, rays, first, last, cells, light, keys, scratch):
-    """Light anew where the keys of rows first ... last - 1 differ from a neighbour's; each pixel is cut into cells."""
+def smooth_band(world, rays, first, last, cells, details, light, keys, scratch):
+    """Light anew where the keys of rows first ... last - 1 differ from a neighbour's, and in finer cells at details.
+
+    cells    into how many a pixel is cut each way: usually, and at details
+    details  uint8 [H + 2, W + 2]
+    """
     height, width = rays.shape[0], rays.shape[1]
     for left in range(0, width, TILE):
         right, count = min(left + TILE, width), -1
         for line in range(max(first, 1), min(last, height - 1)):
             for column in range(max(left, 1), min(right, width - 1)):
-                if differs(keys, line, column):
+                if details[line, column] or differs(keys, line, column):
                     if count < 0:
                         count = things_in_tile(world, rays, first, last, left, right, scratch.things)
                     across, down = steps(rays, line, column)
-                    found = measure(world, rays, column - 1, line - 1, cells, count, scratch)
+                    cut = cells[1] if details[line, column] else cells[0]
+                    found = measure(world, rays, column - 1, line - 1, cut, count, scratch)
+                    if scratch.odd[0] and cut < cells[1]:
+                        found = measure(world, rays, column - 1, line - 1, cells[1], count, scratch)
                     r, g, b = light_of_parts(world, rays, found, across, down, count, scratch)
                     light[line - 1, column - 1, 0] = r
                     light[line - 1, column - 1, 1] = g

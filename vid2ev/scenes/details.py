@@ -1,0 +1,92 @@
+"""Where a picture has details that rays through the centres of pixels may miss, or that need finer cells.
+
+    corners    the pixels in which corners of planes, boxes and meshes of few vertices are, and where the outline
+               of a cylinder leaves its side
+    small      all pixels around a thing whose ball is less than 3 px in radius
+    thin       the pixels along the edges of a plane, box or cylinder that is less than 2 px wide
+
+Only things that are wholly before the camera are looked at.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
+from vid2ev.scenes.lens import pixels_of
+from vid2ev.scenes.rays.layout import World
+from vid2ev.scenes.snapshot import Snapshot, Thing
+
+SMALL_PX, THIN_PX = 3.0, 2.0
+FEW = 64  # vertices
+AROUND = 0.2  # px: a corner is also in a pixel that begins so near
+CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
+EDGES = np.array([(a, b) for a in range(8) for b in range(a) if (a ^ b).bit_count() == 1])
+
+
+def details_of(snapshot: Snapshot, world: World, intrinsics: Intrinsics, camera: Pose) -> np.ndarray:
+    """uint8 [H + 2, W + 2], 1 where pixels (with a margin of 1 px) are to be measured finely."""
+    width, height = intrinsics.size
+    found = np.zeros((height + 2, width + 2), np.uint8)
+    focal = max(intrinsics.focal_px)
+    back = camera.inverse()
+    for thing, (x, y, z, radius) in zip(snapshot.things, world.ball, strict=True):
+        if z - radius > 0 and radius * focal / z < SMALL_PX:
+            centre = pixels_of(np.array([[x, y, z]]), intrinsics)
+            _mark(found, centre, radius * focal / z + 1)
+        elif (corners := _corners(thing)) is not None:
+            here = back @ thing.pose
+            _mark_corners(found, pixels_of(here.apply(corners), intrinsics), thing.shape.kind)
+            if thing.shape.kind == "cylinder":
+                rims = _rim_ends(thing, here.inverse().translation_m)
+                _mark(found, pixels_of(here.apply(rims), intrinsics), AROUND)
+    return found
+
+
+def _corners(thing: Thing) -> np.ndarray | None:
+    """Corners of a thing, or of the box around it; None if it has none worth looking at."""
+    if thing.shape.kind == "mesh":
+        vertices = thing.shape.mesh.vertices  # type: ignore[union-attr]
+        return vertices if len(vertices) <= FEW else None
+    if thing.shape.kind == "sphere":
+        return None
+    return CUBE * thing.shape.size_m * ((1, 1, 0) if thing.shape.kind == "plane" else (1, 1, 1))
+
+
+def _rim_ends(thing: Thing, eye: np.ndarray) -> np.ndarray:
+    """Where the outline of a cylinder goes over from its side to its ends, seen from a place: up to four points."""
+    half = np.maximum(thing.shape.size_m, 1e-300) / np.float64(2)
+    x, y = eye[:2] / half[:2]
+    distance = np.hypot(x, y)
+    if distance <= 1:
+        return np.zeros((0, 3))
+    angles = np.arctan2(y, x) + np.arccos(1 / distance) * np.array([-1, 1])
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1) * half[:2]
+    return np.concatenate([np.column_stack([around, [z, z]]) for z in (-half[2], half[2])])
+
+
+def _mark_corners(found: np.ndarray, corners: np.ndarray, kind: str) -> None:
+    if kind != "cylinder":
+        _mark(found, corners, AROUND)
+    if kind == "mesh" or not np.isfinite(corners).all():
+        return
+    import cv2
+
+    _, sides, _ = cv2.minAreaRect(np.clip(corners, -1e6, 1e6).astype(np.float32))
+    if min(sides) < THIN_PX and max(sides) < 4 * max(found.shape):
+        share = np.linspace(0, 1, int(2 * max(sides)) + 2)[:, None, None]
+        _mark(found, (corners[EDGES[:, 0]] * share + corners[EDGES[:, 1]] * (1 - share)).reshape(-1, 2), 0.5)
+
+
+def _mark(found: np.ndarray, places: np.ndarray, around: float) -> None:
+    """Mark the pixels within `around` of places [n, 2, px], as a square."""
+    height, width = found.shape
+    steps = np.arange(-around, around + 1, min(1.0, 2 * around))
+    for x, y in product(np.minimum(steps, around), repeat=2):
+        spots = np.floor(places + np.array([x + 1.5, y + 1.5]))
+        inside = ((spots >= 0) & (spots < (width, height))).all(axis=1)
+        columns, lines = spots[inside].astype(np.intp).T
+        found[lines, columns] = 1
