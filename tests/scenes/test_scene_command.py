@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from vid2ev.commands import Commands
 from vid2ev.commands.convert import convert
 from vid2ev.commands.scene import scene
+from vid2ev.recording.flow_files import read_flow
 from vid2ev.scenes import folder as folder_module
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.world import World
@@ -76,7 +77,7 @@ def test_a_scene_is_written_with_its_truth() -> None:
     picture = world.render(times[2])
     assert np.array_equal(np.load(out / "depth/000002.npy"), picture.depth)
     shift, _ = world.flow(times[2], times[3], picture)
-    assert np.array_equal(np.load(out / "flow/000002.npy"), shift, equal_nan=True)
+    assert np.array_equal(read_flow(out / "flow/000002.npz"), shift, equal_nan=True)
     poses = np.loadtxt(out / "poses.txt")
     assert poses.shape == (6, 8) and np.allclose(poses[:, 0], 1e-9 * np.array(times), atol=1e-12)
     for row, t_ns in zip(poses, times, strict=True):
@@ -84,6 +85,20 @@ def test_a_scene_is_written_with_its_truth() -> None:
         assert np.allclose(row[1:4], pose.translation_m, atol=1e-9)
         assert np.allclose(Rotation.from_quat(row[4:]).as_matrix(), pose.rotation, atol=1e-8)
     assert json.loads((out / "intrinsics.json").read_text())["size"] == [48, 36]
+
+
+def test_every_camera_of_a_rig_has_its_folder() -> None:
+    arguments = ["scene", "close-object", "-o", "out", "--truth", "depth:png,flow:flo,poses", *QUICK]
+    assert vid2ev(*arguments).exit_code == 0
+    names = {path.name for path in Path("out").iterdir()}
+    assert {"scene.toml", "timestamps.txt", "depth", "flow", "000000.png", "dvs", "cis"} <= names
+    assert {path.name for path in Path("out/cis").iterdir()} == names - {"scene.toml", "dvs", "cis"}
+    assert np.array_equal(cv2.imread("out/000003.png"), cv2.imread("out/dvs/000003.png"))
+    left, right = np.loadtxt("out/dvs/poses.txt"), np.loadtxt("out/cis/poses.txt")
+    assert np.allclose(np.linalg.norm(left[:, 1:4] - right[:, 1:4], axis=1), 0.015)
+    assert {path.suffix for path in Path("out/cis/flow").iterdir()} == {".flo"}
+    assert (Path("out/cis/depth/000000.png")).is_file()
+    assert vid2ev("convert", "out/cis", "-o", "events", "--upsample", "none", "--sensor", "ideal", "-q").exit_code == 0
 
 
 @pytest.mark.parametrize(("kind", "error"), [("png", 1 / 255), ("png16", 1 / 65535), ("tiff", 1e-7), ("exr", 1e-7)])
@@ -165,7 +180,14 @@ def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_what_cannot_be_meant_is_one_sentence() -> None:
     refused(2, "did you mean room?", "rooom")
-    refused(2, "truth 'colour': expected some of depth, flow, poses", "room", "--truth", "colour", *QUICK)
+    refused(
+        2,
+        "truth 'colour': expected some of depth:npy|exr|png, flow:npz|flo|png, poses:txt",
+        "room",
+        "--truth",
+        "colour",
+        *QUICK,
+    )
     refused(2, "size 'big': expected WIDTHxHEIGHT", "room", "--size", "big")
     refused(2, "no 'lamb' (did you mean lamp?)", "room", "--set", "lights.lamb.reach_m=3")
     Path("taken").mkdir()

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.scene_file import read_scene, scene_names
@@ -106,6 +107,36 @@ def test_flow_is_the_motion_between_two_instants(ball: World) -> None:
     x0, x1 = 150 * -0.3 / 2.0, 150 * (-0.3 + 0.008) / 2.005
     assert middle[0] == pytest.approx(x1 - x0, rel=0.1) and after - before == pytest.approx(x1 - x0, abs=0.4)
     assert shift.dtype == np.float32 and seen.shape == picture.depth.shape and seen[picture.thing == 0].mean() > 0.9
+
+
+def test_meshes_have_the_size_that_is_asked_for(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((2, 4, 8)).apply_translation((5, 5, 5)).export(tmp_path / "block.ply")
+    file = tmp_path / "mesh.toml"
+    file.write_text(
+        "[scene]\nambient = 1\n[camera]\nsize = [101, 101]\nfocal_px = [100, 100]\n"
+        '[[objects]]\nname = "block"\nkind = "mesh"\nfile = "block.ply"\nsize_m = 0.8\n'
+        'trajectory = { kind = "fixed", position_m = [0, 0, 1.4] }\n'
+    )
+    picture = World.of(file).render(0)
+    rows, columns = np.nonzero(picture.thing == 0)
+    assert picture.depth[50, 50] == pytest.approx(1.0, rel=1e-5)  # (0.8 m deep, around its middle)
+    assert np.ptp(columns) + 1 == 20 + 1 and np.ptp(rows) + 1 == 40 + 1  # (0.2 x 0.4 m, a metre away, borders included)
+    with pytest.raises(UsageError, match=r"objects.block.file = 'none.ply': no such file"):
+        read_scene(file, ["objects.block.file=none.ply"])
+    (tmp_path / "bad.ply").write_text("ply\n")
+    with pytest.raises(DataError, match=r"bad\.ply"):
+        World.of(file, 0, ["objects.block.file=bad.ply"])
+
+
+def test_a_rig_is_read_before_anything_is_rendered(ball: World, tmp_path: Path) -> None:
+    assert ball.viewpoints == ()
+    pair = World.of("close-object", 0, SMALL).viewpoints
+    assert [view.camera.name for view in pair] == ["dvs", "cis"]
+    assert np.linalg.norm(pair[1].pose.translation_m - pair[0].pose.translation_m) == pytest.approx(0.015)
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "eye"\n')
+    with pytest.raises(UsageError, match="eye"):
+        World.of(tmp_path / "ball.toml", 0, ["rig=rig.toml"])
 
 
 def test_flicker_is_a_sine(tmp_path: Path) -> None:

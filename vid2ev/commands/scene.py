@@ -42,7 +42,9 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
     show_default=True,
     help="png and png16: sRGB; tiff and exr: linear light, unclipped.",
 )
-@click.option("--truth", default="poses", show_default=True, metavar="LIST", help="Of depth,flow,poses; or none.")
+@click.option(
+    "--truth", default="poses", show_default=True, metavar="LIST", help="depth, flow, poses; depth:png, flow:flo; none."
+)
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--resume", is_flag=True, help="Leave scenes that are there, and go on with those that are not.")
@@ -98,7 +100,8 @@ def _file(name: str, options: dict[str, Any]) -> SceneFile:
 
 
 def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[dict[str, Any]]:
-    from vid2ev.scenes.folder import Contents, write_scene
+    from vid2ev.scenes.camera_folder import Contents
+    from vid2ev.scenes.folder import write_scene
     from vid2ev.scenes.source import SceneSource
     from vid2ev.scenes.world import World
 

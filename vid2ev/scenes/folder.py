@@ -1,64 +1,27 @@
 """The folder of a rendered scene: there as a whole or not at all.
 
-    scene.toml        the scene with every number settled; its first lines say how it was made
-    000000.png ...    what the reference camera saw
-    timestamps.txt    when [ns], one line for each of them
-    intrinsics.json   the reference camera's lens and pixels
-    poses.txt         camera to world, as TUM's benchmark has it: t [s], x y z [m], qx qy qz qw
-    depth/000000.npy  float32 [H, W], z in the camera's coordinates [m]; inf where nothing is
-    flow/000000.npy   float32 [H, W, 2], from this picture to the next [px]; NaN where it is unknown
-    preview.mp4       for people
-
-Source of the text of poses: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
+scene.toml   the scene with every number settled; its first line says how it was made
+...          what the reference camera saw (`camera_folder.py`)
+NAME/        what a camera of the scene's rig saw, likewise
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.eight_bits import srgb_codes
-from vid2ev.pictures.film import Film
 from vid2ev.recording.disk import lock, sync
-from vid2ev.rig.pose import Pose
-from vid2ev.scenes.picture_writing import writer_of
-from vid2ev.scenes.render import Picture
+from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.toml_text import toml_text
 
-TRUTH = ("depth", "flow", "poses")
-PREVIEW_FPS = 30
 Report = Callable[[int, int], object]  # frames written, of how many
-
-
-@dataclass(frozen=True)
-class Contents:
-    """What is written of a scene.
-
-    frames   png, png16, tiff or exr
-    truth    of TRUTH
-    preview  a film, too
-
-    Raises UsageError for what cannot be meant.
-    """
-
-    frames: str = "png"
-    truth: Sequence[str] = ("poses",)
-    preview: bool = True
-
-    def __post_init__(self) -> None:
-        writer_of(self.frames)
-        for name in self.truth:
-            if name not in TRUTH:
-                raise UsageError(f"truth '{name}': expected some of {', '.join(TRUTH)}")
 
 
 def write_scene(
@@ -77,15 +40,12 @@ def write_scene(
 
     Raises UsageError where the folder is taken, DataError where it cannot be written.
     """
-    said = (
-        f"# vid2ev {version('vid2ev')}: {how} (frames {contents.frames}; truth {', '.join(contents.truth) or 'none'})"
-    )
+    said = f"# vid2ev {version('vid2ev')}: {how}; {contents.describe()}"
     text = f"{said}\n\n{toml_text(source.world.scene.tables())}"
     if _is_made(directory, text, overwrite, resume):
         return False
     with _new_folder(directory) as partial:
         (partial / "scene.toml").write_text(text, encoding="utf-8")
-        (partial / "intrinsics.json").write_text(source.world.intrinsics.model_dump_json(indent=2) + "\n")
         _write_all(partial, source, contents, report)
     return True
 
@@ -136,52 +96,19 @@ def _new_folder(directory: Path) -> Iterator[Path]:
 
 
 def _write_all(folder: Path, source: SceneSource, contents: Contents, report: Report | None) -> None:
-    write, suffix = writer_of(contents.frames)
-    world, instants, total = source.world, source.instants, len(source.instants)
-    for name in ("depth", "flow"):
-        if name in contents.truth:
-            (folder / name).mkdir()
+    world, total = source.world, len(source.instants)
+    times = [*(source.instants[k] for k in range(total)), None]
     with ExitStack() as stack:
-        times = stack.enter_context(open(folder / "timestamps.txt", "w", encoding="ascii"))
-        times.write("# unit: ns\n")
-        film = stack.enter_context(_Preview(folder / "preview.mp4", source.size)) if contents.preview else None
-        poses = stack.enter_context(open(folder / "poses.txt", "w")) if "poses" in contents.truth else None
-        for k in range(total):
-            t_ns = instants[k]
-            picture = world.render(t_ns)
-            write(picture.light, folder / f"{k:06d}{suffix}")
-            times.write(f"{t_ns}\n")
-            if poses:
-                poses.write(tum_line(t_ns, world.camera_pose(t_ns)))
-            if "depth" in contents.truth:
-                np.save(folder / "depth" / f"{k:06d}.npy", picture.depth)
-            if "flow" in contents.truth and k + 1 < total:
-                np.save(folder / "flow" / f"{k:06d}.npy", world.flow(t_ns, instants[k + 1], picture)[0])
-            if film:
-                film.add(picture, t_ns)
+        views = [CameraFolder(folder, world, contents)]
+        for view in world.viewpoints:
+            if view.camera.name in TRUTH:
+                raise UsageError(f"camera {view.camera.name}: that folder is for {view.camera.name}; rename the camera")
+            views.append(CameraFolder(folder / view.camera.name, world, contents, view.intrinsics, view.pose))
+        for camera in views:
+            stack.enter_context(camera)
+        for done, (t_ns, next_ns) in enumerate(pairwise(times), 1):
+            assert t_ns is not None
+            for camera in views:
+                camera.add(t_ns, next_ns)
             if report:
-                report(k + 1, total)
-
-
-def tum_line(t_ns: int, pose: Pose) -> str:
-    """A pose as a line of text."""
-    numbers = " ".join(f"{value:.9f}" for value in (*pose.translation_m, *pose.quaternion()))
-    return f"{t_ns // 10**9}.{t_ns % 10**9:09d} {numbers}\n"
-
-
-class _Preview(Film):
-    """A film that shows, PREVIEW_FPS times a second, the first picture that is not earlier."""
-
-    def __init__(self, path: Path, size: tuple[int, int]):
-        self._width, self._height = (max(2, side - side % 2) for side in size)  # (4:2:0 needs even sides)
-        super().__init__(path, (self._width, self._height), PREVIEW_FPS)
-
-    def __enter__(self) -> _Preview:
-        return self
-
-    def add(self, picture: Picture, t_ns: int) -> None:  # type: ignore[override]
-        """Show the picture, if it is its turn."""
-        while t_ns * PREVIEW_FPS >= self.frames * 10**9:
-            codes = srgb_codes(picture.light)
-            padded = np.pad(codes, ((0, 1), (0, 1), (0, 0)), mode="edge")
-            super().add(np.ascontiguousarray(padded[: self._height, : self._width]))
+                report(done, total)

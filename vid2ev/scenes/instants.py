@@ -41,6 +41,10 @@ MARGIN = 1.15  # for what the grid misses
 SMOOTH = 4  # cells along a pixel at an edge, where changes of light are measured
 DARK = 0.01  # light of which changes do not count
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
+AXES = np.concatenate([np.eye(3), -np.eye(3)]) / 2
+ROUND = np.concatenate([AXES, CORNERS / math.sqrt(3)])  # on a sphere
+RIM = np.array([(math.cos(a) / 2, math.sin(a) / 2, z) for a in np.arange(8) * math.pi / 4 for z in (-0.5, 0.5)])
+OUTERMOST = {"plane": CORNERS * (1, 1, 0), "box": CORNERS, "sphere": ROUND, "cylinder": RIM}
 NEAREST_M = 0.05
 
 
@@ -134,11 +138,10 @@ def _shift(before: Thing, after: Thing, from_world: list[Pose], intrinsics: Intr
 
 
 def _corners(thing: Thing) -> np.ndarray:
-    """The corners [8, 3] of a thing's box, in its own coordinates."""
+    """The points of a thing that are farthest out [n, 3], in its own coordinates; of a mesh, the corners of its box."""
     mesh = thing.shape.mesh
     if mesh is None:
-        size = thing.shape.size_m
-        return CORNERS * (size[0], size[1], 0.0 if thing.shape.kind == "plane" else size[2])
+        return OUTERMOST[thing.shape.kind] * thing.shape.size_m
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     return (low + high) / 2 + CORNERS * (high - low)
 

@@ -12,9 +12,12 @@ from typing import Self
 
 import numpy as np
 
+from vid2ev.rig.camera import Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.flow import Flow, flow
+from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.scene import Flicker, LightSource, Object, Scene
 from vid2ev.scenes.scene import Picture as Look
@@ -27,9 +30,10 @@ from vid2ev.scenes.trajectory import Fixed, pose_of
 class World:
     """A scene, ready to be rendered; `seed` settles the ranges of a scene file.
 
-    threads  that render; None for all cores.  They change nothing but the time it takes
+    threads     that render; None for all cores.  They change nothing but the time it takes
+    viewpoints  the cameras of the scene's rig, in the coordinates of the reference camera; none without a rig
 
-    Raises UsageError for a scene that cannot be, DataError for a texture or a mesh that cannot be read.
+    Raises UsageError for a scene that cannot be, DataError for a texture, a mesh or a rig that cannot be read.
     """
 
     def __init__(self, scene: Scene | SceneFile, seed: int = 0, *, threads: int | None = None):
@@ -39,6 +43,7 @@ class World:
         self._looks = [(thing, self._shape(thing), self._surface(thing)) for thing in self.scene.objects]
         self._still = {id(thing): pose_of(thing.trajectory, 0.0) for thing in self.scene.objects if is_still(thing)}
         self._environment = self._around()
+        self.viewpoints = self._rig()
 
     @classmethod
     def of(cls, name_or_path: str | Path, seed: int = 0, settings: Sequence[str] = ()) -> Self:
@@ -99,8 +104,6 @@ class World:
     def _shape(self, thing: Object) -> Shape:
         if thing.file is None:
             return Shape(thing.kind, thing.size_m)
-        from vid2ev.scenes.mesh_files import load_mesh
-
         mesh = load_mesh(Path(thing.file))
         return Shape("mesh", mesh=_sized(mesh, max(thing.size_m)) if "size_m" in thing.model_fields_set else mesh)
 
@@ -118,6 +121,11 @@ class World:
         if look not in self._textures:
             self._textures[look] = Texture(pixels_of(look))
         return self._textures[look]
+
+    def _rig(self) -> tuple[Viewpoint, ...]:
+        rig = self.scene.scene.rig
+        cameras = () if rig is None else read_rig(rig).cameras
+        return tuple(Viewpoint(camera, camera.intrinsics(self.intrinsics), camera.pose) for camera in cameras)
 
     def _around(self) -> Texture | None:
         setting = self.scene.scene
