@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, read_events
-from vid2ev.recipe import Instant, Recipe, _ahead
+from vid2ev.recipe import Instant, Recipe
+from vid2ev.stream.ahead import ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
 NOISY = ["shot_rate_hz=20", "leak_rate_hz=1", "hot_probability=0.01", "hot_rate_hz=200"]
@@ -169,10 +170,10 @@ def test_items_made_ahead_come_in_order_and_errors_in_their_place() -> None:
 
     got = []
     with pytest.raises(ZeroDivisionError):
-        for item in _ahead(counting(), 3):
+        for item in ahead(counting(), 3):
             got.append(item)
     assert got == list(range(10)) and closed == [True]
-    early = _ahead(counting(), 3)
+    early = ahead(counting(), 3)
     assert next(early) == 0
     early.close()
     assert closed == [True, True]

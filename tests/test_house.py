@@ -24,6 +24,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 # The floor of each room; an import may only go to a lower floor, or stay in its own room.
 FLOORS = {
     "errors": 0,
+    "toml_text": 0,
     "kernel_cache": 0,
     "kernel_compiler": 0,
     "stream": 1,
@@ -41,14 +42,15 @@ FLOORS = {
     "sensors": 6,
     "outputs": 6,
     "mounts": 7,
+    "sight": 8,
     "tracks": 7,
-    "recipe": 8,
-    "reformat": 8,
-    "recorder": 9,
-    "conversion": 10,
-    "": 11,  # vid2ev/__init__.py: the public names
-    "commands": 12,
-    "__main__": 13,
+    "recipe": 9,
+    "reformat": 9,
+    "recorder": 10,
+    "conversion": 11,
+    "": 12,  # vid2ev/__init__.py: the public names
+    "commands": 13,
+    "__main__": 14,
 }
 
 

@@ -60,7 +60,7 @@ def convert(
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
-    outputs.check(recipe.source.size, expected_us(recipe))
+    check_outputs(recipe, outputs)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()}
@@ -73,12 +73,13 @@ def convert(
         recorder.take_up()
         if not recorder.done.finished:
             _record(recorder, piece, report)
-        manifest = job | recorder.outcome(0) | {"run": _run(video, threads, recorder.done)}
+        manifests = _manifests(job, recorder, _run(video, threads, recorder.done))
         with folder.writing():
             recorder.write(folder.whole)
-            write_manifest(folder.whole / "manifest.json", manifest)
+            for within, manifest in manifests.items():
+                write_manifest(folder.whole / within / "manifest.json", manifest)
             folder.publish()
-    return manifest
+    return manifests[""]
 
 
 def default_directory(video: str | Path) -> Path:
@@ -94,10 +95,27 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def expected_us(recipe: Recipe) -> int | None:
-    """How long the recording should become, if there is any telling."""
+def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
+    """Raise UsageError where a format cannot hold what a camera may send, or a probed pixel is not there."""
     seconds = recipe.source.duration_expected_s
-    return None if seconds is None else round(1e6 * seconds)
+    for mount in recipe.mounts:
+        if mount.kind == "dvs":
+            outputs.check(mount.size, None if seconds is None else round(1e6 * seconds))
+
+
+def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The manifest of the recording, "", and of a rig that of each camera, by its part of the folder."""
+    recipe = recorder.recipe
+    if recipe.alone:
+        return {"": job | recorder.outcome(0) | {"run": run}}
+    outcomes = {mount: recorder.outcome(mount.number) for mount in recipe.mounts}
+    common = {"outputs": job["outputs"]}
+    manifests = {
+        mount.within: recipe.describe_camera(mount) | common | outcome | {"run": run}
+        for mount, outcome in outcomes.items()
+    }
+    results = {mount.name: outcome for mount, outcome in outcomes.items()}
+    return {"": job | {"results": results, "run": run}, **manifests}
 
 
 def _record(recorder: Recorder, piece: int, report: Report | None) -> None:

@@ -1,23 +1,79 @@
-"""A mount: a place on the rig, and the sensor in it, with everything settled that a rig file may leave open."""
+"""Mounts: the cameras of a recording, each with its sensor and everything settled that a rig file may leave open."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
+from vid2ev.errors import UsageError
+from vid2ev.rig.camera import Camera, ResolvedRig
 from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.rig.pose import Pose
+from vid2ev.sensors.cis import Cis
+from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.presets import load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.toml_text import toml_value
+
+Spec = DvsSpec | CisSpec
+
+
+class Loaded(NamedTuple):
+    """A sensor: what its specification was found by, and the specification."""
+
+    name: str
+    spec: Spec
+
+    @property
+    def colour(self) -> bool:
+        """Whether its pixels tell colours apart."""
+        return isinstance(self.spec, CisSpec) and self.spec.colour
 
 
 @dataclass(frozen=True)
+class Sensors:
+    """The sensors of a recording, for cameras that name none: presets, TOML files or specifications; and what is
+    changed in all (`key=value`; keys of frame sensors begin with `cis.`).
+
+    Raises UsageError for changes to a specification.
+    """
+
+    dvs: str | Path | DvsSpec = "paper"
+    cis: str | Path | CisSpec = "paper"
+    overrides: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        for sensor, kind in ((self.dvs, "dvs"), (self.cis, "cis")):
+            if isinstance(sensor, Spec) and (texts := self._changes(kind)):
+                raise UsageError(f"overrides {texts}: expected a preset or file to change; change the specification")
+
+    def of(self, camera: Camera) -> Loaded:
+        """The sensor of a camera: the one that it names, or else the recording's, with the camera's changes and the
+        recording's on top.  Raises UsageError, DataError."""
+        sensor = camera.sensor or (self.dvs if camera.kind == "dvs" else self.cis)
+        if isinstance(sensor, Spec):
+            if camera.set:
+                raise UsageError(
+                    f"camera {camera.name} sets {', '.join(camera.set)}: expected a preset or file to change"
+                )
+            return Loaded("own", sensor)
+        changes = [*(f"{key}={toml_value(value)}" for key, value in camera.set.items()), *self._changes(camera.kind)]
+        return Loaded(str(sensor), (load_sensor if camera.kind == "dvs" else load_cis)(sensor, changes))
+
+    def _changes(self, kind: str) -> list[str]:
+        return [text for text in self.overrides if text.strip().startswith("cis.") == (kind == "cis")]
+
+
+@dataclass(frozen=True, eq=False)
 class Mount:
     """A camera of a recording.
 
     name             "" for the only one, whose files lie in the folder of the recording itself
     number           its place in the rig, from 0; cameras of one seed differ by it
-    sensor, spec     what the specification was found by, and the specification
+    sensor           its sensor
     seed             of the sensor
     intrinsics       of the view, `size` among them
     pose             where it is, from the camera to the source's camera
@@ -26,12 +82,16 @@ class Mount:
 
     name: str
     number: int
-    sensor: str
-    spec: DvsSpec
+    sensor: Loaded
     seed: int
     intrinsics: Intrinsics
-    pose: Pose = IDENTITY
+    pose: Pose
     clock_offset_us: int = 0
+
+    @property
+    def kind(self) -> Literal["dvs", "cis"]:
+        """What it sends: events or frames."""
+        return "dvs" if isinstance(self.sensor.spec, DvsSpec) else "cis"
 
     @property
     def size(self) -> tuple[int, int]:
@@ -44,14 +104,38 @@ class Mount:
         return f"{self.name}/" if self.name else ""
 
     def dvs(self, labels: bool = False, threads: int = 1) -> Dvs:
-        """The sensor, before its first frame."""
-        return Dvs(self.spec, self.size, self.seed, camera=self.number, threads=threads, labels=labels)
+        """The event sensor, before its first frame."""
+        assert isinstance(self.sensor.spec, DvsSpec)
+        return Dvs(self.sensor.spec, self.size, self.seed, camera=self.number, threads=threads, labels=labels)
+
+    def cis(self, threads: int = 1) -> Cis:
+        """The frame sensor, before its first frame."""
+        assert isinstance(self.sensor.spec, CisSpec)
+        return Cis(self.sensor.spec, self.size, self.seed, camera=self.number, threads=threads)
 
     def describe(self) -> dict[str, Any]:
         """The sensor, ready for JSON."""
         return {
-            "name": self.sensor,
+            "kind": self.kind,
+            "name": self.sensor.name,
             "size": list(self.size),
-            "parameters": self.spec.model_dump(mode="json"),
-            "effects": self.spec.effects(),
+            "parameters": self.sensor.spec.model_dump(mode="json"),
+            "effects": self.sensor.spec.effects(),
         }
+
+
+def mounts_of(rig: ResolvedRig, sensors: Sequence[Loaded], seed: int, alone: bool) -> tuple[Mount, ...]:
+    """The cameras of a rig with their sensors; `seed` is of those that have none of their own.  `alone`: the only
+    camera, which has no name."""
+    return tuple(
+        Mount(
+            "" if alone else view.camera.name,
+            number,
+            sensor,
+            seed if view.camera.seed is None else view.camera.seed,
+            view.intrinsics,
+            view.pose,
+            view.camera.clock_offset_us,
+        )
+        for number, (view, sensor) in enumerate(zip(rig.viewpoints, sensors, strict=True))
+    )

@@ -12,6 +12,7 @@ from vid2ev.errors import UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.formats.frame_index import FrameIndex
+from vid2ev.recording import exposures
 from vid2ev.views.on_disk import KINDS, write_frames
 from vid2ev.views.requests import parse_representation, parse_slicing
 
@@ -30,6 +31,7 @@ class Outputs:
     frames_as   what they are made into, as `views.requests.parse_representation` has it
     probe       pixels (x, y) whose state over time goes to probe.csv and probe.png
     noise_maps  noise_maps.npz: thresholds, hot and cold pixels
+    pictures    of frame cameras, some of `recording.exposures.KINDS`
     """
 
     formats: tuple[str, ...] = ("hdf5",)
@@ -39,18 +41,23 @@ class Outputs:
     frames_as: str = FRAMES_AS
     probe: tuple[tuple[int, int], ...] = ()
     noise_maps: bool = False
+    pictures: tuple[str, ...] = ("raw", "mp4")
 
     @classmethod
     def of(
-        cls, formats: str | Sequence[str] = ("hdf5",), probe: Sequence[str | tuple[int, int]] = (), **rest: Any
+        cls,
+        formats: str | Sequence[str] = ("hdf5",),
+        probe: Sequence[str | tuple[int, int]] = (),
+        pictures: str | Sequence[str] = ("raw", "mp4"),
+        **rest: Any,
     ) -> Outputs:
-        """The outputs of these options; several formats may be in one text, with commas, and a pixel be "x,y".
-
-        Raises UsageError.
-        """
-        texts = [formats] if isinstance(formats, str) else formats
-        names = tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",")))
-        outputs = cls(names, probe=tuple(map(pixel_of, probe)), **rest)
+        """The outputs of these options; several formats or pictures may be in one text, with commas, and a pixel be
+        "x,y".  Raises UsageError."""
+        names = _listed(formats)
+        outputs = cls(names, probe=tuple(map(pixel_of, probe)), pictures=_listed(pictures), **rest)
+        for kind in outputs.pictures:
+            if kind not in exposures.KINDS:
+                raise UsageError(f"pictures as '{kind}': expected one of {', '.join(exposures.KINDS)}")
         for name in names:
             if name not in FORMATS or not format_named(name).write:
                 writable = ", ".join(name for name in FORMATS if format_named(name).write)
@@ -91,7 +98,8 @@ class Outputs:
 
     def describe(self) -> dict[str, Any]:
         """The outputs, ready for JSON."""
-        return asdict(self) | {"formats": list(self.formats), "probe": [list(pixel) for pixel in self.probe]}
+        lists = {"formats": list(self.formats), "pictures": list(self.pictures)}
+        return asdict(self) | lists | {"probe": [list(pixel) for pixel in self.probe]}
 
     def files(self) -> dict[str, str]:
         """The file of each format; where two have one suffix, the second has its format's name, too."""
@@ -101,8 +109,10 @@ class Outputs:
             taken[kind.name] = f"events-{kind.name}{kind.suffix}" if plain in taken.values() else plain
         return taken
 
-    def names(self) -> list[str]:
-        """All files, the manifest among them."""
+    def names(self, kind: str = "dvs") -> list[str]:
+        """All files of a camera of a kind, the manifest among them."""
+        if kind == "cis":
+            return [*(exposures.KINDS[name] for name in self.pictures), "manifest.json"]
         files = [*self.files().values(), *([] if "hdf5" in self.formats else [FRAME_INDEX])]
         files += [KINDS[self.frames]] if self.frames else []
         files += ["probe.csv", "probe.png"] if self.probe else []
@@ -133,6 +143,12 @@ def write_frame_index(path: Path, recording: Recording) -> None:
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write("t_us,events\n")
         file.writelines(f"{t_us},{count}\n" for t_us, count in zip(index.frame_us, index.counts, strict=True))
+
+
+def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
+    """The names in texts that may hold several, with commas; each once."""
+    parts = [texts] if isinstance(texts, str) else texts
+    return tuple(dict.fromkeys(name.strip() for text in parts for name in text.split(",")))
 
 
 def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:

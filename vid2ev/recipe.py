@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections import deque
-from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
+
+import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.formats.event_file import Picture
 from vid2ev.light.eight_bits import srgb_codes
-from vid2ev.mounts import Mount
-from vid2ev.physics.bayer import check_pattern, mosaic
+from vid2ev.mounts import Mount, Sensors, mounts_of
+from vid2ev.physics.bayer import check_pattern
 from vid2ev.recording.manifest import identity, versions
-from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.sensors.presets import load_sensor
+from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
+from vid2ev.rig.depth import between, plane_of
+from vid2ev.rig.rig_file import read_rig
+from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sight import Sight, rendered
 from vid2ev.sources import OPTIONS, Source, open_source
+from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import Interval, Upsampler, make_upsampler
@@ -30,10 +35,9 @@ from vid2ev.upsample.none import NoUpsampling
 
 FRAMES_AHEAD = 4  # made in advance, while the sensor works
 INTERVALS_AHEAD = 2  # whose motion is known in advance
+THRESHOLD = 0.15  # nat, where there are frame cameras only
 
 CUTS = ("restart", "keep")
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +60,9 @@ class Recipe:
     """Everything that decides a recording; the same recipe, the same events and frames.
 
     video          what the source was opened by
+    rig            where they stand
     mounts         the cameras
+    plane_m        how far the scene is, if it is a plane
     upsample       how light is made between frames: none, linear or flow
     subframes      intervals that a source interval becomes: "auto" (by motion and contrast), or a number
     max_subframes  the most that "auto" may take
@@ -68,7 +74,9 @@ class Recipe:
 
     video: str
     source: Source
+    rig: ResolvedRig
     mounts: tuple[Mount, ...]
+    plane_m: float | None = None
     upsample: str = "flow"
     subframes: int | Literal["auto"] = "auto"
     max_subframes: int = 64
@@ -83,31 +91,47 @@ class Recipe:
         video: str | Path,
         sensor: str | Path | DvsSpec = "paper",
         overrides: Sequence[str] = (),
+        *,
+        cis: str | Path | CisSpec | None = None,
+        rig: str | Path | Rig | None = None,
+        depth: str | Path | None = None,
         **rest: Any,
     ) -> Recipe:
-        """The recipe for a video and a sensor, with everything checked that can be before the first frame.
+        """The recipe for a video and its cameras, with everything checked that can be before the first frame.
 
-        video      a video file, a folder of images, an array file, or `synthetic:NAME`
-        sensor     a preset, a TOML file, or a specification
-        overrides  `key=value` texts that change a preset or file
+        video      a video file, a folder of images, an array file, `synthetic:NAME` or `scene:NAME`
+        sensor     of event cameras that name none: a preset, a TOML file, or a specification
+        overrides  `key=value` texts that change presets or files; keys of frame sensors begin with `cis.`
+        cis        the same of frame cameras; without a rig it puts one where the video was taken
+        rig        the cameras: a rig file, or what is in one; without it an event camera where the video was taken
+        depth      how far the scene is, as `rig.depth` has it; needed where cameras stand elsewhere
         The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
         """
-        if isinstance(sensor, DvsSpec) and overrides:
-            raise UsageError(
-                f"overrides {list(overrides)}: expected a preset or file to change; change the specification"
-            )
-        spec = sensor if isinstance(sensor, DvsSpec) else load_sensor(sensor, overrides)
-        name = "own" if isinstance(sensor, DvsSpec) else str(sensor)
-        seed = rest.get("seed", 0)
-        if not 0 <= seed < 1 << 64:
+        if not 0 <= (seed := rest.get("seed", 0)) < 1 << 64:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
         if rest.get("bayer"):
-            rest["colour"], rest["bayer"] = "rgb", check_pattern(rest["bayer"].upper())
+            rest["bayer"] = check_pattern(rest["bayer"].upper())
         refuse_recordings(Path(video))
-        source = open_source(video, **{key: rest.pop(key) for key in OPTIONS if key in rest})
-        mounts = (Mount("", 0, name, spec, seed, Intrinsics.of_field(source.size)),)
-        recipe = cls(str(video), source, mounts, **rest)
+        asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
+        chosen = Sensors(sensor, cis or "paper", overrides)
+        sensors = [chosen.of(camera) for camera in asked.cameras]
+        coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
+        plane_m = plane_of(depth)
+        maps = None if depth is None or plane_m is not None else partial(_with_depth, str(depth), asked)
+        options = {key: rest.pop(key) for key in OPTIONS if key in rest} | {"seen_through": maps}
+        source = open_source(video, colour="rgb" if coloured else "luminance", **options)
+        if source.dense:
+            rest["upsample"] = "none"
+        resolved = asked.resolved(source.size)
+        mounts = mounts_of(resolved, sensors, seed, alone=rig is None and cis is None)
+        recipe = cls(str(video), source, resolved, mounts, plane_m, **rest)
         recipe.upsampler()  # (refuses what cannot be)
+        if recipe.sight().needs_depth and maps is None and not source.dense:
+            away = next(mount for mount in mounts if mount.pose.translation_m.any())
+            raise UsageError(
+                f"camera {away.name} stands beside the video's, and how far the scene is was not said; add --depth"
+                " plane:METRES, a depth map or a folder of them"
+            )
         if recipe.cuts not in CUTS:
             raise UsageError(f"cuts '{recipe.cuts}': expected one of {', '.join(CUTS)}")
         return recipe
@@ -119,25 +143,36 @@ class Recipe:
     @property
     def _threshold(self) -> float:
         """The least contrast threshold of all sensors [nat]."""
-        return min(
-            threshold for mount in self.mounts for threshold in (mount.spec.threshold_on, mount.spec.threshold_off)
-        )
+        specs = [mount.sensor.spec for mount in self.mounts]
+        events = [spec for spec in specs if isinstance(spec, DvsSpec)]
+        return min((min(spec.threshold_on, spec.threshold_off) for spec in events), default=THRESHOLD)
+
+    def sight(self) -> Sight:
+        """What the cameras see, before the first frame.  Raises UsageError where a depth is missing."""
+        return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer)
 
     def instants(self, start: int = 0) -> Generator[Instant]:
-        """What is seen at source frame `start`, and at all frames after it, those in between too.  Two threads make the
-        frames, a little in advance: one looks for motion, the other carries light along it."""
-        return _ahead(self._instants(start), FRAMES_AHEAD)
+        """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
+        little in advance: one looks for motion, another carries light along it, a third forms the views."""
+        return ahead(self._instants(start), FRAMES_AHEAD)
 
     def _instants(self, start: int) -> Generator[Instant]:
+        sight = self.sight()
+        if not sight.free and self.source.dense:
+            for frames, t_ns in rendered(self.source, self.mounts, self.bayer, start):
+                yield Instant(frames, t_ns, original=True, cut=False, limited=0)
+            return
+        with closing(self._light(start) if sight.free else ahead(self._light(start), FRAMES_AHEAD)) as light:
+            for frame, limited in light:
+                yield Instant(sight.frames(frame), frame.t_ns, frame.original, frame.cut, limited)
+
+    def _light(self, start: int) -> Generator[tuple[Frame, int]]:
         limited = 0
-        with closing(_ahead(self._intervals(start), INTERVALS_AHEAD)) as intervals:
+        with closing(ahead(self._intervals(start), INTERVALS_AHEAD)) as intervals:
             for interval in intervals:
                 limited += interval.limited
                 for frame in interval:
-                    yield Instant((self._filtered(frame),), frame.t_ns, frame.original, frame.cut, limited)
-
-    def _filtered(self, frame: Frame) -> Frame:
-        return frame if self.bayer is None else replace(frame, light=mosaic(frame.light, self.bayer))
+                    yield frame, limited
 
     def _intervals(self, start: int) -> Generator[Interval]:
         """The frame `start` by itself, and each interval after it."""
@@ -151,35 +186,69 @@ class Recipe:
                 yield Interval(iter([frame]))
             elif before is not None and index > start:
                 method = straight if cuts.unrelated else upsampler
-                yield method.between(before, replace(frame, cut=cut))
+                interval = method.between(before, replace(frame, cut=cut))
+                yield interval if frame.depth is None else replace(interval, frames=_filled(interval, before, frame))
             before = frame
 
-    def pictures(self) -> Iterator[Picture]:
-        """The frames of the source, read again, in 8 bits of sRGB: to be kept beside the events."""
+    def pictures(self, mount: Mount) -> Iterator[Picture]:
+        """The frames of the source as a camera sees them, read again, in 8 bits of sRGB: to be kept beside events."""
+        sight = Sight(self.rig.source, [mount], self.plane_m, None)
         for frame in self.source.frames():
-            yield Picture(frame.t_ns // 1000, srgb_codes(frame.light))
+            (seen,) = sight.frames(frame)
+            yield Picture(seen.t_ns // 1000, srgb_codes(seen.light))
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one camera, whose files lie in the folder of the recording itself."""
+        return not self.mounts[0].name
 
     def describe(self) -> dict[str, Any]:
         """The recipe as JSON: what the manifest says of it, and by which a run is known again."""
+        if self.alone:
+            return self.describe_camera(self.mounts[0])
+        rig = {"rig": self.rig.describe(), "plane_m": self.plane_m}
+        cameras = {mount.name: mount.describe() for mount in self.mounts}
+        return plain(self._shared() | rig | {"cameras": cameras, "bayer": self.bayer, "labels": self.labels})
+
+    def describe_camera(self, mount: Mount) -> dict[str, Any]:
+        """What the manifest of a camera says."""
+        name = {} if self.alone else {"camera": mount.name}
+        sensor = mount.describe() | ({"bayer": self.bayer} if mount.kind == "dvs" else {})
+        return plain(self._shared() | name | {"sensor": sensor, "seed": mount.seed, "labels": self.labels})
+
+    def _shared(self) -> dict[str, Any]:
+        """What is the same for all cameras."""
         path = Path(self.video)
         known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
-        return json.loads(
-            json.dumps(
-                {
-                    "versions": versions(),
-                    "source": self.source.describe() | known_by,
-                    "upsampling": {
-                        "method": self.upsample,
-                        "subframes": self.subframes,
-                        "max_subframes": self.max_subframes,
-                        "cuts": self.cuts,
-                    },
-                    "sensor": self.mounts[0].describe() | {"bayer": self.bayer},
-                    "seed": self.seed,
-                    "labels": self.labels,
-                }
-            )
-        )
+        upsampling = {"method": self.upsample, "subframes": self.subframes, "max_subframes": self.max_subframes}
+        return {
+            "versions": versions(),
+            "source": self.source.describe() | known_by,
+            "upsampling": upsampling | {"cuts": self.cuts},
+        }
+
+
+def _with_depth(text: str, rig: Rig, source: Source) -> Source:
+    """A source with its depth, which may need to know how wide the source sees."""
+    from vid2ev.sources.with_depth import WithDepth, parse_depth
+
+    return WithDepth(source, parse_depth(text, rig.source.intrinsics(source.size)), text)
+
+
+def _filled(frames: Iterable[Frame], before: Frame, after: Frame) -> Iterator[Frame]:
+    """The frames of an interval, with depth between those of its ends."""
+    assert before.depth is not None and after.depth is not None
+    same = np.array_equal(before.depth, after.depth, equal_nan=True)
+    for frame in frames:
+        if frame.depth is None:
+            share = (frame.t_ns - before.t_ns) / (after.t_ns - before.t_ns)
+            frame = replace(frame, depth=before.depth if same else between(before.depth, after.depth, share))
+        yield frame
+
+
+def plain(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts as they come out of a JSON file."""
+    return json.loads(json.dumps(facts))
 
 
 def refuse_recordings(path: Path) -> None:
@@ -208,18 +277,7 @@ def events_of(
     The arguments are those of `Recipe.of`, and the `threads` of the sensor.  What is impossible is refused at once.
     """
     recipe = Recipe.of(video, sensor, overrides, **rest)
+    if not recipe.alone or recipe.mounts[0].kind != "dvs":
+        raise UsageError("events of several cameras at once: expected one event camera; convert the video instead")
     dvs = recipe.mounts[0].dvs(recipe.labels, threads)
     return dvs.run(instant.frames[0] for instant in recipe.instants())
-
-
-def _ahead(items: Generator[T], depth: int) -> Generator[T]:
-    """The items, made by a second thread up to `depth` in advance; an error comes out in the place of its item."""
-    with ThreadPoolExecutor(1) as pool, closing(items):
-        end = object()
-        pending = deque(pool.submit(next, items, end) for _ in range(depth))
-        try:
-            while (item := pending.popleft().result()) is not end:
-                pending.append(pool.submit(next, items, end))
-                yield item  # type: ignore[misc]
-        finally:
-            pool.shutdown(cancel_futures=True)

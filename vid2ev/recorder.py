@@ -6,22 +6,26 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vid2ev.mounts import Mount
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Instant, Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.tracks import Track
+from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
 
 
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     """The files that a folder is to be made with."""
-    return [name for mount in recipe.mounts for name in dvs_files(mount.within, recipe.labels, outputs)]
+    cameras = [mount for mount in recipe.mounts if mount.kind == "dvs"]
+    return [name for mount in cameras for name in dvs_files(mount.within, recipe.labels, outputs)]
 
 
 @dataclass
@@ -58,14 +62,7 @@ class Recorder:
     def __init__(self, recipe: Recipe, outputs: Outputs, folder: Folder, threads: int):
         self.recipe, self.outputs, self.folder = recipe, outputs, folder
         self.done = Progress()
-        rate = rate_for(recipe.source.frames_expected, recipe.source.duration_expected_s)
-        pictures = recipe.pictures if recipe.source.rewindable else None
-        self.tracks: Sequence[Track] = [
-            DvsTrack(
-                mount.dvs(recipe.labels, threads), folder, outputs, within=mount.within, rate=rate, pictures=pictures
-            )
-            for mount in recipe.mounts
-        ]
+        self.tracks: Sequence[Track] = [self._track(mount, threads) for mount in recipe.mounts]
 
     def take_up(self) -> None:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
@@ -122,6 +119,19 @@ class Recorder:
         offset_us = self.recipe.mounts[number].clock_offset_us
         start_us = self.done.start_ns // 1000 + offset_us
         return start_us, max(self.done.end_ns // 1000 + offset_us, self.tracks[number].last_us) - start_us
+
+    def _track(self, mount: Mount, threads: int) -> Track:
+        if mount.kind == "cis":
+            return CisTrack(mount.cis(threads), self.folder, self.outputs, within=mount.within)
+        source = self.recipe.source
+        return DvsTrack(
+            mount.dvs(self.recipe.labels, threads),
+            self.folder,
+            self.outputs,
+            within=mount.within,
+            rate=rate_for(source.frames_expected, source.duration_expected_s),
+            pictures=partial(self.recipe.pictures, mount) if source.rewindable else None,
+        )
 
     def outcome(self, number: int) -> dict[str, Any]:
         """What came out of a camera, for its manifest."""

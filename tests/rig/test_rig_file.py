@@ -82,12 +82,12 @@ def test_what_is_left_out_is_that_of_the_video() -> None:
 
 
 def test_the_field_of_the_video_is_assumed_where_nobody_states_it() -> None:
-    rig = default_rig(cis="plain").resolved((64, 48))
+    rig = default_rig(frames=True).resolved((64, 48))
     assert rig.source_assumed and rig.source.fov_deg == pytest.approx(60)
     assert rig.describe()["source"]["assumed"]
-    assert [(view.camera.name, view.camera.sensor) for view in rig.viewpoints] == [("dvs", None), ("cis", "plain")]
+    assert [(view.camera.name, view.camera.sensor) for view in rig.viewpoints] == [("dvs", None), ("cis", None)]
     assert all(view.intrinsics == rig.source for view in rig.viewpoints)
-    assert [camera.name for camera in default_rig("paper").cameras] == ["dvs"]
+    assert [camera.name for camera in default_rig().cameras] == ["dvs"]
 
 
 def test_a_lens_of_another_shape_than_the_video_is_refused() -> None:

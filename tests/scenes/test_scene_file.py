@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from vid2ev.errors import DataError, UsageError
 from vid2ev.scenes.scene_file import SceneFile, read_scene, scene_names
 from vid2ev.scenes.textures import PHOTOGRAPHS, Pattern, pixels_of
-from vid2ev.scenes.toml_text import toml_text
+from vid2ev.toml_text import toml_text
 
 FILE = """
 [about]

@@ -11,8 +11,8 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.scene_file import read_scene, scene_names
-from vid2ev.scenes.toml_text import toml_text
 from vid2ev.scenes.world import World
+from vid2ev.toml_text import toml_text
 
 SMALL = ["camera.size=[48, 36]"]
 BALL = """

@@ -65,7 +65,7 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
             traceback.print_exc()
             result |= {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
         else:
-            events = made.get("counts", {}).get("events")  # (there are none yet in a dry run)
+            events = _events(made)
             result |= {"state": "planned" if events is None else "done", "events": events}
         results.append(result)
     return results
@@ -87,6 +87,12 @@ def table(results: list[dict[str, Any]]) -> str:
         lines.append(f"{result['state']:<7} {result['video']:<{width}}  {result.get('error', events)}".rstrip())
     lines.append(f"{len(results) - failed} of {len(results)} {verb}" + f", {failed} failed" * (failed > 0))
     return "\n".join(lines)
+
+
+def _events(made: dict[str, Any]) -> int | None:
+    """How many there are, by a manifest; None before they are made."""
+    results = [made] if "counts" in made else list(made.get("results", {}).values())
+    return sum(result["counts"].get("events", 0) for result in results) if results else None
 
 
 def _is_clip(path: Path) -> bool:

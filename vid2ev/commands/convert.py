@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from vid2ev.commands.source_options import source_options
+from vid2ev.errors import UsageError
 
 
 class Auto(click.ParamType):
@@ -45,6 +46,20 @@ class Auto(click.ParamType):
 )
 @click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor; may be repeated."
+)
+@click.option(
+    "--rig",
+    metavar="FILE",
+    type=click.Path(dir_okay=False),
+    help="Cameras around the video's; `vid2ev init` writes a file.",
+)
+@click.option(
+    "--depth", metavar="DEPTH",
+    help="How far the scene is, for cameras that stand elsewhere: plane:METRES, a map or a folder of maps, model:NAME.",
+)  # fmt: skip
+@click.option("--frames", "with_frames", is_flag=True, help="Without a rig: a frame camera, too, in the same place.")
+@click.option(
+    "--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames.  [default: paper]"
 )
 @click.option(
     "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
@@ -107,6 +122,10 @@ class Auto(click.ParamType):
     "--probe", multiple=True, metavar="X,Y", help="Write the state of a pixel over time, as CSV and as a plot."
 )
 @click.option("--noise-maps", is_flag=True, help="Write each pixel's thresholds, and which are hot or cold.")
+@click.option(
+    "--cis-out", "pictures", multiple=True, default=["raw", "mp4"], show_default=True, metavar="KIND[,KIND...]",
+    help="Frames of frame cameras: raw (codes of the ADC), png (8 bits), mp4.",
+)  # fmt: skip
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")
@@ -121,6 +140,7 @@ def convert(
     verbose: bool,
     quiet: bool,
     as_json: bool,
+    with_frames: bool,
     **options: Any,
 ) -> None:
     """Turn each VIDEO into the recording of an event camera.
@@ -136,6 +156,9 @@ def convert(
 
     quiet |= as_json
     options["seed"] = None if options["seed"] == "random" else options["seed"]
+    options["cis"] = options["cis"] or ("paper" if with_frames else None)
+    if with_frames and options["rig"]:
+        raise UsageError("--frames with --rig: the rig's file says which cameras there are; leave --frames out")
     found = [source for video in videos for source in batch.sources_in(video)]
     if len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/"):
         directory = Path(output) if output else conversion.default_directory(videos[0])
@@ -188,9 +211,10 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
     overwrite, resume = options.pop("overwrite"), options.pop("resume")
     recipe = Recipe.of(video, seed=seed or 0, **options)
-    outputs.check(recipe.source.size, conversion.expected_us(recipe))
+    conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
-    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(outputs.names())}")]
+    files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
+    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
     text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
     return described | {"outputs": outputs.describe()}, text

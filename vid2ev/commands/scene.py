@@ -61,7 +61,7 @@ def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) 
         titles = _titles()
         click.echo(json.dumps(titles, indent=2) if as_json else _listing(titles))
         return
-    from vid2ev.scenes.toml_text import toml_text
+    from vid2ev.toml_text import toml_text
 
     file = _file(name, options)
     if dry_run:

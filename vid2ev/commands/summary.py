@@ -11,48 +11,78 @@ NAME = 10  # width of the names
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:
     """Facts under each other, their names in a column."""
-    return "\n".join(f"{name:<{NAME}}{text}" for name, text in facts)
+    return "\n".join(f"{name + ' ':<{NAME}}{text}" for name, text in facts)
 
 
 def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Source, light, sensor and seed, from a recipe's description or a manifest."""
-    sensor, upsampling = recipe["sensor"], recipe["upsampling"]
-    parameters = sensor["parameters"]
+    upsampling = recipe["upsampling"]
     light = {
         "none": "the frames, in a straight line from one to the next",
         "linear": f"in a straight line from frame to frame, {_parts(upsampling, 'in one part')}",
         "flow": f"along the motion between the frames, {_parts(upsampling, 'in parts as needed, at most {}')}",
     }
-    width, height = sensor["size"]
-    return [
-        ("source", source_text(recipe["source"])),
-        ("light", light[upsampling["method"]]),
-        (
-            "sensor",
-            f"{sensor['name']}, {width}x{height}, thresholds ON {parameters['threshold_on']:g} and OFF"
-            f" {parameters['threshold_off']:g}, seed {recipe['seed']}",
-        ),
-        ("effects", ", ".join(sensor["effects"]) or "none"),
-    ]
+    facts = [("source", source_text(recipe["source"])), ("light", light[upsampling["method"]])]
+    if "cameras" in recipe:
+        cameras = recipe["cameras"].items()
+        return [*facts, ("depth", _depth_text(recipe)), *((name, sensor_text(sensor)) for name, sensor in cameras)]
+    effects = ", ".join(recipe["sensor"]["effects"]) or "none"
+    return [*facts, ("sensor", f"{sensor_text(recipe['sensor'])}, seed {recipe['seed']}"), ("effects", effects)]
+
+
+def sensor_text(sensor: Mapping[str, Any]) -> str:
+    """A sensor's description as one line."""
+    parameters = sensor["parameters"]
+    if sensor["kind"] == "cis":
+        shutter = f", lines {parameters['line_us']:g} us apart" if parameters["line_us"] else ""
+        how = f"{parameters['frame_rate_hz']:g} frames/s of {parameters['exposure_us']:g} us{shutter}"
+    else:
+        how = f"thresholds ON {parameters['threshold_on']:g} and OFF {parameters['threshold_off']:g}"
+    return f"{sensor['name']}, {'x'.join(map(str, sensor['size']))}, {how}"
+
+
+def _depth_text(recipe: Mapping[str, Any]) -> str:
+    plane_m, maps = recipe["plane_m"], recipe["source"].get("edits", {}).get("depth")
+    return f"a plane at {plane_m:g} m" if plane_m is not None else maps or "not needed"
 
 
 def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Events, duration and warnings, from a manifest."""
-    counts = manifest["counts"]
-    seconds, (width, height) = manifest["duration_us"] / 1e6, manifest["sensor"]["size"]
+    """What came out, duration and warnings, from a manifest."""
+    if "results" in manifest:
+        results, cameras = manifest["results"], manifest["cameras"]
+        counts = [(name, _count_text(result, cameras[name])) for name, result in results.items()]
+        warnings = {text: None for result in results.values() for text in result["warnings"]}
+        return [*counts, _duration(next(iter(results.values()))), *(("warning", text) for text in warnings)]
+    sensor = manifest["sensor"]
+    what = "frames" if sensor["kind"] == "cis" else "events"
+    warnings = manifest["warnings"]
+    return [
+        (what, _count_text(manifest, sensor, named=True)),
+        _duration(manifest),
+        *(("warning", text) for text in warnings),
+    ]
+
+
+def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: bool = False) -> str:
+    """Events or frames of a camera; `named`: which of them it is stands before."""
+    counts, seconds, (width, height) = result["counts"], result["duration_us"] / 1e6, sensor["size"]
+    if sensor["kind"] == "cis":
+        return f"{counts['exposures']:,}{'' if named else ' frames'}, {counts['unfinished']:,} cut off by the end"
     per_s = counts["events"] / seconds if seconds else 0.0
     rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"
     share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
-    return [
-        ("events", f"{counts['events']:,}{rate if seconds else ''}{share}"),
-        ("duration", f"{seconds:.3f} s: {counts['frames']:,} frames, {counts['subframes']:,} made between them"),
-        *(("warning", text) for text in manifest["warnings"]),
-    ]
+    return f"{counts['events']:,}{'' if named else ' events'}{rate if seconds else ''}{share}"
+
+
+def _duration(result: Mapping[str, Any]) -> tuple[str, str]:
+    counts, seconds = result["counts"], result["duration_us"] / 1e6
+    return "duration", f"{seconds:.3f} s: {counts['frames']:,} frames, {counts['subframes']:,} made between them"
 
 
 def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Time taken, from a manifest."""
-    seconds, video_s = manifest["run"]["seconds"], manifest["duration_us"] / 1e6
+    result = next(iter(manifest["results"].values())) if "results" in manifest else manifest
+    seconds, video_s = manifest["run"]["seconds"], result["duration_us"] / 1e6
     ratio = f", {video_s / seconds:.2g} x real time" if seconds and video_s else ""
     threads = manifest["run"]["threads"]
     return [("took", f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}")]

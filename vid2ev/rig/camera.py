@@ -237,11 +237,11 @@ class ResolvedRig:
 OF_THE_CAMERA = {"name", "kind", "clock_offset_us", "sensor", "set", "seed"}
 
 
-def default_rig(dvs: str | None = None, cis: str | None = None) -> Rig:
-    """The rig of a recording without a rig file: an event camera `dvs` and, if its sensor is named, a frame camera
-    `cis`, both where the video was taken."""
-    frames = [Camera(name="cis", kind="cis", sensor=cis)] if cis is not None else []
-    return Rig(cameras=(Camera(name="dvs", kind="dvs", sensor=dvs), *frames))
+def default_rig(frames: bool = False) -> Rig:
+    """The rig of a recording without a rig file: an event camera, and with `frames` a frame camera, where the video was
+    taken."""
+    cameras = Camera(name="dvs", kind="dvs"), Camera(name="cis", kind="cis")
+    return Rig(cameras=cameras if frames else cameras[:1])
 
 
 def nearest_rotation(matrix: np.ndarray) -> np.ndarray:

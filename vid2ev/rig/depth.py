@@ -131,6 +131,12 @@ def open_depth(
     return DepthFiles(Path(text), source.size, meaning)
 
 
+def plane_of(text: str | Path | None) -> float | None:
+    """The distance [m] that a text names, if it names a plane.  Raises UsageError."""
+    name, _, rest = str(text).partition(":")
+    return _distance_m(rest) if name == "plane" else None
+
+
 def between(before_m: np.ndarray, after_m: np.ndarray, share: float) -> np.ndarray:
     """The depth map after `share` (0 to 1) of the interval between two."""
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -14,8 +14,6 @@ A `sensor` that is a file is looked for beside the rig file.  `example_rig.toml`
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import re
 import reprlib
@@ -29,6 +27,7 @@ from pydantic import BaseModel, ValidationError
 from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.recording.disk import whole_file
 from vid2ev.rig.camera import Camera, Rig, Source
+from vid2ev.toml_text import toml_value
 
 EXAMPLE = Path(__file__).with_name("example_rig.toml")
 Model = TypeVar("Model", bound=BaseModel)
@@ -163,17 +162,4 @@ def _keys(record: BaseModel) -> str:
     """The keys of a record that differ from their defaults, as lines of TOML."""
     values = record.model_dump(exclude_defaults=True)
     order = ["name", "kind", *(key for key in values if key not in ("name", "kind"))]
-    return "".join(f"{key} = {_toml(values[key])}\n" for key in order if key in values)
-
-
-def _toml(value: Any) -> str:
-    """A value of TOML, in one line."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else str(value)
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_toml(str(key))} = {_toml(held)}" for key, held in value.items()) + " }"
-    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, list | tuple) else str(value)
+    return "".join(f"{key} = {toml_value(values[key])}\n" for key in order if key in values)

@@ -19,7 +19,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import lock, sync
 from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
 from vid2ev.scenes.source import SceneSource
-from vid2ev.scenes.toml_text import toml_text
+from vid2ev.toml_text import toml_text
 
 Report = Callable[[int, int], object]  # frames written, of how many
 

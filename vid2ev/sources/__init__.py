@@ -3,56 +3,24 @@ all linear light with exact times.
 
     source -> cut (start, stop) -> slowed -> cropped, brought to a size
 
-A new kind of source is a class that satisfies `Source` and a line in `_opened`.
+A new kind of source is a class that satisfies `Source` (`source.py`) and a line in `_opened`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from vid2ev.errors import UsageError
-from vid2ev.stream.frames import Colour, Frame
+from vid2ev.sources.source import Source
+from vid2ev.stream.frames import Colour
 
 __all__ = ["OPTIONS", "Source", "open_source"]
 
 SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "scene:", "camera:", "-"
 OPTIONS = ("transfer", "fps", "colour", "slowdown", "start", "stop", "crop", "size", "motion")  # of `open_source`
-
-
-class Source(Protocol):
-    """A clip that can be read from its start as often as one likes, one frame at a time, in memory that does not grow.
-
-    Making one opens it, and raises `UsageError` or `DataError` if its first frame cannot be had.
-    """
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height [px] of every frame, upright."""
-
-    @property
-    def frames_expected(self) -> int | None:
-        """How many frames there should be, by the header; in some formats an estimate, None if there is no telling."""
-
-    @property
-    def duration_expected_s(self) -> float | None:
-        """From the first frame to the end [s], by the header; None if there is no telling."""
-
-    @property
-    def rewindable(self) -> bool:
-        """Whether it can be read again; standard input and cameras cannot, and a second `frames` raises UsageError."""
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a person should know, one sentence each; more may come while the frames are read to their end."""
-
-    def describe(self) -> dict[str, Any]:
-        """What the source is, how its codes were taken and how it was edited, ready for JSON."""
-
-    def frames(self, start: int = 0) -> Iterator[Frame]:
-        """The frames from index `start` on, in order of presentation, with strictly increasing times."""
 
 
 def open_source(
@@ -67,6 +35,7 @@ def open_source(
     crop: str | None = None,
     size: str | None = None,
     motion: str | None = None,
+    seen_through: Callable[[Source], Source] | None = None,
 ) -> Source:
     """The source behind a path: a folder of images, a TIFF with pages, a .npy or .npz, `synthetic:NAME`, `scene:NAME`
     or a scene file, `-` for standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
@@ -79,6 +48,7 @@ def open_source(
     start, stop  the part to read [s on the source's own clock], both ends included
     slowdown     the footage plays so many times slower than the world went: its times are divided by it
     crop, size   as in `framing.py`, such as "640x480+0+60" and "346x260"
+    seen_through what else is done to the source before it is cut and framed, such as giving it depth
     motion       makes a clip of a photograph: "pan", "saccade", "zoom" or a .csv file, as in `motion.py`
 
     Raises UsageError for a path that does not exist and for options that cannot be meant, DataError for content that
@@ -91,6 +61,7 @@ def open_source(
     else:
         source = _in_motion(Path(path), motion, transfer=transfer, fps=fps, colour=colour, crop=crop, size=size)
         crop = size = None
+    source = source if seen_through is None else seen_through(source)
     if start is not None or stop is not None:
         from vid2ev.sources.cut import Cut
 

@@ -31,6 +31,7 @@ class ArrayStack:
     """
 
     rewindable = True
+    dense = False
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ import numpy as np
 from vid2ev.stream.frames import Frame
 
 if TYPE_CHECKING:
-    from vid2ev.sources import Source
+    from vid2ev.sources.source import Source
 
 
 class Edit:
@@ -39,6 +39,11 @@ class Edit:
     def rewindable(self) -> bool:
         """Whether it can be read again."""
         return self.source.rewindable
+
+    @property
+    def dense(self) -> bool:
+        """Whether nothing has to be made between its frames."""
+        return self.source.dense
 
     @property
     def warnings(self) -> list[str]:

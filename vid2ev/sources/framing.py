@@ -24,7 +24,7 @@ from vid2ev.sources.edit import Edit
 from vid2ev.stream.frames import Frame
 
 if TYPE_CHECKING:
-    from vid2ev.sources import Source
+    from vid2ev.sources.source import Source
 
 LARGEST = 1 << 15  # pixels along a side
 

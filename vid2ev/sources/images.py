@@ -36,6 +36,7 @@ class Images:
     """
 
     rewindable = True
+    dense = False
 
     def __init__(
         self,

@@ -47,6 +47,7 @@ class Photograph:
     """
 
     rewindable = True
+    dense = False
 
     def __init__(
         self,

@@ -49,6 +49,11 @@ class SyntheticClip(ABC):
         return True
 
     @property
+    def dense(self) -> bool:
+        """There is as much between its frames as between those of a video."""
+        return False
+
+    @property
     def duration_expected_s(self) -> float:
         """From the first frame to the last [s]."""
         return float((self.frames_expected - 1) / parse_fps(self.fps))

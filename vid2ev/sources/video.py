@@ -39,6 +39,8 @@ class Video:
     footage have no known meaning, UsageError for a transfer or fps that cannot be meant.
     """
 
+    dense = False
+
     def __init__(
         self,
         footage: Footage,

@@ -17,17 +17,18 @@ def toml_text(tables: Mapping[str, Any]) -> str:
     for name, table in tables.items():
         heading = f"[[{_key(name)}]]" if isinstance(table, list) else f"[{_key(name)}]"
         for one in table if isinstance(table, list) else [table]:
-            lines = [f"{_key(key)} = {_value(value)}" for key, value in one.items() if value is not None]
+            lines = [f"{_key(key)} = {toml_value(value)}" for key, value in one.items() if value is not None]
             blocks.append("\n".join([heading, *lines]))
     return "\n\n".join(blocks) + "\n"
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A value in one line."""
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{_key(key)} = {_value(child)}" for key, child in value.items() if child is not None)
+        inside = ", ".join(f"{_key(key)} = {toml_value(child)}" for key, child in value.items() if child is not None)
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(child) for child in value)}]"
+        return f"[{', '.join(toml_value(child) for child in value)}]"
     if isinstance(value, str):
         return _string(value)
     if isinstance(value, bool):

@@ -1,0 +1,45 @@
+"""What a source is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from vid2ev.stream.frames import Frame
+
+
+class Source(Protocol):
+    """A clip that can be read from its start as often as one likes, one frame at a time, in memory that does not grow.
+
+    Making one opens it, and raises `UsageError` or `DataError` if its first frame cannot be had.
+    """
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px] of every frame, upright."""
+
+    @property
+    def frames_expected(self) -> int | None:
+        """How many frames there should be, by the header; in some formats an estimate, None if there is no telling."""
+
+    @property
+    def duration_expected_s(self) -> float | None:
+        """From the first frame to the end [s], by the header; None if there is no telling."""
+
+    @property
+    def rewindable(self) -> bool:
+        """Whether it can be read again; standard input and cameras cannot, and a second `frames` raises UsageError."""
+
+    @property
+    def dense(self) -> bool:
+        """Whether its frames are as close in time as light asks for, so that nothing has to be made between them."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know, one sentence each; more may come while the frames are read to their end."""
+
+    def describe(self) -> dict[str, Any]:
+        """What the source is, how its codes were taken and how it was edited, ready for JSON."""
+
+    def frames(self, start: int = 0) -> Iterator[Frame]:
+        """The frames from index `start` on, in order of presentation, with strictly increasing times."""

@@ -1,0 +1,63 @@
+"""A source whose frames carry their depth.
+
+On the command line depth is named in one text, with what its numbers mean after commas (`rig/depth.py` has all of it):
+
+    plane:2.5      maps/,scale=0.001      disparity.npy,baseline_m=0.193,focal_px=995      model:FOLDER,scale=0.2
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from vid2ev.errors import UsageError, nearest
+from vid2ev.rig.depth import KINDS, Depth, open_depth
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.sources.edit import Edit
+from vid2ev.sources.source import Source
+from vid2ev.stream.frames import Frame
+
+NUMBERS = ("scale", "shift", "focal_px", "baseline_m")
+
+
+class WithDepth(Edit):
+    """A source with the depth of its frames; `name` says where it is from."""
+
+    def __init__(self, source: Source, depth: Depth, name: str):
+        super().__init__(source)
+        self._depth, self._name = depth, name
+
+    def edits(self) -> dict[str, Any]:
+        """Where the depth is from."""
+        return {"depth": self._name}
+
+    def frames(self, start: int = 0) -> Iterator[Frame]:
+        """The frames from index `start` on."""
+        for index, frame in enumerate(self.source.frames(start), start):
+            yield replace(frame, depth=self._depth.at(index, lights=[frame.light]))
+
+
+def parse_depth(text: str, lens: Intrinsics) -> Depth:
+    """The depth that a text names, of pictures taken through a lens.  Raises UsageError, DataError."""
+    name, settings = text, dict[str, Any]()
+    while found := re.fullmatch(r"(.+),(\w+)=([^,=]*)", name):
+        name, key, value = found[1], found[2], found[3]
+        if key == "kind" and value in KINDS:
+            settings[key] = value
+        elif key in NUMBERS and _number(value) is not None:
+            settings[key] = _number(value)
+        else:
+            keys = ("kind", *NUMBERS)
+            wanted = f"one of {', '.join(KINDS)}" if key == "kind" else "a number"
+            why = f"expected {wanted}" if key in keys else f"unknown{nearest(key, keys)}; expected {', '.join(keys)}"
+            raise UsageError(f"depth '{text}': {key}={value}: {why}")
+    return open_depth(name, lens, **settings)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
