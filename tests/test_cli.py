@@ -18,9 +18,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from vid2ev import UsageError, conversion
+from vid2ev import UsageError, conversion, instants
 from vid2ev.commands import main
-from vid2ev.recipe import Instant, Recipe
+from vid2ev.instants import Instant
+from vid2ev.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 QUICK = ["--upsample", "none", "--threads", "1"]
@@ -259,16 +260,16 @@ def test_a_place_that_cannot_be_written() -> None:
 
 def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     vid2ev("convert", CLIP, "-o", "whole", "-q", *QUICK)
-    instants = Recipe._instants
+    of_recipe = instants._instants
 
-    def interrupted(self: Recipe, start: int) -> Iterator[Instant]:
-        for k, item in enumerate(instants(self, start)):
+    def interrupted(recipe: Recipe, start: int) -> Iterator[Instant]:
+        for k, item in enumerate(of_recipe(recipe, start)):
             if k == 8:
                 raise KeyboardInterrupt
             yield item
 
     with monkeypatch.context() as patch:
-        patch.setattr(Recipe, "_instants", interrupted)
+        patch.setattr(instants, "_instants", interrupted)
         result = vid2ev("convert", CLIP, "-o", "out", *QUICK)
         assert (result.exit_code, result.stderr.count("\n")) == (130, 1)
         assert "nothing is left" in result.stderr and left() == {"whole"}

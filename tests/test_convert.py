@@ -13,8 +13,9 @@ import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
 
-from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, read_events
-from vid2ev.recipe import Instant, Recipe
+from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, read_events
+from vid2ev.instants import Instant
+from vid2ev.recipe import Recipe
 from vid2ev.stream.ahead import ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
@@ -144,15 +145,15 @@ def test_a_random_seed_is_drawn_and_kept(tmp_path: Path) -> None:
 
 
 def test_a_source_that_fails_half_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    instants = Recipe._instants
+    of_recipe = instants._instants
 
-    def failing(self: Recipe, start: int) -> Iterator[Instant]:
-        for k, item in enumerate(instants(self, start)):
+    def failing(recipe: Recipe, start: int) -> Iterator[Instant]:
+        for k, item in enumerate(of_recipe(recipe, start)):
             if k == 8:
                 raise DataError("picture 8 is broken; mend it")
             yield item
 
-    monkeypatch.setattr(Recipe, "_instants", failing)
+    monkeypatch.setattr(instants, "_instants", failing)
     with pytest.raises(DataError, match="picture 8"):
         convert(CLIP, tmp_path / "out", upsample="none")
     assert list(tmp_path.iterdir()) == []

@@ -25,6 +25,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 FLOORS = {
     "errors": 0,
     "toml_text": 0,
+    "requests": 0,
     "kernel_cache": 0,
     "kernel_compiler": 0,
     "stream": 1,
@@ -43,14 +44,16 @@ FLOORS = {
     "outputs": 6,
     "mounts": 7,
     "sight": 8,
-    "tracks": 7,
+    "truth": 8,
+    "tracks": 9,
+    "instants": 10,
     "recipe": 9,
     "reformat": 9,
-    "recorder": 10,
-    "conversion": 11,
-    "": 12,  # vid2ev/__init__.py: the public names
-    "commands": 13,
-    "__main__": 14,
+    "recorder": 11,
+    "conversion": 12,
+    "": 13,  # vid2ev/__init__.py: the public names
+    "commands": 14,
+    "__main__": 15,
 }
 
 

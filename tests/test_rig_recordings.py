@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from vid2ev import Events, UsageError, convert, read_events
+from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.camera import Camera, Rig, Source
+from vid2ev.rig.pose import IDENTITY
+from vid2ev.scenes.source import SceneSource
+from vid2ev.sources import open_source
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=200,duration_s=0.2"
 OPTIONS: dict[str, Any] = {"upsample": "none", "seed": 3, "threads": 1}
@@ -114,3 +118,46 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any]
     with pytest.raises(UsageError, match=message):
         convert(CLIP, tmp_path / "out", **(OPTIONS | changed))
     assert not (tmp_path / "out").exists()
+
+
+def test_truth_lies_beside_what_each_camera_sends(tmp_path: Path) -> None:
+    around = rig(translation_mm=(100.0, 0.0, 0.0), clock_offset_us=7)
+    truth = ["depth,mask", "map", "poses"]
+    convert(CLIP, tmp_path / "out", rig=around, depth="plane:2", truth=truth, truth_rate_hz=20, **OPTIONS)
+    right = tmp_path / "out" / "right" / "truth"
+    assert np.loadtxt(right / "timestamps.txt").tolist() == [7, 50_007, 100_007, 150_007, 200_007]
+    t_ns, positions_m, quaternions = read_poses(right / "poses.txt")
+    assert t_ns.tolist() == [7000, 50_007_000, 100_007_000, 150_007_000, 200_007_000]
+    np.testing.assert_allclose(positions_m, [[0.1, 0, 0]] * 5)
+    np.testing.assert_array_equal(quaternions, [[0, 0, 0, 1]] * 5)
+    np.testing.assert_array_equal(read_depth(right / "depth" / "000004.npy"), np.full((48, 64), 2, np.float32))
+    disparity = 32 / np.tan(np.radians(30)) * 0.1 / 2
+    here = np.stack(np.meshgrid(np.arange(64), np.arange(48)), axis=-1)
+    shift = read_pixel_map(right / "map_left" / "000002.npz") - here
+    np.testing.assert_allclose(shift, np.broadcast_to([disparity, 0], shift.shape), atol=1e-4)
+    mask = read_mask(right / "mask" / "000001.png")
+    assert mask[:, : 63 - int(disparity)].all() and not mask[:, 64 - int(disparity) :].any()
+    assert read_mask(tmp_path / "out" / "left" / "truth" / "mask" / "000001.png").all()
+
+
+def test_the_truth_of_a_scene_is_that_of_its_world(tmp_path: Path) -> None:
+    scene = "scene:parallax,seed=4,scene.duration_s=0.05,size=48x36"
+    around = rig(translation_mm=(15.0, 0.0, 0.0), size=(32, 24))
+    manifest = convert(scene, tmp_path / "out", rig=around, truth="depth,flow,poses", truth_rate_hz=40, **OPTIONS)
+    assert manifest["upsampling"]["method"] == "none" and manifest["results"]["right"]["counts"]["events"] > 0
+    source = open_source(scene)
+    assert isinstance(source, SceneSource)
+    world = source.world
+    stamps_us = np.loadtxt(tmp_path / "out" / "right" / "truth" / "timestamps.txt", dtype=np.int64)
+    assert len(stamps_us) == 3 and stamps_us[0] == 0
+    right = around.resolved((48, 36), world.intrinsics).viewpoints[1]
+    for name, lens, pose in (("left", world.intrinsics, IDENTITY), ("right", right.intrinsics, right.pose)):
+        folder = tmp_path / "out" / name / "truth"
+        t_ns, positions_m, _ = read_poses(folder / "poses.txt")
+        assert (t_ns // 1000).tolist() == stamps_us.tolist()
+        picture = world.render(int(t_ns[1]), lens, pose)
+        np.testing.assert_array_equal(read_depth(folder / "depth" / "000001.npy"), picture.depth)
+        np.testing.assert_allclose(positions_m[1], (world.camera_pose(int(t_ns[1])) @ pose).translation_m)
+        flow = world.flow(int(t_ns[1]), int(t_ns[2]), picture, lens, pose).shift
+        np.testing.assert_array_equal(read_flow(folder / "flow" / "000001.npz"), flow)
+        assert not (folder / "flow" / "000002.npz").exists()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from vid2ev.errors import UsageError as UsageError
     from vid2ev.errors import Vid2evError as Vid2evError
     from vid2ev.formats import read_events as read_events
-    from vid2ev.recipe import events_of as events_of
+    from vid2ev.instants import events_of as events_of
     from vid2ev.sensors.cis import Cis as Cis
     from vid2ev.sensors.cis_spec import CisSpec as CisSpec
     from vid2ev.sensors.dvs import Dvs as Dvs
@@ -45,7 +45,7 @@ _HOME = {
     "Vid2evError": "vid2ev.errors",
     "cis_names": "vid2ev.sensors.presets",
     "convert": "vid2ev.conversion",
-    "events_of": "vid2ev.recipe",
+    "events_of": "vid2ev.instants",
     "load_cis": "vid2ev.sensors.presets",
     "load_sensor": "vid2ev.sensors.presets",
     "open_source": "vid2ev.sources",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.recorder import Progress, Recorder, growing
@@ -122,12 +123,12 @@ def _record(recorder: Recorder, piece: int, report: Report | None) -> None:
     """From the point of the last checkpoint to the end of the source."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
-    with closing(recipe.instants(max(done.frames - 1, 0))) as instants:
-        first = next(instants, None)
+    with closing(instants(recipe, max(done.frames - 1, 0))) as seen:
+        first = next(seen, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
         recorder.begin(first)
-        for instant in instants:
+        for instant in seen:
             recorder.add(instant)
             done.limited, done.seconds = limited_before + instant.limited, time.monotonic() - began
             work += max(STEP, sum(frame.light.size for frame in instant.frames))

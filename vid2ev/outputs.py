@@ -13,6 +13,7 @@ from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.recording import exposures
+from vid2ev.requests import names_in
 from vid2ev.views.on_disk import KINDS, write_frames
 from vid2ev.views.requests import parse_representation, parse_slicing
 
@@ -53,8 +54,8 @@ class Outputs:
     ) -> Outputs:
         """The outputs of these options; several formats or pictures may be in one text, with commas, and a pixel be
         "x,y".  Raises UsageError."""
-        names = _listed(formats)
-        outputs = cls(names, probe=tuple(map(pixel_of, probe)), pictures=_listed(pictures), **rest)
+        names = names_in(formats)
+        outputs = cls(names, probe=tuple(map(pixel_of, probe)), pictures=names_in(pictures), **rest)
         for kind in outputs.pictures:
             if kind not in exposures.KINDS:
                 raise UsageError(f"pictures as '{kind}': expected one of {', '.join(exposures.KINDS)}")
@@ -143,12 +144,6 @@ def write_frame_index(path: Path, recording: Recording) -> None:
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write("t_us,events\n")
         file.writelines(f"{t_us},{count}\n" for t_us, count in zip(index.frame_us, index.counts, strict=True))
-
-
-def _listed(texts: str | Sequence[str]) -> tuple[str, ...]:
-    """The names in texts that may hold several, with commas; each once."""
-    parts = [texts] if isinstance(texts, str) else texts
-    return tuple(dict.fromkeys(name.strip() for text in parts for name in text.split(",")))
 
 
 def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:

@@ -3,56 +3,31 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
-from vid2ev.formats.event_file import Picture
-from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.mounts import Mount, Sensors, mounts_of
 from vid2ev.physics.bayer import check_pattern
 from vid2ev.recording.manifest import identity, versions
+from vid2ev.requests import names_in
 from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
-from vid2ev.rig.depth import between, plane_of
+from vid2ev.rig.depth import plane_of
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, rendered
+from vid2ev.sight import Sight, scene_of
 from vid2ev.sources import OPTIONS, Source, open_source
-from vid2ev.stream.ahead import ahead
-from vid2ev.stream.events import Events
-from vid2ev.stream.frames import Frame
-from vid2ev.upsample import Interval, Upsampler, make_upsampler
-from vid2ev.upsample.cuts import CutDetector
-from vid2ev.upsample.none import NoUpsampling
+from vid2ev.truth import Wanted
+from vid2ev.upsample import Upsampler, make_upsampler
 
-FRAMES_AHEAD = 4  # made in advance, while the sensor works
-INTERVALS_AHEAD = 2  # whose motion is known in advance
 THRESHOLD = 0.15  # nat, where there are frame cameras only
 
 CUTS = ("restart", "keep")
-
-
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """What the cameras see at one instant of the source's clock: a frame for each, on its own clock.
-
-    `original` and `cut` are those of the source's frame.  `limited` is the number of source intervals so far that hit
-    `max_subframes`.
-    """
-
-    frames: tuple[Frame, ...]
-    t_ns: int
-    original: bool
-    cut: bool
-    limited: int
 
 
 @dataclass(frozen=True)
@@ -70,6 +45,7 @@ class Recipe:
     labels         give each event its cause
     cuts           "restart": event cameras start afresh after a cut, and "keep": they see a step of light
     bayer          the pattern of colour filters before the pixels; None for none: they see luminance
+    truth          what is to be known for certain beside it
     """
 
     video: str
@@ -84,6 +60,7 @@ class Recipe:
     labels: bool = False
     cuts: Literal["restart", "keep"] = "restart"
     bayer: str | None = None
+    truth: Wanted | None = None
 
     @classmethod
     def of(
@@ -95,6 +72,8 @@ class Recipe:
         cis: str | Path | CisSpec | None = None,
         rig: str | Path | Rig | None = None,
         depth: str | Path | None = None,
+        truth: str | Sequence[str] = (),
+        truth_rate_hz: float = 30.0,
         **rest: Any,
     ) -> Recipe:
         """The recipe for a video and its cameras, with everything checked that can be before the first frame.
@@ -105,6 +84,7 @@ class Recipe:
         cis        the same of frame cameras; without a rig it puts one where the video was taken
         rig        the cameras: a rig file, or what is in one; without it an event camera where the video was taken
         depth      how far the scene is, as `rig.depth` has it; needed where cameras stand elsewhere
+        truth      some of `truth.KINDS`, to be written so many times a second
         The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
         """
         if not 0 <= (seed := rest.get("seed", 0)) < 1 << 64:
@@ -122,9 +102,17 @@ class Recipe:
         source = open_source(video, colour="rgb" if coloured else "luminance", **options)
         if source.dense:
             rest["upsample"] = "none"
-        resolved = asked.resolved(source.size)
+        scene = scene_of(source)
+        resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None)
         mounts = mounts_of(resolved, sensors, seed, alone=rig is None and cis is None)
-        recipe = cls(str(video), source, resolved, mounts, plane_m, **rest)
+        wanted = Wanted(names_in(truth), truth_rate_hz) if truth else None
+        if wanted and "flow" in wanted.kinds and not source.dense:
+            raise UsageError("truth 'flow' of a video is known to nobody: expected a scene; leave it out")
+        if wanted and not source.dense and depth is None and {"depth", "map"} & {*wanted.kinds}:
+            raise UsageError(
+                f"truth '{','.join(wanted.kinds)}': how far the video's scene is was not said; add --depth"
+            )
+        recipe = cls(str(video), source, resolved, mounts, plane_m, truth=wanted, **rest)
         recipe.upsampler()  # (refuses what cannot be)
         if recipe.sight().needs_depth and maps is None and not source.dense:
             away = next(mount for mount in mounts if mount.pose.translation_m.any())
@@ -138,10 +126,10 @@ class Recipe:
 
     def upsampler(self) -> Upsampler:
         """A new upsampler."""
-        return make_upsampler(self.upsample, self.subframes, self.max_subframes, self._threshold)
+        return make_upsampler(self.upsample, self.subframes, self.max_subframes, self.threshold)
 
     @property
-    def _threshold(self) -> float:
+    def threshold(self) -> float:
         """The least contrast threshold of all sensors [nat]."""
         specs = [mount.sensor.spec for mount in self.mounts]
         events = [spec for spec in specs if isinstance(spec, DvsSpec)]
@@ -150,52 +138,6 @@ class Recipe:
     def sight(self) -> Sight:
         """What the cameras see, before the first frame.  Raises UsageError where a depth is missing."""
         return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer)
-
-    def instants(self, start: int = 0) -> Generator[Instant]:
-        """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
-        little in advance: one looks for motion, another carries light along it, a third forms the views."""
-        return ahead(self._instants(start), FRAMES_AHEAD)
-
-    def _instants(self, start: int) -> Generator[Instant]:
-        sight = self.sight()
-        if not sight.free and self.source.dense:
-            for frames, t_ns in rendered(self.source, self.mounts, self.bayer, start):
-                yield Instant(frames, t_ns, original=True, cut=False, limited=0)
-            return
-        with closing(self._light(start) if sight.free else ahead(self._light(start), FRAMES_AHEAD)) as light:
-            for frame, limited in light:
-                yield Instant(sight.frames(frame), frame.t_ns, frame.original, frame.cut, limited)
-
-    def _light(self, start: int) -> Generator[tuple[Frame, int]]:
-        limited = 0
-        with closing(ahead(self._intervals(start), INTERVALS_AHEAD)) as intervals:
-            for interval in intervals:
-                limited += interval.limited
-                for frame in interval:
-                    yield frame, limited
-
-    def _intervals(self, start: int) -> Generator[Interval]:
-        """The frame `start` by itself, and each interval after it."""
-        upsampler, straight = self.upsampler(), NoUpsampling()
-        cuts = CutDetector(self._threshold)
-        before: Frame | None = None
-        # (whether there is a cut after frame `start` depends on the frame before it, too)
-        for index, frame in enumerate(self.source.frames(max(start - 1, 0)), max(start - 1, 0)):
-            cut = before is not None and cuts.begins_shot(before, frame) and self.cuts == "restart"
-            if index == start:
-                yield Interval(iter([frame]))
-            elif before is not None and index > start:
-                method = straight if cuts.unrelated else upsampler
-                interval = method.between(before, replace(frame, cut=cut))
-                yield interval if frame.depth is None else replace(interval, frames=_filled(interval, before, frame))
-            before = frame
-
-    def pictures(self, mount: Mount) -> Iterator[Picture]:
-        """The frames of the source as a camera sees them, read again, in 8 bits of sRGB: to be kept beside events."""
-        sight = Sight(self.rig.source, [mount], self.plane_m, None)
-        for frame in self.source.frames():
-            (seen,) = sight.frames(frame)
-            yield Picture(seen.t_ns // 1000, srgb_codes(seen.light))
 
     @property
     def alone(self) -> bool:
@@ -221,11 +163,12 @@ class Recipe:
         path = Path(self.video)
         known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
         upsampling = {"method": self.upsample, "subframes": self.subframes, "max_subframes": self.max_subframes}
+        truth = {"truth": asdict(self.truth)} if self.truth else {}
         return {
             "versions": versions(),
             "source": self.source.describe() | known_by,
             "upsampling": upsampling | {"cuts": self.cuts},
-        }
+        } | truth
 
 
 def _with_depth(text: str, rig: Rig, source: Source) -> Source:
@@ -233,17 +176,6 @@ def _with_depth(text: str, rig: Rig, source: Source) -> Source:
     from vid2ev.sources.with_depth import WithDepth, parse_depth
 
     return WithDepth(source, parse_depth(text, rig.source.intrinsics(source.size)), text)
-
-
-def _filled(frames: Iterable[Frame], before: Frame, after: Frame) -> Iterator[Frame]:
-    """The frames of an interval, with depth between those of its ends."""
-    assert before.depth is not None and after.depth is not None
-    same = np.array_equal(before.depth, after.depth, equal_nan=True)
-    for frame in frames:
-        if frame.depth is None:
-            share = (frame.t_ns - before.t_ns) / (after.t_ns - before.t_ns)
-            frame = replace(frame, depth=before.depth if same else between(before.depth, after.depth, share))
-        yield frame
 
 
 def plain(facts: dict[str, Any]) -> dict[str, Any]:
@@ -262,22 +194,3 @@ def refuse_recordings(path: Path) -> None:
     raise UsageError(
         f"{path} is {what} already; `vid2ev render` shows it, `vid2ev reformat` turns it into another format"
     )
-
-
-def events_of(
-    video: str | Path,
-    sensor: str | Path | DvsSpec = "paper",
-    overrides: Sequence[str] = (),
-    *,
-    threads: int = 1,
-    **rest: Any,
-) -> Iterator[Events]:
-    """The events of a video, those that `convert` writes: one Events for each frame and sub-frame, the empty ones too.
-
-    The arguments are those of `Recipe.of`, and the `threads` of the sensor.  What is impossible is refused at once.
-    """
-    recipe = Recipe.of(video, sensor, overrides, **rest)
-    if not recipe.alone or recipe.mounts[0].kind != "dvs":
-        raise UsageError("events of several cameras at once: expected one event camera; convert the video instead")
-    dvs = recipe.mounts[0].dvs(recipe.labels, threads)
-    return dvs.run(instant.frames[0] for instant in recipe.instants())

@@ -12,20 +12,24 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.instants import Instant, pictures
 from vid2ev.mounts import Mount
 from vid2ev.outputs import Outputs
-from vid2ev.recipe import Instant, Recipe
+from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
+from vid2ev.tracks.truth import TruthTrack, truth_files
 
 
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     """The files that a folder is to be made with."""
-    cameras = [mount for mount in recipe.mounts if mount.kind == "dvs"]
-    return [name for mount in cameras for name in dvs_files(mount.within, recipe.labels, outputs)]
+    events = [mount.within for mount in recipe.mounts if mount.kind == "dvs"]
+    truth = [mount.within for mount in recipe.mounts if recipe.truth]
+    files = [name for within in events for name in dvs_files(within, recipe.labels, outputs)]
+    return files + [name for within in truth for name in truth_files(within)]
 
 
 @dataclass
@@ -63,6 +67,7 @@ class Recorder:
         self.recipe, self.outputs, self.folder = recipe, outputs, folder
         self.done = Progress()
         self.tracks: Sequence[Track] = [self._track(mount, threads) for mount in recipe.mounts]
+        self._truths = [TruthTrack(mount, folder) for mount in recipe.mounts if recipe.truth]
 
     def take_up(self) -> None:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
@@ -78,6 +83,8 @@ class Recorder:
         with self.folder.writing():
             for track, frame in zip(self.tracks, instant.frames, strict=True):
                 track.begin(frame)
+            if not self.done.frames:
+                self._add_truth(instant)
         if not self.done.frames:
             self.done.add(instant)
 
@@ -86,6 +93,7 @@ class Recorder:
         with self.folder.writing():
             for track, frame in zip(self.tracks, instant.frames, strict=True):
                 track.add(frame)
+            self._add_truth(instant)
         self.done.add(instant)
         self.done.events = sum(track.events for track in self.tracks)
 
@@ -112,6 +120,8 @@ class Recorder:
         for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
             (whole / mount.within).mkdir(exist_ok=True)
             track.write(whole / mount.within, *self.span_us(mount.number))
+        for mount, truth in zip(self.recipe.mounts, self._truths, strict=False):
+            truth.write(whole / mount.within)
 
     def span_us(self, number: int) -> tuple[int, int]:
         """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last
@@ -119,6 +129,10 @@ class Recorder:
         offset_us = self.recipe.mounts[number].clock_offset_us
         start_us = self.done.start_ns // 1000 + offset_us
         return start_us, max(self.done.end_ns // 1000 + offset_us, self.tracks[number].last_us) - start_us
+
+    def _add_truth(self, instant: Instant) -> None:
+        for track, truth in zip(self._truths, instant.truth, strict=False):
+            track.add(truth)
 
     def _track(self, mount: Mount, threads: int) -> Track:
         if mount.kind == "cis":
@@ -130,7 +144,7 @@ class Recorder:
             self.outputs,
             within=mount.within,
             rate=rate_for(source.frames_expected, source.duration_expected_s),
-            pictures=partial(self.recipe.pictures, mount) if source.rewindable else None,
+            pictures=partial(pictures, self.recipe, mount) if source.rewindable else None,
         )
 
     def outcome(self, number: int) -> dict[str, Any]:

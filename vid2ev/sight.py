@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
 from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.views import Views, is_same
+from vid2ev.rig.views import View, Views, is_same
+from vid2ev.scenes.render import Picture
+from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import Source
+from vid2ev.sources.cut import Cut
 from vid2ev.stream.frames import Frame
 
 
@@ -21,8 +26,8 @@ class Sight:
     bayer    the pattern of colour filters before the pixels of event cameras, or None
     """
 
-    def __init__(self, source: Intrinsics, mounts: Sequence[Mount], plane_m: float | None, bayer: str | None):
-        self._mounts, self._bayer = mounts, bayer
+    def __init__(self, source: Intrinsics, mounts: Sequence[Mount], plane_m: float | None, bayer: str | None = None):
+        self._mounts = mounts
         self.free = all(is_same(source, mount.intrinsics, mount.pose) for mount in mounts)  # of any work
         self._groups = [  # (those that see colours, and those that see luminance: a third of the work)
             (coloured, places, Views(source, [(mounts[k].intrinsics, mounts[k].pose) for k in places], plane_m))
@@ -35,41 +40,62 @@ class Sight:
         """Whether frames have to carry their depth."""
         return any(views.needs_depth() for _, _, views in self._groups)
 
-    def frames(self, frame: Frame) -> tuple[Frame, ...]:
-        """What each camera sees of a frame."""
-        seen: dict[int, Frame] = {}
+    def views(self, frame: Frame) -> list[View]:
+        """The views of a frame, with their masks."""
+        seen: dict[int, View] = {}
         for coloured, places, views in self._groups:
-            found = views.see(frame.light if coloured else frame.luminance, frame.depth)
-            for k, view in zip(places, found, strict=True):
-                seen[k] = as_seen(replace(frame, light=view.light, depth=None), self._mounts[k], self._bayer)
-        return tuple(seen[k] for k in range(len(self._mounts)))
+            light = frame.light if coloured else frame.luminance
+            seen |= dict(zip(places, views.see(light, frame.depth), strict=True))
+        return [seen[k] for k in range(len(self._mounts))]
 
 
-def rendered(
-    source: Source, mounts: Sequence[Mount], bayer: str | None, start: int
-) -> Iterator[tuple[tuple[Frame, ...], int]]:
-    """What each camera sees of a scene at each instant from index `start` on, and the instant [ns].  Raises UsageError
-    for a scene that is seen through a crop or another size."""
-    views = getattr(source, "views", None)
-    if views is None:
-        raise UsageError(
-            "a rig sees all of a scene: leave --crop, --size and --slowdown out, and set its camera's size"
-        )
-    for t_ns, pictures in views([(mount.intrinsics, mount.pose) for mount in mounts], start=start):
-        frames = [Frame(picture.light, t_ns) for picture in pictures]
-        seen = [
-            as_seen(frame if sees_colour(mount, bayer) else replace(frame, light=frame.luminance), mount, bayer)
-            for frame, mount in zip(frames, mounts, strict=True)
-        ]
-        yield tuple(seen), t_ns
+def scene_of(source: Source) -> SceneSource | None:
+    """The scene that a source renders, or a part in time of one; None for other sources."""
+    scene = source.source if isinstance(source, Cut) else source
+    return scene if isinstance(scene, SceneSource) else None
+
+
+class Stage:
+    """A scene whose pictures are rendered for each camera, in place of views of one.
+
+    Raises UsageError for a scene that is seen through a crop, at another size or speed.
+    """
+
+    def __init__(self, source: Source, mounts: Sequence[Mount]):
+        scene = scene_of(source)
+        if scene is None:
+            raise UsageError(
+                "a rig sees all of a scene: leave --crop, --size and --slowdown out; set its camera's size"
+            )
+        self.world, self._mounts = scene.world, mounts
+        self.instants_ns = scene.instants_between(*(source.ends_ns() if isinstance(source, Cut) else (None, None)))
+
+    def pictures(self, t_ns: int) -> list[Picture]:
+        """What each camera sees at an instant; cameras with the same view share it."""
+        seen: dict[tuple[object, ...], Picture] = {}
+        keys = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in self._mounts]
+        for key, mount in zip(keys, self._mounts, strict=True):
+            if key not in seen:
+                seen[key] = self.world.render(t_ns, mount.intrinsics, mount.pose)
+        return [seen[key] for key in keys]
+
+
+def arriving(
+    frame: Frame, lights: Sequence[np.ndarray], mounts: Sequence[Mount], bayer: str | None
+) -> tuple[Frame, ...]:
+    """The light that each camera sees at a frame of the source, as it reaches its pixels: luminance where it tells no
+    colours apart, through its colour filters, on its own clock."""
+    frames = []
+    for light, mount in zip(lights, mounts, strict=True):
+        seen = replace(frame, light=light, t_ns=frame.t_ns + 1000 * mount.clock_offset_us, depth=None)
+        if bayer is not None and mount.kind == "dvs":
+            seen = replace(seen, light=mosaic(light, bayer))
+        elif not mount.sensor.colour:
+            seen = replace(seen, light=seen.luminance)
+        frames.append(seen)
+    return tuple(frames)
 
 
 def sees_colour(mount: Mount, bayer: str | None) -> bool:
     """Whether a camera wants red, green and blue."""
     return mount.sensor.colour or (bayer is not None and mount.kind == "dvs")
-
-
-def as_seen(frame: Frame, mount: Mount, bayer: str | None) -> Frame:
-    """A view as it reaches the pixels, through their colour filters, on the camera's own clock."""
-    light = mosaic(frame.light, bayer) if bayer and mount.kind == "dvs" else frame.light
-    return replace(frame, light=light, t_ns=frame.t_ns + 1000 * mount.clock_offset_us)

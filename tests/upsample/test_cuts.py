@@ -12,7 +12,8 @@ import pytest
 from skimage import data
 
 from vid2ev import Dvs, convert, load_sensor, open_source, read_events
-from vid2ev.recipe import Instant, Recipe
+from vid2ev.instants import Instant, instants
+from vid2ev.recipe import Recipe
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample.cuts import CutDetector
@@ -102,10 +103,10 @@ def test_a_recording_has_no_events_of_a_cut_and_lists_it(tmp_path: Path) -> None
 def test_light_taken_up_anywhere_knows_the_cuts(tmp_path: Path, start: int) -> None:
     recipe = Recipe.of(film(tmp_path), "ideal", fps=100.0)
 
-    def cuts(instants: Iterator[Instant]) -> list[int]:
-        return [instant.t_ns for instant in instants if instant.cut]
+    def cuts(seen: Iterator[Instant]) -> list[int]:
+        return [instant.t_ns for instant in seen if instant.cut]
 
-    assert cuts(recipe.instants(start)) == [t_ns for t_ns in cuts(recipe.instants()) if t_ns > start * 10**7]
+    assert cuts(instants(recipe, start)) == [t_ns for t_ns in cuts(instants(recipe)) if t_ns > start * 10**7]
 
 
 @pytest.mark.parametrize("sensor", ["ideal", "paper", "v2e-noisy"])

@@ -126,6 +126,13 @@ class Auto(click.ParamType):
     "--cis-out", "pictures", multiple=True, default=["raw", "mp4"], show_default=True, metavar="KIND[,KIND...]",
     help="Frames of frame cameras: raw (codes of the ADC), png (8 bits), mp4.",
 )  # fmt: skip
+@click.option(
+    "--truth", multiple=True, metavar="KIND[,KIND...]",
+    help="What is known for certain: depth, mask, map (pixels in the other cameras), poses; of scenes also flow.",
+)  # fmt: skip
+@click.option(
+    "--truth-rate", "truth_rate_hz", type=float, default=30, show_default=True, metavar="HZ", help="How often."
+)
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")

@@ -193,13 +193,13 @@ class Rig(BaseModel):
             seen[folded] = camera.name
         return self
 
-    def resolved(self, source_size: tuple[int, int]) -> ResolvedRig:
-        """The rig around a video of this size, with every number known.  Raises UsageError where they do not
-        fit."""
-        source = self.source.intrinsics(source_size)
+    def resolved(self, source_size: tuple[int, int], known: Intrinsics | None = None) -> ResolvedRig:
+        """The rig around a video of this size, with every number known; or around a camera that is `known`, such as
+        that of a scene, whatever the rig says of it.  Raises UsageError where they do not fit."""
+        source = known or self.source.intrinsics(source_size)
         return ResolvedRig(
             source,
-            self.source.assumed,
+            known is None and self.source.assumed,
             tuple(Viewpoint(camera, camera.intrinsics(source), camera.pose) for camera in self.cameras),
         )
 

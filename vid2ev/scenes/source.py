@@ -7,16 +7,13 @@ scene file.  Besides the keys of scene files there are `seed` and `size`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from vid2ev.errors import UsageError
-from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.pose import Pose
 from vid2ev.scenes.instants import Instants
-from vid2ev.scenes.render import Picture
 from vid2ev.scenes.scene_file import plain_size, read_scene
 from vid2ev.scenes.world import World
 from vid2ev.stream.frames import LUMINANCE, Colour, Frame
@@ -28,13 +25,6 @@ class Request(NamedTuple):
     name: str
     seed: int
     settings: list[str]
-
-
-class Pictures(NamedTuple):
-    """What the cameras of a rig see at an instant, each with its depth."""
-
-    t_ns: int
-    pictures: list[Picture]
 
 
 class SceneSource:
@@ -102,17 +92,9 @@ class SceneSource:
             light = self.world.render(t_ns).light
             yield Frame(light if self.colour == "rgb" else light @ LUMINANCE, t_ns)
 
-    def views(
-        self,
-        cameras: Sequence[tuple[Intrinsics, Pose]],
-        since_ns: int | None = None,
-        until_ns: int | None = None,
-        start: int = 0,
-    ) -> Iterator[Pictures]:
-        """The same instants, seen by cameras with poses in the coordinates of the reference camera."""
-        for k in self._indices(since_ns, until_ns, start):
-            t_ns = self.instants[k]
-            yield Pictures(t_ns, [self.world.render(t_ns, intrinsics, pose) for intrinsics, pose in cameras])
+    def instants_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> list[int]:
+        """The instants [ns] from `since_ns` to `until_ns`, both included, None without end; from index `start` on."""
+        return [self.instants[k] for k in self._indices(since_ns, until_ns, start)]
 
     def _indices(self, since_ns: int | None, until_ns: int | None, start: int) -> range:
         first = 0 if since_ns is None else self.instants.first_from(since_ns)

@@ -77,16 +77,13 @@ class Cut(Edit):
         if nothing:
             raise DataError(self._empty("wait longer, or leave --start and --stop out"))
 
-    def views(self, cameras: Any, start: int = 0) -> Any:
-        """The part, seen by other cameras, of a source that can be."""
-        return self.source.views(cameras, *self._ends_ns(), start)  # type: ignore[attr-defined]
-
-    def _ends_ns(self) -> tuple[int | None, int | None]:
+    def ends_ns(self) -> tuple[int | None, int | None]:
+        """The first and the last instant that may be in the part [ns], as far as it has ends."""
         since_ns = None if self._start is None else math.ceil(self._start * 10**9)
         return since_ns, None if self._stop is None else math.floor(self._stop * 10**9)
 
     def _between(self, start: int) -> Iterator[Frame]:
-        since_ns, until_ns = self._ends_ns()
+        since_ns, until_ns = self.ends_ns()
         if isinstance(self.source, Divisible):
             return self.source.frames_between(since_ns, until_ns, start)
         coming = self.source.frames(start if since_ns is None else 0)

@@ -1,0 +1,153 @@
+"""What the cameras of a recording see, instant by instant: the light of its source, made denser in time, as views.
+
+source -> intervals (motion between two frames) -> frames (light carried along it) -> views
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.formats.event_file import Picture
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.mounts import Mount
+from vid2ev.recipe import Recipe
+from vid2ev.rig.depth import between
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sight import Sight, Stage, arriving
+from vid2ev.stream.ahead import ahead
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+from vid2ev.truth import Truth, with_next
+from vid2ev.upsample import Interval
+from vid2ev.upsample.cuts import CutDetector
+from vid2ev.upsample.none import NoUpsampling
+
+FRAMES_AHEAD = 4  # made in advance, while the sensors work
+INTERVALS_AHEAD = 2  # whose motion is known in advance
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What the cameras see at one instant of the source's clock: a frame for each, on its own clock.
+
+    `original` and `cut` are those of the source's frame.  `limited` is the number of source intervals so far that hit
+    `max_subframes`; `truth` is that of each camera, where it is due.
+    """
+
+    frames: tuple[Frame, ...]
+    t_ns: int
+    original: bool = True
+    cut: bool = False
+    limited: int = 0
+    truth: tuple[Truth, ...] = ()
+
+
+def instants(recipe: Recipe, start: int = 0) -> Generator[Instant]:
+    """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
+    little in advance: one looks for motion, another carries light along it, a third forms the views."""
+    return ahead(_instants(recipe, start), FRAMES_AHEAD)
+
+
+def events_of(
+    video: str | Path,
+    sensor: str | Path | DvsSpec = "paper",
+    overrides: Sequence[str] = (),
+    *,
+    threads: int = 1,
+    **rest: Any,
+) -> Iterator[Events]:
+    """The events of a video, those that `convert` writes: one Events for each frame and sub-frame, the empty ones too.
+
+    The arguments are those of `Recipe.of`, and the `threads` of the sensor.  What is impossible is refused at once.
+    """
+    recipe = Recipe.of(video, sensor, overrides, **rest)
+    if not recipe.alone or recipe.mounts[0].kind != "dvs":
+        raise UsageError("events of several cameras at once: expected one event camera; convert the video instead")
+    dvs = recipe.mounts[0].dvs(recipe.labels, threads)
+    return dvs.run(instant.frames[0] for instant in instants(recipe))
+
+
+def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
+    """The frames of the source as a camera sees them, read again, in 8 bits of sRGB: to be kept beside its events."""
+    sight = Sight(recipe.rig.source, [mount], recipe.plane_m)
+    if recipe.source.dense and not sight.free:
+        stage = Stage(recipe.source, [mount])
+        seen = ((t_ns, stage.pictures(t_ns)[0].light) for t_ns in stage.instants_ns)
+    else:
+        seen = ((frame.t_ns, sight.views(frame)[0].light) for frame in recipe.source.frames())
+    for t_ns, light in seen:
+        yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(light))
+
+
+def _instants(recipe: Recipe, start: int) -> Generator[Instant]:
+    sight = recipe.sight()
+    if recipe.source.dense and (recipe.truth or not sight.free):
+        return (yield from _rendered(recipe, start))
+    wanted, before_ns = recipe.truth, None
+    with closing(_light(recipe, start) if sight.free else ahead(_light(recipe, start), FRAMES_AHEAD)) as light:
+        for frame, limited in light:
+            views, truth = sight.views(frame), tuple[Truth, ...]()
+            if wanted and frame.original:
+                if wanted.due(before_ns, frame.t_ns):
+                    masks = [view.valid for view in views]
+                    truth = wanted.of_views(frame, recipe.rig.source, recipe.plane_m, recipe.mounts, masks)
+                before_ns = frame.t_ns
+            frames = arriving(frame, [view.light for view in views], recipe.mounts, recipe.bayer)
+            yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth)
+
+
+def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
+    """What each camera sees of a scene."""
+    stage, wanted = Stage(recipe.source, recipe.mounts), recipe.truth
+    due = with_next(stage.instants_ns, wanted) if wanted else {}
+    for t_ns in stage.instants_ns[start:]:
+        seen, truth = stage.pictures(t_ns), tuple[Truth, ...]()
+        if wanted and t_ns in due:
+            truth = wanted.of_pictures(stage.world, t_ns, due[t_ns], seen, recipe.mounts)
+        lights = [picture.light for picture in seen]
+        yield Instant(arriving(Frame(lights[0], t_ns), lights, recipe.mounts, recipe.bayer), t_ns, truth=truth)
+
+
+def _light(recipe: Recipe, start: int) -> Generator[tuple[Frame, int]]:
+    """The frames of the source and those in between, each with the number of intervals so far that hit a limit."""
+    limited = 0
+    with closing(ahead(_intervals(recipe, start), INTERVALS_AHEAD)) as intervals:
+        for interval in intervals:
+            limited += interval.limited
+            for frame in interval:
+                yield frame, limited
+
+
+def _intervals(recipe: Recipe, start: int) -> Generator[Interval]:
+    """The frame `start` by itself, and each interval after it."""
+    upsampler, straight = recipe.upsampler(), NoUpsampling()
+    cuts = CutDetector(recipe.threshold)
+    before: Frame | None = None
+    # (whether there is a cut after frame `start` depends on the frame before it, too)
+    for index, frame in enumerate(recipe.source.frames(max(start - 1, 0)), max(start - 1, 0)):
+        cut = before is not None and cuts.begins_shot(before, frame) and recipe.cuts == "restart"
+        if index == start:
+            yield Interval(iter([frame]))
+        elif before is not None and index > start:
+            method = straight if cuts.unrelated else upsampler
+            interval = method.between(before, replace(frame, cut=cut))
+            yield interval if frame.depth is None else replace(interval, frames=_filled(interval, before, frame))
+        before = frame
+
+
+def _filled(frames: Iterable[Frame], before: Frame, after: Frame) -> Iterator[Frame]:
+    """The frames of an interval, with depth between those of its ends."""
+    assert before.depth is not None and after.depth is not None
+    same = np.array_equal(before.depth, after.depth, equal_nan=True)
+    for frame in frames:
+        if frame.depth is None:
+            share = (frame.t_ns - before.t_ns) / (after.t_ns - before.t_ns)
+            frame = replace(frame, depth=before.depth if same else between(before.depth, after.depth, share))
+        yield frame
