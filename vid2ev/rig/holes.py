@@ -46,15 +46,15 @@ def fill_of(inverse: np.ndarray, inset: int = 0) -> Fill:
         weights = np.zeros((holes.size, 4), F)
         _weigh(found, holes, hits, inset if not rounds else 0, weights)
         rounds.append(Fill(holes[seen], hits[seen], weights[seen]))
-        apply_fill(rounds[-1], found[None])
+        apply_fill(rounds[-1], found[..., None])
         holes = holes[~seen]
     return Fill(*(np.concatenate(parts) for parts in zip(*rounds, strict=True)))
 
 
-def apply_fill(fill: Fill, planes: np.ndarray) -> None:
-    """Fill the holes of planes [C, h, w] float32 in place."""
+def apply_fill(fill: Fill, picture: np.ndarray) -> None:
+    """Fill the holes of a picture [h, w, C] float32, contiguous, in place."""
     if fill.holes.size:
-        _apply(*fill, planes.reshape(len(planes), -1))
+        _apply(*fill, picture.reshape(-1, picture.shape[2]))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -114,14 +114,14 @@ def _weigh(inverse, holes, hits, inset, weights):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _apply(holes, sources, weights, planes):
-    for c in range(planes.shape[0]):
-        for k in range(holes.size):
+def _apply(holes, sources, weights, pixels):
+    for k in range(holes.size):
+        for c in range(pixels.shape[1]):
             base, total = F(np.nan), F(0)
             for way in range(4):
                 if sources[k, way] != NOTHING:
-                    light = planes[c, sources[k, way]]
+                    light = pixels[sources[k, way], c]
                     if base != base:
                         base = light
                     total += weights[k, way] * (light - base)  # (differences: flat light stays exactly flat)
-            planes[c, holes[k]] = base + total
+            pixels[holes[k], c] = base + total

@@ -36,11 +36,11 @@ def sampled(
     inverse: np.ndarray = _NOWHERE,
     steep: float = 0.0,
 ) -> np.ndarray:
-    """Light [C, h, w] at places x, y [h, w] float32 of a picture; beyond its border, that of the border.
+    """Light [h, w, C] at places x, y [h, w] float32 of a picture; beyond its border, that of the border.
 
     near_cut, inverse, steep   those of a surface, if the picture is of one
     """
-    out = np.empty((len(spline.pixels), *x.shape), F)
+    out = np.empty((*x.shape, len(spline.pixels)), F)
 
     def sample(begin: int, end: int) -> None:
         _sample(spline.weights, spline.lowest, spline.highest, x, y, begin, end, out)
@@ -52,11 +52,11 @@ def sampled(
 
 
 def pixel_means(fine: np.ndarray, samples: int) -> np.ndarray:
-    """Means [C, h, w] of samples x samples places each, of [C, samples h, samples w]."""
+    """Means [h, w, C] of samples x samples places each, of [samples h, samples w, C]."""
     if samples == 1:
         return fine
-    channels, height, width = fine.shape
-    out = np.empty((channels, height // samples, width // samples), F)
+    height, width, channels = fine.shape
+    out = np.empty((height // samples, width // samples, channels), F)
     _means(fine, samples, out)
     return out
 
@@ -86,7 +86,7 @@ def _sample(weights, lowest, highest, x, y, begin, end, out):
                 p = weights[c]
                 light = y0 * _row(p, row, column, x0, x1, x2, x3) + y1 * _row(p, second, column, x0, x1, x2, x3)
                 light += y2 * _row(p, third, column, x0, x1, x2, x3) + y3 * _row(p, fourth, column, x0, x1, x2, x3)
-                out[c, j, i] = min(max(light, lowest[c, own_y, own_x]), highest[c, own_y, own_x])
+                out[j, i, c] = min(max(light, lowest[c, own_y, own_x]), highest[c, own_y, own_x])
 
 
 @njit(nogil=True, error_model="numpy", inline="always")
@@ -120,25 +120,25 @@ def _sample_beside_cuts(pixels, x, y, near_cut, inverse, steep, begin, end, out)
                     if abs(there - depth) <= steep * away * max(there, depth):
                         columns[count], rows[count], weights[count] = column, row, weights_y[m] * weights_x[n]
                         count += 1
-            for c in range(out.shape[0]):
+            for c in range(out.shape[2]):
                 own = pixels[c, own_y, own_x]
                 total, low, high = _ZERO, own, own
                 for k in range(count):
                     light = pixels[c, rows[k], columns[k]]
                     total += weights[k] * (light - own)
                     low, high = min(low, light), max(high, light)
-                out[c, j, i] = min(max(own + total, low), high)
+                out[j, i, c] = min(max(own + total, low), high)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _means(fine, samples, out):
     share = F(1) / F(samples * samples)
-    for c in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            for i in range(out.shape[2]):
-                first = fine[c, j * samples, i * samples]  # (sums of differences: flat light stays exactly flat)
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            for c in range(out.shape[2]):
+                first = fine[j * samples, i * samples, c]  # (sums of differences: flat light stays exactly flat)
                 total = _ZERO
                 for m in range(j * samples, (j + 1) * samples):
                     for n in range(i * samples, (i + 1) * samples):
-                        total += fine[c, m, n] - first
-                out[c, j, i] = first + share * total
+                        total += fine[m, n, c] - first
+                out[j, i, c] = first + share * total

@@ -42,30 +42,32 @@ class Spline:
     """
 
     def __init__(self, light: np.ndarray, bands: Bands):
-        self.pixels = np.array(light[None] if light.ndim == 2 else np.moveaxis(light, -1, 0), F, order="C")
-        self.lowest, self.highest = np.empty_like(self.pixels), np.empty_like(self.pixels)
-        channels, height, width = self.pixels.shape
+        channels = 1 if light.ndim == 2 else light.shape[2]
+        height, width = light.shape[:2]
+        self._bands = bands
+        self.pixels, self.lowest, self.highest = (np.empty((channels, height, width), F) for _ in range(3))
         self.weights = np.empty((channels, height + 2 * MARGIN, width + 2 * MARGIN), F)
-        bands.run(width, self._filter_down)
-        bands.run(height, self._filter_across)
-        bands.run(height, self._find_limits)
+        self.fit(light)
+
+    def fit(self, light: np.ndarray) -> None:
+        """Become the spline of another picture of the same size, in the same memory."""
+        channels, height, width = self.pixels.shape
+        for c in range(channels):  # (one after the other, since one fits into the processor's cache)
+            self.pixels[c] = light if light.ndim == 2 else light[..., c]
+            self._bands.run(width, self._filter_down, c)
+            self._bands.run(height, self._filter_across, c)
+            self._bands.run(height, _limits, self.pixels[c], self.lowest[c], self.highest[c])
         for k in range(1, MARGIN + 1):
             self.weights[:, MARGIN - k] = self.weights[:, MARGIN + min(k, height - 1)]
             self.weights[:, height + MARGIN - 1 + k] = self.weights[:, MARGIN + max(height - 1 - k, 0)]
 
-    def _filter_down(self, begin: int, end: int) -> None:
-        for weights, pixels in zip(self.weights, self.pixels, strict=True):
-            inside = weights[MARGIN:-MARGIN, MARGIN + begin : MARGIN + end]
-            inside[:] = pixels[:, begin:end]
-            _filter(inside)
+    def _filter_down(self, begin: int, end: int, channel: int) -> None:
+        inside = self.weights[channel, MARGIN:-MARGIN, MARGIN + begin : MARGIN + end]
+        inside[:] = self.pixels[channel, :, begin:end]
+        _filter(inside)
 
-    def _filter_across(self, begin: int, end: int) -> None:
-        for weights in self.weights:
-            _filter_rows(weights[MARGIN + begin : MARGIN + end])
-
-    def _find_limits(self, begin: int, end: int) -> None:
-        for pixels, lowest, highest in zip(self.pixels, self.lowest, self.highest, strict=True):
-            _limits(pixels, begin, end, lowest, highest)
+    def _filter_across(self, begin: int, end: int, channel: int) -> None:
+        _filter_rows(self.weights[channel, MARGIN + begin : MARGIN + end])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -120,7 +122,7 @@ def _filter_rows(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _limits(pixels, begin, end, lowest, highest):
+def _limits(begin, end, pixels, lowest, highest):
     """How low and how high the light nearest to each pixel may be."""
     height, width = pixels.shape
     low, high = np.empty(width, np.float32), np.empty(width, np.float32)

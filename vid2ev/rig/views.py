@@ -63,7 +63,7 @@ class Views:
     samples   at least so many places across each pixel; more are taken where a pixel is wider than the source's
     threads   change nothing but the time it takes
 
-    Raises UsageError for a plane that is not in front of the source.
+    One picture at a time: memory is used again.  Raises UsageError for a plane that is not in front of the source.
     """
 
     def __init__(
@@ -87,6 +87,7 @@ class Views:
         self._corners: Corners | None = None
         self._depth_m = np.zeros(0, np.float32)
         self._looks: list[Look | None] = []
+        self._spline: Spline | None = None
 
     def needs_depth(self) -> bool:
         """Whether a camera has a translation, and there is no plane."""
@@ -100,19 +101,19 @@ class Views:
         """
         self._check(light, "light")
         looks = self.looks(depth_m)
-        spline: Spline | None = None
+        if not all(is_same(self.source, *camera) for camera in self.cameras):
+            self._fit(light)
         views = []
         for (camera, pose), look in zip(self.cameras, looks, strict=True):
             if is_same(self.source, camera, pose):
                 views.append(View(light, look.valid))
                 continue
-            spline = spline or Spline(light, self._bands)
-            fine = sampled(spline, look.places.x, look.places.y, self._bands, *look.cuts)
+            assert self._spline
+            fine = sampled(self._spline, look.places.x, look.places.y, self._bands, *look.cuts)
             if look.fill is not None:
                 apply_fill(look.fill, fine)
-            planes = pixel_means(fine, len(look.places.x) // camera.size[1])
-            seen = np.ascontiguousarray(np.moveaxis(planes, 0, -1)) if light.ndim == 3 else planes[0]
-            views.append(View(seen, look.valid))
+            seen = pixel_means(fine, len(look.places.x) // camera.size[1])
+            views.append(View(seen if light.ndim == 3 else seen[..., 0], look.valid))
         return views
 
     def looks(self, depth_m: np.ndarray | None = None) -> list[Look]:
@@ -131,6 +132,13 @@ class Views:
             self._looks = [self._look_at_surface(k, surface, known) for k in range(len(self.cameras))]
             self._depth_m = depth_m
         return self._looks  # type: ignore[return-value]
+
+    def _fit(self, light: np.ndarray) -> None:
+        """Make the spline of a picture, in the memory of the last one's: fresh memory would take almost as long as the work."""
+        if self._spline is None or len(self._spline.pixels) != (1 if light.ndim == 2 else 3):
+            self._spline = Spline(light, self._bands)
+        else:
+            self._spline.fit(light)
 
     def _look_at_plane(self, camera: Intrinsics, pose: Pose, plane_m: float, samples: int) -> Look:
         if is_same(self.source, camera, pose):
@@ -183,7 +191,7 @@ def filled_inverse(depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         known = depth_m >= NEAREST_M
         inverse = np.where(known, 1 / depth_m, np.float32(-1)).astype(np.float32)
     if not known.all():
-        apply_fill(fill_of(inverse), inverse[None])
+        apply_fill(fill_of(inverse), inverse[..., None])
     return (inverse if known.any() else np.zeros_like(inverse)), known
 
 
