@@ -119,7 +119,7 @@ def test_a_third_of_the_pixels_each_way_sees_means() -> None:
     assert moved.valid[:, :-3].all() and not moved.valid[:, -3:].any()
 
 
-@pytest.mark.parametrize("factor", [2, 2.5, 4, 7])
+@pytest.mark.parametrize("factor", [2, 2.5, 4, 7, 9])
 def test_fine_stripes_do_not_alias_into_coarse_ones(factor: float) -> None:
     stripes = (0.5 + 0.5 * np.cos(np.pi * np.arange(240) * 0.95)).astype(np.float32)[None].repeat(160, 0)
     source = pinhole((240, 160), 200)
@@ -183,6 +183,15 @@ def test_the_mask_is_where_the_rays_meet_the_picture() -> None:
     clearly_in = ((px > 2) & (px < np.array(SOURCE.size) - 3)).all(-1)
     clearly_out = ((px < -3) | (px > np.array(SOURCE.size) + 2)).any(-1)
     assert view.valid[clearly_in].all() and not view.valid[clearly_out].any()
+
+
+def test_many_cameras_see_what_each_would_alone() -> None:
+    cameras = [(SOURCE, POSES["both"]), (SOURCE, IDENTITY), (pinhole((53, 40), 50), POSES["turned"])]
+    for light in (noise(), noise(colours=(3,)), noise(seed=1)):
+        for together, camera in zip(Views(SOURCE, cameras, 2.0).see(light), cameras, strict=True):
+            alone = Views(SOURCE, [camera], 2.0).see(light)[0]
+            np.testing.assert_array_equal(together.light, alone.light)
+            np.testing.assert_array_equal(together.valid, alone.valid)
 
 
 def test_threads_change_nothing() -> None:

@@ -59,6 +59,14 @@ def test_a_lamp_neither_rings_far_away_nor_darkens_below_zero(seed: int) -> None
     assert (found[away > 1.6] == np.float32(0.01)).all()
 
 
+def test_light_that_is_no_number_stays_where_it_is() -> None:
+    light = np.full((30, 30), 0.5, np.float32)
+    light[5, 5], light[15, 15], light[25, 25] = np.nan, np.inf, -np.inf
+    x, y = np.moveaxis(pixel_grid((30, 30)) + 0.3, -1, 0)
+    found = at(light, x, y)[..., 0]
+    assert np.isfinite(found).all() and (found[8:12] == 0.5).all() and found[15, 15] > 1000
+
+
 def test_light_moves_smoothly() -> None:
     """The slope along a path has no steps, as that of a piecewise line or parabola would."""
     light = 0.5 + 0.4 * np.sin(np.arange(40, dtype=np.float32) * 1.3)[None].repeat(5, 0)

@@ -11,6 +11,9 @@ frequencies up to 0.25 cycles per pixel is met to 61 dB, where cubic convolution
 that range by half of it, as a peak between pixels does, and not go below low / 4 if low is positive.  So nothing rings
 far from a lamp, nor goes below zero beside it, and flat light stays exactly flat.
 
+Light that is not a number counts as black, infinite light as 65504, the brightest of half floats: one such pixel would
+otherwise be all over its row and column.
+
 Source: M. Unser, "Splines: a perfect fit for signal and image processing", IEEE Signal Processing Magazine 16(6), 1999
 (the filter: box 2).
 """
@@ -28,6 +31,7 @@ from vid2ev.rig.bands import Bands
 mark_our_kernels()
 F = np.float32
 POLE = F(math.sqrt(3) - 2)
+BRIGHTEST = 65504.0
 HORIZON = 16  # pixels after which the filter has forgotten: |POLE| ** 16 < 1e-9
 MARGIN = 2  # px around the weights, so that sampling needs no conditions
 _QUARTER, _HALF, _ONE, _ZERO = F(0.25), F(0.5), F(1), F(0)
@@ -54,6 +58,8 @@ class Spline:
         channels, height, width = self.pixels.shape
         for c in range(channels):  # (one after the other, since one fits into the processor's cache)
             self.pixels[c] = light if light.ndim == 2 else light[..., c]
+            if not np.isfinite(self.pixels[c]).all():
+                np.nan_to_num(self.pixels[c], copy=False, nan=0, posinf=BRIGHTEST, neginf=-BRIGHTEST)
             self._bands.run(width, self._filter_down, c)
             self._bands.run(height, self._filter_across, c)
             self._bands.run(height, _limits, self.pixels[c], self.lowest[c], self.highest[c])

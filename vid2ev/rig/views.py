@@ -134,7 +134,7 @@ class Views:
         return self._looks  # type: ignore[return-value]
 
     def _fit(self, light: np.ndarray) -> None:
-        """Make the spline of a picture, in the memory of the last one's: fresh memory would take almost as long as the work."""
+        """Make the spline of a picture, in the memory of the last one, since fresh memory takes as long as the work."""
         if self._spline is None or len(self._spline.pixels) != (1 if light.ndim == 2 else 3):
             self._spline = Spline(light, self._bands)
         else:
