@@ -127,6 +127,15 @@ def test_a_blurred_edge_does_not_bleed_into_the_hole() -> None:
     assert np.abs(view.light[45:75, 86:95] - BACK).max() < 0.02
 
 
+def test_holes_are_not_streaked() -> None:
+    light, depth_m = card_before_wall()
+    wall = depth_m == 4
+    light[wall] = np.random.default_rng(0).random(wall.sum(), np.float32)
+    hole = Views(SOURCE, [(SOURCE, BESIDE)]).see(light, depth_m)[0].light[45:75, 87:94]
+    assert np.abs(np.diff(hole, axis=0)).mean() < 0.5 * np.abs(np.diff(light[:, :40], axis=0)).mean()
+    assert abs(hole.mean() - 0.5) < 0.1
+
+
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("turn", [0, 20])
 def test_nothing_cracks(scale: float, turn: float) -> None:

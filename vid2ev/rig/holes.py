@@ -4,6 +4,9 @@ From each pixel of a hole the nearest pixels without one are looked up to the le
 these four, those on the farthest surface count, in proportion to 1 / distance**2: what opens up beside a thing in front
 shows what is behind it.  Pixels that see nothing in their row or column take what their filled neighbours have.
 
+What is filled in that way is streaked.  It is made smooth by means over three by three pixels of the hole and the same
+surface, several times: streaks would flicker when things move.
+
 The pixel at the rim of a hole is often a mixture with the thing in front, because the photograph's lens and pixels mix
 there; `inset` looks so many pixels further on, where these are of the same surface.
 """
@@ -21,40 +24,50 @@ mark_our_kernels()
 F = np.float32
 NOTHING = -1
 ALIKE = F(1.05)  # inverse depths of one surface: up to so many times that of the farthest,
+FRINGE = F(0.02)  # what a sliver of background counts, too narrow to look `inset` pixels further on
 SPREAD = F(0.1)  # or up to this share of the way from the farthest to the nearest
 
 
 class Fill(NamedTuple):
-    """How holes are filled; in this order, since later ones take from earlier ones."""
+    """How holes are filled: each pixel as a sum of others, in this order, since later ones take from earlier ones."""
 
     holes: np.ndarray  # [n] flat index of the pixel
     sources: np.ndarray  # [n, 4] flat indices of those it is made of; -1 for none
     weights: np.ndarray  # [n, 4] float32, which sum to 1
+    around: np.ndarray  # [n, 9] flat indices of pixels of the hole with which it is made smooth, itself among them
+    shares: np.ndarray  # [n, 9] float32, which sum to 1
 
 
 def fill_of(inverse: np.ndarray, inset: int = 0) -> Fill:
     """How to fill the pixels of inverse depth [h, w] float32 that are negative.  Nothing can be done if all are."""
     holes = np.flatnonzero(inverse < 0)
     if holes.size in (0, inverse.size):
-        return Fill(np.zeros(0, np.int64), np.zeros((0, 4), np.int64), np.zeros((0, 4), F))
+        holes = holes[:0]
     found = np.array(inverse)
-    rounds: list[Fill] = []
+    rounds = [(holes[:0], np.zeros((0, 4), np.int64), np.zeros((0, 4), F))]
     while holes.size:
         hits = np.full((holes.size, 4), NOTHING, np.int64)
         _look_around(found, holes, hits)
         seen = (hits != NOTHING).any(axis=1)
         weights = np.zeros((holes.size, 4), F)
-        _weigh(found, holes, hits, inset if not rounds else 0, weights)
-        rounds.append(Fill(holes[seen], hits[seen], weights[seen]))
-        apply_fill(rounds[-1], found[..., None])
+        _weigh(found, holes, hits, inset if len(rounds) == 1 else 0, weights)
+        rounds.append((holes[seen], hits[seen], weights[seen]))
+        _apply(*rounds[-1], found.reshape(-1, 1))
         holes = holes[~seen]
-    return Fill(*(np.concatenate(parts) for parts in zip(*rounds, strict=True)))
+    holes, sources, weights = (np.concatenate(parts) for parts in zip(*rounds, strict=True))
+    around = np.full((holes.size, 9), NOTHING, np.int64)
+    _find_around(inverse, found, holes, around)
+    shares = (around != NOTHING).astype(F)
+    return Fill(holes, sources, weights, around, shares / shares.sum(axis=1, keepdims=True))
 
 
-def apply_fill(fill: Fill, picture: np.ndarray) -> None:
-    """Fill the holes of a picture [h, w, C] float32, contiguous, in place."""
+def apply_fill(fill: Fill, picture: np.ndarray, smoothings: int = 0) -> None:
+    """Fill the holes of a picture [h, w, C] float32, contiguous, in place, and make smooth what is filled in."""
     if fill.holes.size:
-        _apply(*fill, picture.reshape(-1, picture.shape[2]))
+        pixels = picture.reshape(-1, picture.shape[2])
+        _apply(fill.holes, fill.sources, fill.weights, pixels)
+        for _ in range(smoothings):
+            _apply(fill.holes, fill.around, fill.shares, pixels)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -103,14 +116,28 @@ def _weigh(inverse, holes, hits, inset, weights):
             row, column = hit // width, hit % width
             away = max(abs(row - y), abs(column - x))
             weights[k, way] = F(1) / F(away * away)
-            total += weights[k, way]
             if inset:
                 row += inset * ((way == 3) - (way == 2))
                 column += inset * ((way == 1) - (way == 0))
                 if 0 <= row < height and 0 <= column < width and F(0) <= inverse[row, column] <= ALIKE * depths[hit]:
                     hits[k, way] = row * width + column
+                else:
+                    weights[k, way] *= FRINGE
+            total += weights[k, way]
         for way in range(4):
             weights[k, way] /= max(total, F(1e-30))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _find_around(inverse, filled, holes, around):
+    height, width = inverse.shape
+    for k in range(holes.size):
+        y, x = holes[k] // width, holes[k] % width
+        for row in range(max(y - 1, 0), min(y + 2, height)):
+            for column in range(max(x - 1, 0), min(x + 2, width)):
+                one, two = filled[y, x], filled[row, column]
+                if inverse[row, column] < F(0) and max(one, two) <= ALIKE * min(one, two):
+                    around[k, 3 * (row - y + 1) + column - x + 1] = row * width + column
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -118,7 +145,7 @@ def _apply(holes, sources, weights, pixels):
     for k in range(holes.size):
         for c in range(pixels.shape[1]):
             base, total = F(np.nan), F(0)
-            for way in range(4):
+            for way in range(sources.shape[1]):
                 if sources[k, way] != NOTHING:
                     light = pixels[sources[k, way], c]
                     if base != base:

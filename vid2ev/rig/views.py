@@ -35,6 +35,7 @@ from vid2ev.rig.spline import Spline
 from vid2ev.rig.surface import Corners, Surface, corners_of, seen_of, surface_of
 
 INSET_PX = 2  # of the camera: what fills a hole comes from so far beyond its rim
+SMOOTHINGS = 4
 NEAREST_M = 1e-6  # depth below counts as zero
 
 
@@ -111,7 +112,7 @@ class Views:
             assert self._spline
             fine = sampled(self._spline, look.places.x, look.places.y, self._bands, *look.cuts)
             if look.fill is not None:
-                apply_fill(look.fill, fine)
+                apply_fill(look.fill, fine, SMOOTHINGS)
             seen = pixel_means(fine, len(look.places.x) // camera.size[1])
             views.append(View(seen if light.ndim == 3 else seen[..., 0], look.valid))
         return views
