@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from rigs import pinhole
+from view_rigs import pinhole
 
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid
