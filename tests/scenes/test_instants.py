@@ -42,7 +42,7 @@ def test_light_is_sampled_as_densely_as_it_flickers() -> None:
 
 
 def test_lamps_change_light_in_small_steps() -> None:
-    world = World.of("specular", 0, SMALL)
+    world = World.of("specular", 0, [*SMALL, "max_light_step=0.1"])
     instants = Instants(world)
     light = [world.render(instants[k]).light.max(axis=-1) for k in range(4)]
     steps = [np.abs(np.log((after + 0.01) / (before + 0.01))) for before, after in pairwise(light)]

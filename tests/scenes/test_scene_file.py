@@ -179,6 +179,9 @@ def test_files_that_are_no_scene(tmp_path: Path) -> None:
     broken.write_text("objects = 3")
     with pytest.raises(UsageError, match=r"objects = 3: expected tables, each under a line \[\[objects\]\]"):
         read_scene(broken)
+    broken.write_text('[[lights]]\nname = "a"\nkind = "sun"\n' * 2)
+    with pytest.raises(UsageError, match=r"lights\.a: 2 have this name"):
+        read_scene(broken)
     with pytest.raises(UsageError, match=r"scene 'rooom' is unknown \(did you mean room\?\)"):
         read_scene("rooom")
     with pytest.raises(UsageError, match="does not exist"):

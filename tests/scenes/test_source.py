@@ -143,7 +143,7 @@ flicker = { frequency_hz = 7, depth = 0.3 }
 """
 
 
-def crossings(world: World, fps: float) -> dict[tuple[int, int], list[tuple[int, int]]]:
+def crossings(world: World, fps: float | None = None) -> dict[tuple[int, int], list[tuple[int, int]]]:
     """The events of each pixel: times [us] and polarities."""
     found: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for events in Dvs(load_sensor("ideal", ["threshold_on=0.1", "threshold_off=0.1"]), world.intrinsics.size).run(
@@ -175,3 +175,14 @@ def test_events_converge_as_the_square_of_the_sampling_interval(tmp_path: Path) 
         means.append(np.percentile(errors, 75))
     orders = np.log2(np.array(means[:-1]) / means[1:])
     assert orders.min() > 1.6, (means, orders)  # (2 but for the microseconds to which times are rounded)
+
+
+def test_so_do_those_of_a_predefined_scene_with_the_shift_that_is_asked_for() -> None:
+    settings = ["camera.size=[64, 48]", "duration_s=0.1", "min_fps=1"]
+    truth = crossings(World.of("flying-shapes", 1, [*settings, "max_shift_px=0.06"]))
+    medians = []
+    for shift in (0.8, 0.4, 0.2):
+        events = crossings(World.of("flying-shapes", 1, [*settings, f"max_shift_px={shift}"]))
+        medians.append(np.median(list(errors_us(events, truth))))
+    orders = np.log2(np.array(medians[:-1]) / medians[1:])
+    assert orders.min() > 1.5 and orders.max() < 2.6, (medians, orders)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -127,6 +128,26 @@ def test_meshes_have_the_size_that_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "bad.ply").write_text("ply\n")
     with pytest.raises(DataError, match=r"bad\.ply"):
         World.of(file, 0, ["objects.block.file=bad.ply"])
+
+
+def test_environments_are_pictures_of_any_light(tmp_path: Path) -> None:
+    around = np.full((8, 16, 3), 0.5, np.float32)
+    around[:, 8:] = [1.0, 4.0, 20.0]  # (blue, green, red) on the right half
+    cv2.imwrite(str(tmp_path / "around.hdr"), around)
+    file = tmp_path / "sky.toml"
+    file.write_text(
+        '[scene]\nenvironment = "around.hdr"\nenvironment_gain = 0.5\n'
+        "[camera]\nsize = [41, 21]\nfov_deg = 90\n"
+        'trajectory = { kind = "fixed", rotation_deg = [0, 0, 0] }\n'
+    )
+    light = World.of(file).render(0).light
+    assert np.allclose(light[10, 36], [10, 2, 0.5], rtol=0.02) and np.allclose(light[10, 4], 0.25, rtol=0.02)
+    turned = World.of(file, 0, ["environment_rotation_deg=[0, 180, 0]"]).render(0).light
+    assert np.allclose(turned[10, 4], [10, 2, 0.5], rtol=0.02)
+    plain = World.of(file, 0, ["environment={ pattern = 'checker' }", "background=0.3"]).render(0).light
+    assert plain.std() > 0.1
+    with pytest.raises(UsageError, match="no such file"):
+        World.of(file, 0, ["environment=none.hdr"])
 
 
 def test_a_rig_is_read_before_anything_is_rendered(ball: World, tmp_path: Path) -> None:

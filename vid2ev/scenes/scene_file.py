@@ -70,8 +70,10 @@ class SceneFile:
         """Each of a list of objects or lights, as often as its count says."""
         if not isinstance(things, list) or not all(isinstance(thing, Mapping) for thing in things):
             raise UsageError(f"{kind} = {things!r}: expected tables, each under a line [[{kind}]]")
-        for index, thing in enumerate(things):
-            name = thing.get("name", f"{thing.get('kind', kind)}-{index}")
+        names = [str(thing.get("name", f"{thing.get('kind', kind)}-{index}")) for index, thing in enumerate(things)]
+        for name, thing in zip(names, things, strict=True):
+            if names.count(name) > 1:
+                raise UsageError(f"{kind}.{name}: {names.count(name)} have this name; give each its own, or a count")
             path = f"{kind}.{name}"
             content = {key: value for key, value in thing.items() if key not in ("count", "name")}
             count = drawn(thing["count"], chance, f"{path}.count") if "count" in thing else 1
