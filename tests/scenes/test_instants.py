@@ -46,7 +46,7 @@ def test_lamps_change_light_in_small_steps() -> None:
     instants = Instants(world)
     light = [world.render(instants[k]).light.max(axis=-1) for k in range(4)]
     steps = [np.abs(np.log((after + 0.01) / (before + 0.01))) for before, after in pairwise(light)]
-    assert 0.001 < np.max(steps) < 0.3  # (highlights between the pixels of the grid may be a little faster)
+    assert 0.001 < np.quantile(steps, 0.995) < 0.11 and np.max(steps) < 1  # (edges of shadows are faster)
 
 
 def test_nothing_happens_at_the_least_rate(tmp_path: Path) -> None:

@@ -7,9 +7,10 @@ The rate at t is the greatest of
     samples_per_period * frequency of every flicker
     min_fps
 
-and at most max_fps.  It is found at knots 8 ms apart, where the true flow and the change of light are measured over a
-small step on a grid of pixels, and the motion of the corners of all things in view beside it, for those that fall
-between the pixels of the grid.  Between two knots the greater of their rates R holds, and instant k of N + 1 is where
+and at most max_fps.  It is found at knots 16 ms apart, or 2 ms where it changes much from one to the next.  There the
+true flow and the change of light are measured over a small step on a grid of pixels, and the motion of the corners of
+all things in view beside it, for those that fall between the pixels of the grid.  Between two knots the greater of
+their rates R holds, and instant k of N + 1 is where
 
     integral of R dt = k (integral over all of the scene) / N,    N rounded up,
 
@@ -34,11 +35,13 @@ from vid2ev.scenes.scene import LightSource, Object
 from vid2ev.scenes.snapshot import Thing
 from vid2ev.scenes.world import World, is_still
 
-KNOT_NS = 8_000_000
+COARSEST_NS, FINEST_NS = 16_000_000, 2_000_000  # from knot to knot
+STEADY = 1.25  # rates of two knots that differ less need none between them
 STEP_NS = 50_000  # over which motion is measured
 GRID = 64  # pixels across, of the pictures in which it is measured
 MARGIN = 1.15  # for what the grid misses
-SMOOTH = 4  # cells along a pixel at an edge, where changes of light are measured
+SMOOTH = 2  # cells along a pixel at an edge, where changes of light are measured
+FEW = 1 / 500  # of the pixels
 DARK = 0.01  # light of which changes do not count
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 AXES = np.concatenate([np.eye(3), -np.eye(3)]) / 2
@@ -57,8 +60,7 @@ class Instants:
         if self._fps is not None:
             self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
             return
-        knots = np.linspace(0, self._end_ns, max(1, math.ceil(self._end_ns / KNOT_NS)) + 1)
-        rates = np.array([rate_hz(world, round(t_ns)) for t_ns in knots])
+        knots, rates = _rates(world)
         self.slowest_hz, self.fastest_hz = float(rates.min()), float(rates.max())
         spans = 1e-9 * np.diff(knots) * np.maximum(rates[1:], rates[:-1])
         self._knots, self._steps = knots, np.concatenate([[0.0], np.cumsum(spans)])
@@ -79,6 +81,23 @@ class Instants:
     def first_from(self, t_ns: int) -> int:
         """The index of the first instant that is not before t_ns; `len` if there is none."""
         return bisect_left(range(self.count), t_ns, key=self.__getitem__)
+
+
+def _rates(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """The knots [ns], and the rates at them."""
+    parts = max(1, math.ceil(world.duration_ns / COARSEST_NS))
+    coming = [round(world.duration_ns * k / parts) for k in range(parts, -1, -1)]  # (the earliest last)
+    known = {t_ns: rate_hz(world, t_ns) for t_ns in coming}
+    knots = [coming.pop()]
+    while coming:
+        low, high = sorted((known[knots[-1]], known[coming[-1]]))
+        middle = (knots[-1] + coming[-1]) // 2
+        if high > STEADY * low and middle - knots[-1] >= FINEST_NS:
+            known[middle] = rate_hz(world, middle)
+            coming.append(middle)
+        else:
+            knots.append(coming.pop())
+    return np.array(knots, np.float64), np.array([known[t_ns] for t_ns in knots])
 
 
 def rate_hz(world: World, t_ns: int) -> float:
@@ -106,13 +125,16 @@ def speed_px_s(world: World, t_ns: int) -> float:
 
 
 def light_rate(world: World, t_ns: int) -> float:
-    """How fast lamps change the light of what is seen, everything else standing still [nat/s]."""
+    """How fast lamps change the light of what is seen, everything else standing still [nat/s].
+
+    The fastest few pixels do not count: at the edge of a shadow light changes as fast as one looks closely.
+    """
     coarse = _coarse(world.intrinsics)
     # (with smooth edges, so that shadows that move change the light of the pixels at their edge)
     pictures = [_seen(world, t_ns, coarse, lamps_ns, SMOOTH) for lamps_ns in (t_ns, t_ns + STEP_NS)]
     before, after = (picture.light.max(axis=-1) for picture in pictures)
     change = np.abs(np.log((after + DARK) / (before + DARK)))
-    return MARGIN * float(change.max()) / (1e-9 * STEP_NS)
+    return MARGIN * float(np.quantile(change, 1 - FEW)) / (1e-9 * STEP_NS)
 
 
 def _seen(world: World, t_ns: int, intrinsics: Intrinsics, lamps_ns: int | None = None, samples: int = 1) -> Picture:
