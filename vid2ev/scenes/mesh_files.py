@@ -89,7 +89,7 @@ def _look(visual: Any) -> tuple[np.ndarray | None, np.ndarray | None, Texture | 
         texture = None if image is None else Texture(_light(np.asarray(image.convert("RGB"))))
         return np.nan_to_num(visual.uv) * (1, -1) + (0, 1), None, texture
     if visual.kind in ("vertex", "face"):
-        return None, _light(np.asarray(visual.to_color().vertex_colors)[None, :, :3])[0], None
+        return None, _light(np.asarray(visual.vertex_colors)[None, :, :3])[0], None
     return None, None, None
 
 

@@ -61,7 +61,7 @@ def render(
     thing, keys = np.empty((height, width), np.int32), np.empty((height + 2, width + 2), np.int64)
 
     def trace(first: int, last: int, scratch: Scratch) -> Any:
-        trace_band(world, rays, first, last, light, depth, thing, keys, scratch)
+        trace_band(world, rays, first, last, light, depth, thing, keys, samples > 1, scratch)
 
     def smooth(first: int, last: int, scratch: Scratch) -> Any:
         smooth_band(world, rays, first, last, cells, details, light, keys, scratch)

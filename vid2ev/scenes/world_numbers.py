@@ -14,8 +14,6 @@ from vid2ev.scenes.rays.layout import NOTHING, POINT, SUN, World
 from vid2ev.scenes.snapshot import KINDS, Lamp, Shape, Snapshot, Texture, Thing
 from vid2ev.scenes.surroundings import irradiance_of
 
-LAYER = 1 / 12  # of the radius of a mesh
-
 
 def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
     """What rays from a camera (camera to world) meet."""
@@ -39,7 +37,6 @@ def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
         ball=balls,
         nearest=nearest,
         root=np.array([roots[meshes.index(t.shape.mesh)] if t.shape.mesh else NOTHING for t in things], np.int64),
-        layer=np.array([max(_own_ball(t.shape)[1], 1e-9) * LAYER for t in things], np.float64),
         colour=_rows([surface.colour for surface in surfaces], 3),
         gloss=_rows([(surface.specular, surface.shininess, surface.emission) for surface in surfaces], 3),
         repeat=_rows([surface.repeat for surface in surfaces], 2),

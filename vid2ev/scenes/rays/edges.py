@@ -68,7 +68,7 @@ def light_of_part(world, rays, part, across, down, count, scratch):
     eye, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
     t, face, b1, b2 = meet_thing(world, thing, eye, d, math.inf, scratch.stack)
     meeting = thing, t, face, b1, b2
-    if not (t < math.inf and key_of(world, thing, t, face, shadows) == key):
+    if not (t < math.inf and key_of(world, thing, face, x, y, shadows, scratch.stack) == key):
         x, y = ray_at(rays, scratch.parts[part, AT_X], scratch.parts[part, AT_Y])
         meeting = meet(world, scratch.things, count, x, y, scratch.stack)
     return light_of(world, meeting, x, y, across, down, shadows)

@@ -19,9 +19,9 @@ NOTHING = -1
 STACK = 96  # nodes of a hierarchy that wait to be looked at; its depth is at most STACK / 2
 
 # A key says what a pixel shows: light is smooth wherever the key stays the same.
-# Meshes are cut into layers of depth, so that what lies far behind itself has another key.
-SHADOW_BITS, LAYER_BITS, PART_BITS = 8, 6, 32
-LAYERS = 1 << LAYER_BITS
+# How often a ray crosses a mesh changes where one part of it begins to hide another.
+SHADOW_BITS, CROSSING_BITS, PART_BITS = 8, 6, 32
+CROSSINGS = 1 << CROSSING_BITS
 PART = 1 << SHADOW_BITS
 THING = PART << PART_BITS
 
@@ -37,7 +37,6 @@ class World(NamedTuple):
     ball: np.ndarray  # float64 [n, 4]: a ball around it, in the camera's coordinates: centre, radius
     nearest: np.ndarray  # float64 [n]: how far away the ball begins
     root: np.ndarray  # int64 [n]: the first node of its mesh
-    layer: np.ndarray  # float64 [n]: of a mesh, the depth of a layer [m]
     colour: np.ndarray  # float64 [n, 3]
     gloss: np.ndarray  # float64 [n, 3]: specular, shininess, emission
     repeat: np.ndarray  # float64 [n, 2]

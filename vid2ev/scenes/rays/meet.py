@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import BOX, LAYERS, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
+from vid2ev.scenes.rays.layout import BOX, CROSSINGS, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
 from vid2ev.scenes.rays.shapes import meet_box, meet_cylinder, meet_plane, meet_sphere
-from vid2ev.scenes.rays.triangles import meet_mesh
+from vid2ev.scenes.rays.triangles import crossings_of, meet_mesh
 
 CLEAR = 1e-7  # of the distance: how far above a surface a ray towards a lamp starts
 
@@ -65,12 +65,14 @@ def meet(world, things, count, x, y, stack):
 
 
 @law
-def key_of(world, thing, t, part, shadows):
-    """The key of a meeting."""
+def key_of(world, thing, part, x, y, shadows, stack):
+    """The key of what the ray (x, y, 1) meets."""
     if thing < 0:
         return -1
     if world.kind[thing] == MESH:
-        part = world.triangle_part[part] * LAYERS + int(t / world.layer[thing]) % LAYERS
+        o, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
+        crossings = crossings_of(world, world.root[thing], o, d, stack)
+        part = world.triangle_part[part] * CROSSINGS + crossings % CROSSINGS
     return thing * THING + part * PART + shadows
 
 

@@ -32,7 +32,8 @@ def key_at(world, rays, x, y, count, scratch):
     """The key at any place of the picture."""
     rx, ry = ray_at(rays, x, y)
     meeting = meet(world, scratch.things, count, rx, ry, scratch.stack)
-    return key_of(world, meeting[0], meeting[1], meeting[2], shadows_of(world, meeting, rx, ry, scratch.stack))
+    shadows = shadows_of(world, meeting, rx, ry, scratch.stack)
+    return key_of(world, meeting[0], meeting[2], rx, ry, shadows, scratch.stack)
 
 
 @law

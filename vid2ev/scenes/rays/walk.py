@@ -17,11 +17,11 @@ TILE = 16
 
 
 @walk
-def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
+def trace_band(world, rays, first, last, light, depth, thing, keys, keyed, scratch):
     """Light, depth, thing and key at the centres of the rows first ... last - 1 of `rays` (the margin is row 0).
 
     rays   float64 [H + 2, W + 2, 2]: (x, y) of the rays (x, y, 1) through the centres of the pixels and of a margin
-    light  float32 [H, W, 3]; depth float32 [H, W]; thing int32 [H, W]; keys int64 [H + 2, W + 2]
+    light  float32 [H, W, 3]; depth float32 [H, W]; thing int32 [H, W]; keys int64 [H + 2, W + 2], if `keyed`
     """
     height, width = rays.shape[0], rays.shape[1]
     for left in range(0, width, TILE):
@@ -32,7 +32,8 @@ def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
                 x, y = rays[line, column, 0], rays[line, column, 1]
                 meeting = meet(world, scratch.things, count, x, y, scratch.stack)
                 shadows = shadows_of(world, meeting, x, y, scratch.stack)
-                keys[line, column] = key_of(world, meeting[0], meeting[1], meeting[2], shadows)
+                if keyed:
+                    keys[line, column] = key_of(world, meeting[0], meeting[2], x, y, shadows, scratch.stack)
                 if 0 < line < height - 1 and 0 < column < width - 1:
                     across, down = steps(rays, line, column)
                     r, g, b = light_of(world, meeting, x, y, across, down, shadows)
