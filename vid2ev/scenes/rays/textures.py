@@ -1,7 +1,7 @@
 """The colour of a picture within the footprint of a pixel.
 
     footprint of a pixel   the ellipse to which (d(u, v)/dx, d(u, v)/dy) map the unit circle, in texels: axes a >= b
-    level                  log2 max(b, a / 4, 1), between two levels of the picture's halvings
+    texel                  max(b, a / 4, 1), between two levels of the picture's halvings
     along the longer axis  samples a level's texel apart, as many as fit, those at the ends with the share that fits
 
 All of it is continuous in the footprint, and so is light while a camera moves.
@@ -18,6 +18,7 @@ import numpy as np
 
 from vid2ev.scenes.rays.compiler import law
 
+LONG = 1.1  # times its width: what is shorter is looked at in its middle
 LONGEST = 4.0  # times its width: what is longer is blurred across, too
 
 
@@ -34,13 +35,14 @@ def colour_of(world, picture, u, v, ux, vx, uy, vy, wraps_u, wraps_v):
     if long <= 1.0:
         return of_level(world, first, u, v, wraps_u, wraps_v)
     texel = max(short, long / LONGEST, 1.0)
-    level = min(math.log2(texel), count - 1.0)
-    whole = int(level)
-    coarse = min(2.0 * (1 << whole), texel * LONGEST)
-    red, green, blue = along(world, first + whole, u, v, long_u / width, long_v / height, long, texel, wraps_u, wraps_v)
-    rest = level - whole
-    if rest > 0.0:
-        r, g, b = along(world, first + whole + 1, u, v, long_u / width, long_v / height, long, coarse, wraps_u, wraps_v)
+    whole, size = 0, 1.0
+    while 2.0 * size <= texel and whole + 1 < count:
+        whole, size = whole + 1, 2.0 * size
+    long_u, long_v = long_u / width, long_v / height
+    red, green, blue = along(world, first + whole, u, v, long_u, long_v, long, texel, wraps_u, wraps_v)
+    rest = texel / size - 1.0
+    if rest > 0.0 and whole + 1 < count:
+        r, g, b = along(world, first + whole + 1, u, v, long_u, long_v, long, 2.0 * size, wraps_u, wraps_v)
         red, green, blue = red + rest * (r - red), green + rest * (g - green), blue + rest * (b - blue)
     return red, green, blue
 
@@ -66,7 +68,9 @@ def axes(ux, vx, uy, vy):
 @law
 def along(world, level, u, v, axis_u, axis_v, long, apart, wraps_u, wraps_v):
     """The mean of a level's samples along the longer axis, a distance apart (both in texels of the first level)."""
-    reach = 0.5 * max(long / apart, 1.0) + 0.5  # half the samples
+    if long <= LONG * apart:
+        return of_level(world, level, u, v, wraps_u, wraps_v)
+    reach = 0.5 * long / apart + 1.0 - 0.5 * LONG  # half the samples
     side = math.ceil(reach) - 1
     axis_u, axis_v, one = axis_u * apart, axis_v * apart, np.float32(1.0)
     red, green, blue, sum_ = np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
