@@ -143,6 +143,44 @@ def test_other_settings_are_not_mixed_in(tmp_path: Path) -> None:
     assert kept.read_bytes() == before
 
 
+RIG = """
+[[camera]]
+name = "left"
+kind = "dvs"
+[[camera]]
+name = "right"
+kind = "dvs"
+translation_mm = [30, 0, 0]
+size = [40, 30]
+[[camera]]
+name = "aps"
+kind = "cis"
+set = { frame_rate_hz = 90, exposure_us = 15000, line_us = 50 }
+"""
+
+
+def test_a_rig_killed_here_and_there_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(RIG)
+    rig = {"rig": str(tmp_path / "rig.toml"), "depth": "plane:1", "truth": "depth,poses", "truth_rate_hz": 50}
+    rig |= {"probe": [], "formats": ["evt3"], "pictures": ["raw", "png", "mp4"], "frames": None, "piece": 9 << 18}
+    done = run(tmp_path / "whole", **rig)
+    assert done.returncode == 0, done.stderr
+    steps = int(done.stdout)
+    files = {path.relative_to(tmp_path / "whole") for path in (tmp_path / "whole").rglob("*") if path.is_file()}
+    assert {str(path.parent) for path in files} == {".", *("left", "right", "aps", "aps/raw", "aps/frames")} | {
+        f"{camera}/truth{part}" for camera in ("left", "right", "aps") for part in ("", "/depth")
+    }
+    for killed_at in (*random.Random(1).sample(range(2, steps - 12), 3), steps - 5, steps - 1):
+        out = tmp_path / f"killed_{killed_at}"
+        assert run(out, killed_at, **rig).returncode == -signal.SIGKILL
+        done = run(out, resume=True, **rig)
+        assert done.returncode == 0, done.stderr
+        assert {path.relative_to(out) for path in out.rglob("*") if path.is_file()} == files
+        for path in files:
+            if path.name != "manifest.json":
+                assert (out / path).read_bytes() == (tmp_path / "whole" / path).read_bytes(), (killed_at, path)
+
+
 @pytest.mark.slow
 def test_killed_by_the_clock_it_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     video = Path(__file__).parents[1] / ".." / "shared" / "data" / "videos" / "nasa_13013.mp4"

@@ -14,6 +14,7 @@ from vid2ev import Events, UsageError, convert, read_events
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.pose import IDENTITY
+from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import open_source
 
@@ -61,6 +62,8 @@ def test_every_camera_has_a_recording_of_its_own(tmp_path: Path) -> None:
         files = {path.name for path in (tmp_path / "out" / name).iterdir()}
         events = {"events.h5", "events.csv", "preview.mp4", "manifest.json"}
         assert files == (events if kind == "dvs" else {"raw", "frames.mp4", "manifest.json"})
+    kept = read_rig(tmp_path / "out" / "rig.toml")
+    assert kept.resolved((64, 48)).describe()["cameras"] == manifest["rig"]["cameras"]
     stamps = np.loadtxt(tmp_path / "out" / "aps" / "raw" / "timestamps.txt", dtype=np.int64)
     starts = np.arange(6) * 10**6 // 30
     np.testing.assert_array_equal(stamps, np.stack([starts, starts + 5000], axis=1))
@@ -161,3 +164,13 @@ def test_the_truth_of_a_scene_is_that_of_its_world(tmp_path: Path) -> None:
         flow = world.flow(int(t_ns[1]), int(t_ns[2]), picture, lens, pose).shift
         np.testing.assert_array_equal(read_flow(folder / "flow" / "000001.npz"), flow)
         assert not (folder / "flow" / "000002.npz").exists()
+
+
+def test_a_scene_brings_its_own_rig(tmp_path: Path) -> None:
+    scene = "scene:close-object,scene.duration_s=0.01,size=32x24"
+    manifest = convert(scene, tmp_path / "out", **OPTIONS)
+    (frames, events) = sorted(manifest["cameras"], key=lambda name: manifest["cameras"][name]["kind"])
+    poses = {camera["name"]: camera["translation_m"] for camera in manifest["rig"]["cameras"]}
+    assert np.hypot(*(np.subtract(poses[frames], poses[events])[:2])) == pytest.approx(0.015)
+    with pytest.raises(UsageError, match="leave --depth out"):
+        convert(scene, tmp_path / "other", depth="plane:2", **OPTIONS)

@@ -87,7 +87,7 @@ def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
     if str(video) == "-" or str(video).startswith("camera:"):
         return Path("stdin_events" if str(video) == "-" else f"{str(video).replace(':', '')}_events")
-    path = Path(os.path.abspath(str(video).removeprefix("synthetic:").partition(",")[0]))
+    path = Path(os.path.abspath(str(video).removeprefix("synthetic:").removeprefix("scene:").partition(",")[0]))
     return Path(f"{path.name if path.is_dir() else path.stem}_events")
 
 

@@ -99,6 +99,11 @@ class Mount:
         return self.intrinsics.size
 
     @property
+    def view(self) -> tuple[Intrinsics, Pose]:
+        """What it sees with, and from where."""
+        return self.intrinsics, self.pose
+
+    @property
     def within(self) -> str:
         """The camera's part of the recording's folder, with a slash at its end."""
         return f"{self.name}/" if self.name else ""

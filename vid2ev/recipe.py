@@ -21,7 +21,7 @@ from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, scene_of
-from vid2ev.sources import OPTIONS, Source, open_source
+from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.truth import Wanted
 from vid2ev.upsample import Upsampler, make_upsampler
 
@@ -37,7 +37,7 @@ class Recipe:
     video          what the source was opened by
     rig            where they stand
     mounts         the cameras
-    plane_m        how far the scene is, if it is a plane
+    depth          how far the scene is, in a text; None where no camera needs to know, and of scenes
     upsample       how light is made between frames: none, linear or flow
     subframes      intervals that a source interval becomes: "auto" (by motion and contrast), or a number
     max_subframes  the most that "auto" may take
@@ -52,7 +52,7 @@ class Recipe:
     source: Source
     rig: ResolvedRig
     mounts: tuple[Mount, ...]
-    plane_m: float | None = None
+    depth: str | None = None
     upsample: str = "flow"
     subframes: int | Literal["auto"] = "auto"
     max_subframes: int = 64
@@ -82,7 +82,8 @@ class Recipe:
         sensor     of event cameras that name none: a preset, a TOML file, or a specification
         overrides  `key=value` texts that change presets or files; keys of frame sensors begin with `cis.`
         cis        the same of frame cameras; without a rig it puts one where the video was taken
-        rig        the cameras: a rig file, or what is in one; without it an event camera where the video was taken
+        rig        the cameras: a rig file, or what is in one; without it that of a scene, or else an event camera where
+                   the video was taken
         depth      how far the scene is, as `rig.depth` has it; needed where cameras stand elsewhere
         truth      some of `truth.KINDS`, to be written so many times a second
         The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
@@ -92,41 +93,53 @@ class Recipe:
         if rest.get("bayer"):
             rest["bayer"] = check_pattern(rest["bayer"].upper())
         refuse_recordings(Path(video))
+        rig = rig or (_rig_of_scene(str(video)) if cis is None else None)
         asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
         chosen = Sensors(sensor, cis or "paper", overrides)
         sensors = [chosen.of(camera) for camera in asked.cameras]
         coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
-        plane_m = plane_of(depth)
-        maps = None if depth is None or plane_m is not None else partial(_with_depth, str(depth), asked)
+        maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
         options = {key: rest.pop(key) for key in OPTIONS if key in rest} | {"seen_through": maps}
         source = open_source(video, colour="rgb" if coloured else "luminance", **options)
-        if source.dense:
-            rest["upsample"] = "none"
+        rest |= {"upsample": "none"} if source.dense else {}
         scene = scene_of(source)
         resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None)
         mounts = mounts_of(resolved, sensors, seed, alone=rig is None and cis is None)
         wanted = Wanted(names_in(truth), truth_rate_hz) if truth else None
-        if wanted and "flow" in wanted.kinds and not source.dense:
+        depth = None if depth is None else str(depth)
+        recipe = cls(str(video), source, resolved, mounts, depth, truth=wanted, **rest)
+        recipe.check()
+        return recipe
+
+    def check(self) -> None:
+        """Raise UsageError for what does not go together."""
+        self.upsampler()
+        if self.cuts not in CUTS:
+            raise UsageError(f"cuts '{self.cuts}': expected one of {', '.join(CUTS)}")
+        if self.source.dense:
+            if self.depth is not None:
+                raise UsageError(f"depth '{self.depth}' of a scene, which knows its own; leave --depth out")
+            return
+        kinds = {*self.truth.kinds} if self.truth else set()
+        if "flow" in kinds:
             raise UsageError("truth 'flow' of a video is known to nobody: expected a scene; leave it out")
-        if wanted and not source.dense and depth is None and {"depth", "map"} & {*wanted.kinds}:
-            raise UsageError(
-                f"truth '{','.join(wanted.kinds)}': how far the video's scene is was not said; add --depth"
-            )
-        recipe = cls(str(video), source, resolved, mounts, plane_m, truth=wanted, **rest)
-        recipe.upsampler()  # (refuses what cannot be)
-        if recipe.sight().needs_depth and maps is None and not source.dense:
-            away = next(mount for mount in mounts if mount.pose.translation_m.any())
+        if self.depth is None and kinds & {"depth", "map"}:
+            raise UsageError("truth 'depth' and 'map' need to know how far the video's scene is; add --depth")
+        if self.depth is None and self.sight().needs_depth:
+            away = next(mount for mount in self.mounts if mount.pose.translation_m.any())
             raise UsageError(
                 f"camera {away.name} stands beside the video's, and how far the scene is was not said; add --depth"
                 " plane:METRES, a depth map or a folder of them"
             )
-        if recipe.cuts not in CUTS:
-            raise UsageError(f"cuts '{recipe.cuts}': expected one of {', '.join(CUTS)}")
-        return recipe
 
     def upsampler(self) -> Upsampler:
         """A new upsampler."""
         return make_upsampler(self.upsample, self.subframes, self.max_subframes, self.threshold)
+
+    @property
+    def plane_m(self) -> float | None:
+        """How far the scene is, if it is a plane [m]."""
+        return None if self.depth is None else plane_of(self.depth)
 
     @property
     def threshold(self) -> float:
@@ -136,7 +149,7 @@ class Recipe:
         return min((min(spec.threshold_on, spec.threshold_off) for spec in events), default=THRESHOLD)
 
     def sight(self) -> Sight:
-        """What the cameras see, before the first frame.  Raises UsageError where a depth is missing."""
+        """What the cameras see, before the first frame."""
         return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer)
 
     @property
@@ -148,7 +161,7 @@ class Recipe:
         """The recipe as JSON: what the manifest says of it, and by which a run is known again."""
         if self.alone:
             return self.describe_camera(self.mounts[0])
-        rig = {"rig": self.rig.describe(), "plane_m": self.plane_m}
+        rig = {"rig": self.rig.describe(), "depth": self.depth}
         cameras = {mount.name: mount.describe() for mount in self.mounts}
         return plain(self._shared() | rig | {"cameras": cameras, "bayer": self.bayer, "labels": self.labels})
 
@@ -169,6 +182,13 @@ class Recipe:
             "source": self.source.describe() | known_by,
             "upsampling": upsampling | {"cuts": self.cuts},
         } | truth
+
+
+def _rig_of_scene(video: str) -> str | None:
+    """The rig that a scene comes with."""
+    from vid2ev.scenes.source import rig_of_scene
+
+    return rig_of_scene(video.removeprefix(SCENE_PREFIX)) if is_scene(video) else None
 
 
 def _with_depth(text: str, rig: Rig, source: Source) -> Source:

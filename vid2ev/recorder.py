@@ -18,6 +18,7 @@ from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
+from vid2ev.rig.rig_file import write_rig
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -122,6 +123,8 @@ class Recorder:
             track.write(whole / mount.within, *self.span_us(mount.number))
         for mount, truth in zip(self.recipe.mounts, self._truths, strict=False):
             truth.write(whole / mount.within)
+        if not self.recipe.alone:
+            write_rig(whole / "rig.toml", self.recipe.rig.settled(), overwrite=True)
 
     def span_us(self, number: int) -> tuple[int, int]:
         """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last

@@ -25,7 +25,11 @@ def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
     facts = [("source", source_text(recipe["source"])), ("light", light[upsampling["method"]])]
     if "cameras" in recipe:
         cameras = recipe["cameras"].items()
-        return [*facts, ("depth", _depth_text(recipe)), *((name, sensor_text(sensor)) for name, sensor in cameras)]
+        return [
+            *facts,
+            ("depth", recipe["depth"] or "not needed"),
+            *((name, sensor_text(sensor)) for name, sensor in cameras),
+        ]
     effects = ", ".join(recipe["sensor"]["effects"]) or "none"
     return [*facts, ("sensor", f"{sensor_text(recipe['sensor'])}, seed {recipe['seed']}"), ("effects", effects)]
 
@@ -39,11 +43,6 @@ def sensor_text(sensor: Mapping[str, Any]) -> str:
     else:
         how = f"thresholds ON {parameters['threshold_on']:g} and OFF {parameters['threshold_off']:g}"
     return f"{sensor['name']}, {'x'.join(map(str, sensor['size']))}, {how}"
-
-
-def _depth_text(recipe: Mapping[str, Any]) -> str:
-    plane_m, maps = recipe["plane_m"], recipe["source"].get("edits", {}).get("depth")
-    return f"a plane at {plane_m:g} m" if plane_m is not None else maps or "not needed"
 
 
 def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:

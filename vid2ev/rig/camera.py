@@ -221,6 +221,11 @@ class ResolvedRig:
     source_assumed: bool
     viewpoints: tuple[Viewpoint, ...]
 
+    def settled(self) -> Rig:
+        """The rig with every number in it, so that it means the same around any video of this size."""
+        cameras = [view.camera.model_copy(update=_stated(view.intrinsics)) for view in self.viewpoints]
+        return Rig(source=Source(**_stated(self.source)), cameras=tuple(cameras))
+
     def describe(self) -> dict[str, Any]:
         """All of it, ready for JSON; reading it again gives the same light."""
         return {
@@ -232,6 +237,13 @@ class ResolvedRig:
                 for view in self.viewpoints
             ],
         }
+
+
+def _stated(lens: Intrinsics) -> dict[str, Any]:
+    """The keys of `Optics` that mean these intrinsics."""
+    model = None if lens.model == "none" else lens.model
+    stated = {"size": lens.size, "fov_deg": None, "focal_px": lens.focal_px, "centre_px": lens.centre_px}
+    return stated | {"distortion_model": model, "distortion": lens.distortion}
 
 
 OF_THE_CAMERA = {"name", "kind", "clock_offset_us", "sensor", "set", "seed"}

@@ -110,6 +110,13 @@ def open_scene(text: str, *, fps: float | Fraction | None = None, colour: Colour
     return SceneSource(world, name, seed=request.seed, fps=fps, colour=colour)
 
 
+def rig_of_scene(text: str) -> str | None:
+    """The rig file that a scene names, of `NAME,key=value,...` or a scene file; None without one.  Raises as
+    `open_scene` does."""
+    request = parse_request(text)
+    return read_scene(request.name, request.settings).resolved(request.seed).scene.rig
+
+
 def parse_request(text: str) -> Request:
     """What `NAME,key=value,...` asks for; commas within brackets and quotes belong to a value.  Raises UsageError."""
     if Path(text).is_file():

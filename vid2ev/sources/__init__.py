@@ -81,7 +81,7 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
     """The source of a name, unedited."""
     if name.startswith(SYNTHETIC_PREFIX):
         return _synthetic(name, transfer, fps, colour)
-    if name.startswith(SCENE_PREFIX) or _is_scene_file(name):
+    if is_scene(name):
         return _scene(name.removeprefix(SCENE_PREFIX), transfer, fps, colour)
     if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
         from vid2ev.sources.live import open_camera, open_standard_input
@@ -155,9 +155,9 @@ def _scene(text: str, transfer: str, fps: float | Fraction | None, colour: Colou
     return open_scene(text, fps=fps, colour=colour)
 
 
-def _is_scene_file(name: str) -> bool:
-    """Whether this is a text of TOML: nothing else that can be read has this suffix."""
-    return name.endswith(".toml") and Path(name).is_file()
+def is_scene(name: str) -> bool:
+    """Whether a source is a scene: by its prefix, or a text of TOML (nothing else that can be read has this suffix)."""
+    return name.startswith(SCENE_PREFIX) or (name.endswith(".toml") and Path(name).is_file())
 
 
 def _existing(path: Path) -> Path:
