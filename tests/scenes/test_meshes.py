@@ -66,6 +66,19 @@ def test_a_mesh_of_a_sphere_is_nearly_a_sphere(tmp_path):
     assert mesh.light.sum() == pytest.approx(true.light.sum(), rel=3e-3)
 
 
+def test_edges_at_which_a_mesh_hides_itself_are_smooth():
+    ring = trimesh.creation.torus(1, 0.35, major_sections=96, minor_sections=48)
+    mesh = Mesh(ring.vertices, ring.faces, normals=ring.vertex_normals)
+    things = [Thing("ring", Shape("mesh", mesh=mesh), pose=Pose.of((65, 20, 0), (0, 0, 4)))]
+    world = Snapshot(things, [Lamp("ambient", (0.2,) * 3), Lamp("sun", direction=(0.3, 1, 0.4))])
+    many = render(world, Intrinsics.of_field((64 * 12, 48 * 12), 60), IDENTITY, samples=1).light
+    true = many.reshape(48, 12, 64, 12, 3).mean(axis=(1, 3))
+    rough, smooth = (render(world, CAMERA, IDENTITY, samples=samples).light for samples in (1, 2))
+    inside = true.min(axis=-1) > 0.2  # (the outline has its own tests)
+    errors = [np.abs(light - true)[inside] for light in (rough, smooth)]
+    assert errors[0].max() > 0.2 and errors[1].max() < 0.06
+
+
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "glb", "gltf"])
 def test_files_of_all_kinds_hold_the_same_box(tmp_path, suffix):
     box = trimesh.creation.box((1, 0.8, 0.6))

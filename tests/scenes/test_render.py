@@ -131,6 +131,26 @@ def test_light_changes_smoothly_while_things_move(kind):
     assert change.max() < 0.2
 
 
+@pytest.mark.parametrize("width_px", [0.25, 0.6, 1.3])
+@pytest.mark.parametrize("kind", ["box", "cylinder", "plane"])
+def test_what_is_thinner_than_a_pixel_has_its_width(kind, width_px):
+    width = width_px / CAMERA.focal_px[0] * 5
+    # a pole that is longer than the picture is high, at a slant (a cylinder's length is along z)
+    turn = Pose.of((0, 0, 10)) @ Pose.of((90, 0, 0) if kind == "cylinder" else (0, 0, 0))
+    size = (width, width, 3.0) if kind == "cylinder" else (width, 3.0, 1e-9)
+    light = seen(Thing("pole", Shape(kind, size), pose=Pose(turn.rotation, np.array([0.01, 0.02, 5])))).light[..., 0]
+    across = light[12:36].sum(axis=1)
+    np.testing.assert_allclose(across, width_px / math.cos(math.radians(10)), rtol=0.12, atol=0.04)
+
+
+def test_what_is_smaller_than_a_pixel_has_its_area():
+    for radius_px in (0.3, 0.5, 0.9):
+        for shift in (0, 0.3, 0.5):
+            way = (shift / CAMERA.focal_px[0] * 5, 0, 5)
+            light = seen(thing("sphere", (2 * radius_px / CAMERA.focal_px[0] * 5,) * 3, way=way)).light[..., 0]
+            assert light.sum() == pytest.approx(math.pi * radius_px**2, rel=0.06)
+
+
 def test_rays_through_a_lens_land_where_opencv_projects():
     lenses = {"radtan": (-0.2, 0.05, 0.001, -0.002), "equidistant": (0.01, -0.003, 0.001, 0.0)}
     for model, distortion in lenses.items():

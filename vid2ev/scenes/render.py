@@ -57,20 +57,20 @@ def render(
         raise UsageError(f"{samples} samples must be 1 (jagged edges) to 16; 2 is usual")
     width, height = intrinsics.size
     rays, world = rays_of_pixels(intrinsics), numbers_of(snapshot, pose)
-    light, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
-    thing, keys = np.empty((height, width), np.int32), np.empty((height + 2, width + 2), np.int64)
+    light, thing = np.empty((height, width, 3), np.float32), np.empty((height, width), np.int32)
+    depths, keys = (np.empty((height + 2, width + 2), dtype) for dtype in (np.float32, np.int64))
 
     def trace(first: int, last: int, scratch: Scratch) -> Any:
-        trace_band(world, rays, first, last, light, depth, thing, keys, samples > 1, scratch)
+        trace_band(world, rays, first, last, light, depths, thing, keys, scratch)
 
     def smooth(first: int, last: int, scratch: Scratch) -> Any:
-        smooth_band(world, rays, first, last, cells, details, light, keys, scratch)
+        smooth_band(world, rays, first, last, cells, details, light, depths, keys, scratch)
 
     works: list[Work] = [trace, smooth] if samples > 1 else [trace]
     cells, details = (samples, max(samples, FINE)), details_of(snapshot, world, intrinsics, pose)
     for work in works:
         _in_bands(work, height + 2, lambda: scratch_for(len(world.kind), cells[1]), threads)
-    return Picture(light, depth, thing)
+    return Picture(light, depths[1:-1, 1:-1].copy(), thing)
 
 
 def _in_bands(work: Work, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:

@@ -72,8 +72,8 @@ def is_straight(world, rays, keys, x, y, apart_x, apart_y, size, count, scratch)
     if length == 0.0:
         return True
     off_x, off_y = OFF_LINE * size * apart_y / length, -OFF_LINE * size * apart_x / length
-    one = key_at(world, rays, x + off_x, y + off_y, count, scratch)
-    other = key_at(world, rays, x - off_x, y - off_y, count, scratch)
+    one, _ = key_at(world, rays, x + off_x, y + off_y, count, scratch)
+    other, _ = key_at(world, rays, x - off_x, y - off_y, count, scratch)
     return one != other and (one == keys[0] or other == keys[0])
 
 
@@ -86,7 +86,8 @@ def direction_at(world, rays, px, py, side, key, size, count, scratch):
         angle = 0.5 * (low + high)
         around = turn + math.pi - angle
         x, y = px + RADIUS * size * math.cos(around), py + RADIUS * size * math.sin(around)
-        if key_at(world, rays, x, y, count, scratch) == key:
+        there, _ = key_at(world, rays, x, y, count, scratch)
+        if there == key:
             low = angle
         else:
             high = angle

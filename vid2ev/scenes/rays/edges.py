@@ -13,7 +13,7 @@ import math
 
 from vid2ev.scenes.rays.cells import share_cell
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import PART, THING
+from vid2ev.scenes.rays.layout import BEHIND, JUMP, MESH, PART, THING
 from vid2ev.scenes.rays.meet import key_of, meet, meet_thing, row, turned
 from vid2ev.scenes.rays.pixel import light_of
 from vid2ev.scenes.rays.probe import change_between, key_at, ray_at
@@ -25,9 +25,7 @@ def measure(world, rays, column, line, cells, count, scratch):
     """Fill `keys` and `parts` with what is in a pixel; how many."""
     scratch.odd[0] = 0
     left, top, size = column - 0.5, line - 0.5, 1.0 / cells
-    for j in range(cells + 1):
-        for i in range(cells + 1):
-            scratch.corners[j, i] = key_at(world, rays, left + i * size, top + j * size, count, scratch)
+    look_at_corners(world, rays, left, top, cells, count, scratch)
     # A side belongs to two cells; its change is found once.
     for j in range(cells + 1):
         for i in range(cells + 1):
@@ -43,6 +41,47 @@ def measure(world, rays, column, line, cells, count, scratch):
         for i in range(cells):
             found = share_cell(world, rays, i, j, left + i * size, top + j * size, size, found, count, scratch)
     return found
+
+
+@law
+def look_at_corners(world, rays, left, top, cells, count, scratch):
+    """Fill `corners`, and set the depth at which a mesh hides itself."""
+    scratch.split[0], hides = math.inf, False
+    for j in range(cells + 1):
+        for i in range(cells + 1):
+            key, depth = key_at(world, rays, left + i / cells, top + j / cells, count, scratch)
+            scratch.corners[j, i], scratch.depths[j, i] = key, depth
+            hides = hides or (key >= 0 and world.kind[key // THING] == MESH)
+    if not hides:
+        return
+    scratch.split[0] = widest_gap(world, rays, left, top, cells, scratch)
+    for j in range(cells + 1):
+        for i in range(cells + 1):
+            key = scratch.corners[j, i]
+            if key >= 0 and world.kind[key // THING] == MESH and scratch.depths[j, i] > scratch.split[0]:
+                scratch.corners[j, i] = key + BEHIND
+
+
+@law
+def widest_gap(world, rays, left, top, cells, scratch):
+    """The middle of the widest gap in depth between corners on the same part of a mesh; infinite if none is wide."""
+    x, y = ray_at(rays, left, top)
+    x1, y1 = ray_at(rays, left + 1.0, top)
+    least, split = JUMP * math.sqrt((x1 - x) * (x1 - x) + (y1 - y) * (y1 - y)), math.inf
+    widest = 0.0
+    across, number = cells + 1, (cells + 1) * (cells + 1)
+    for k in range(number):
+        key, depth = scratch.corners[k // across, k % across], scratch.depths[k // across, k % across]
+        if key >= 0 and world.kind[key // THING] == MESH:
+            further = math.inf
+            for other in range(number):
+                behind = scratch.depths[other // across, other % across]
+                same = scratch.corners[other // across, other % across] // PART == key // PART
+                if same and depth < behind < further:
+                    further = behind
+            if further < math.inf and further - depth > max(widest, least * depth):
+                widest, split = further - depth, 0.5 * (further + depth)
+    return split
 
 
 @law
@@ -64,11 +103,11 @@ def light_of_part(world, rays, part, across, down, count, scratch):
     x, y = ray_at(rays, scratch.parts[part, X] / area, scratch.parts[part, Y] / area)
     if key < 0:
         return light_of(world, (-1, math.inf, 0, 0.0, 0.0), x, y, across, down, 0)
-    thing, shadows = key // THING, key % PART
+    thing, shadows = key // THING, key % BEHIND
     eye, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
     t, face, b1, b2 = meet_thing(world, thing, eye, d, math.inf, scratch.stack)
     meeting = thing, t, face, b1, b2
-    if not (t < math.inf and key_of(world, thing, face, x, y, shadows, scratch.stack) == key):
+    if not (t < math.inf and key_of(world, thing, t, face, shadows, scratch.split[0]) == key):
         x, y = ray_at(rays, scratch.parts[part, AT_X], scratch.parts[part, AT_Y])
         meeting = meet(world, scratch.things, count, x, y, scratch.stack)
     return light_of(world, meeting, x, y, across, down, shadows)

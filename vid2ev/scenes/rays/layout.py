@@ -18,12 +18,13 @@ POINT, SUN = range(2)
 NOTHING = -1
 STACK = 96  # nodes of a hierarchy that wait to be looked at; its depth is at most STACK / 2
 
-# A key says what a pixel shows: light is smooth wherever the key stays the same.
-# How often a ray crosses a mesh changes where one part of it begins to hide another.
-SHADOW_BITS, CROSSING_BITS, PART_BITS = 8, 6, 32
-CROSSINGS = 1 << CROSSING_BITS
-PART = 1 << SHADOW_BITS
+# A key says what a pixel shows; light is smooth wherever it stays the same.  From the low end: lamps that are hidden,
+# whether a mesh is met behind the depth at which it hides itself in this pixel, the part, the thing.
+SHADOW_BITS, PART_BITS = 8, 31
+BEHIND = 1 << SHADOW_BITS
+PART = BEHIND << 1
 THING = PART << PART_BITS
+JUMP = 6.0  # steps of a pixel in depth from one to the next, steeper than 80 degrees: there a mesh may hide itself
 
 
 class World(NamedTuple):

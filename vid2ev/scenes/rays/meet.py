@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import BOX, CROSSINGS, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
+from vid2ev.scenes.rays.layout import BEHIND, BOX, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
 from vid2ev.scenes.rays.shapes import meet_box, meet_cylinder, meet_plane, meet_sphere
-from vid2ev.scenes.rays.triangles import crossings_of, meet_mesh
+from vid2ev.scenes.rays.triangles import meet_mesh
 
 CLEAR = 1e-7  # of the distance: how far above a surface a ray towards a lamp starts
 
@@ -65,14 +65,12 @@ def meet(world, things, count, x, y, stack):
 
 
 @law
-def key_of(world, thing, part, x, y, shadows, stack):
-    """The key of what the ray (x, y, 1) meets."""
+def key_of(world, thing, t, part, shadows, split):
+    """The key of a meeting; `split` is the depth at which meshes are parted into what is before it and behind it."""
     if thing < 0:
         return -1
     if world.kind[thing] == MESH:
-        o, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
-        crossings = crossings_of(world, world.root[thing], o, d, stack)
-        part = world.triangle_part[part] * CROSSINGS + crossings % CROSSINGS
+        return thing * THING + world.triangle_part[part] * PART + (BEHIND if t > split else 0) + shadows
     return thing * THING + part * PART + shadows
 
 

@@ -29,11 +29,11 @@ def ray_at(rays, x, y):
 
 @law
 def key_at(world, rays, x, y, count, scratch):
-    """The key at any place of the picture."""
+    """The key and the depth at any place of the picture."""
     rx, ry = ray_at(rays, x, y)
     meeting = meet(world, scratch.things, count, rx, ry, scratch.stack)
     shadows = shadows_of(world, meeting, rx, ry, scratch.stack)
-    return key_of(world, meeting[0], meeting[2], rx, ry, shadows, scratch.stack)
+    return key_of(world, meeting[0], meeting[1], meeting[2], shadows, scratch.split[0]), meeting[1]
 
 
 @law
@@ -45,7 +45,7 @@ def change_between(world, rays, x0, y0, x1, y1, key, next_key, count, scratch):
     low, high, beyond = 0.0, 1.0, next_key
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        found = key_at(world, rays, x0 + middle * (x1 - x0), y0 + middle * (y1 - y0), count, scratch)
+        found, _ = key_at(world, rays, x0 + middle * (x1 - x0), y0 + middle * (y1 - y0), count, scratch)
         if found == key:
             low = middle
         else:

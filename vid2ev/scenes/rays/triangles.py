@@ -48,26 +48,6 @@ def meet_mesh(world, root, o, d, nearest, stack):
 
 
 @law
-def crossings_of(world, root, o, d, stack):
-    """How often a ray crosses a mesh."""
-    way = inverse(d[0]), inverse(d[1]), inverse(d[2])
-    crossings, waiting, stack[0] = 0, 1, root
-    while waiting > 0:
-        waiting -= 1
-        node = stack[waiting]
-        if enters(world.bounds, node, o, way, math.inf) < math.inf:
-            first, second = world.links[node, 0], world.links[node, 1]
-            if second < 0:
-                stack[waiting], stack[waiting + 1] = first, ~second
-                waiting += 2
-            else:
-                for triangle in range(first, first + second):
-                    t, _, _ = meet_triangle(world.corners, triangle, o, d)
-                    crossings += 1 if t < math.inf else 0
-    return crossings
-
-
-@law
 def inverse(d):
     """1 / d, and a number too large to matter, but not infinite, where d is 0."""
     return 1.0 / d if abs(d) > 1e-300 else 1e300

@@ -10,6 +10,7 @@ import math
 
 from vid2ev.scenes.rays.compiler import law, walk
 from vid2ev.scenes.rays.edges import light_of_parts, measure
+from vid2ev.scenes.rays.layout import JUMP, MESH, THING
 from vid2ev.scenes.rays.meet import key_of, meet
 from vid2ev.scenes.rays.pixel import light_of, shadows_of
 
@@ -17,11 +18,11 @@ TILE = 16
 
 
 @walk
-def trace_band(world, rays, first, last, light, depth, thing, keys, keyed, scratch):
+def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
     """Light, depth, thing and key at the centres of the rows first ... last - 1 of `rays` (the margin is row 0).
 
     rays   float64 [H + 2, W + 2, 2]: (x, y) of the rays (x, y, 1) through the centres of the pixels and of a margin
-    light  float32 [H, W, 3]; depth float32 [H, W]; thing int32 [H, W]; keys int64 [H + 2, W + 2], if `keyed`
+    light  float32 [H, W, 3]; thing int32 [H, W]; with the margin: depth float32, keys int64 [H + 2, W + 2]
     """
     height, width = rays.shape[0], rays.shape[1]
     for left in range(0, width, TILE):
@@ -32,20 +33,19 @@ def trace_band(world, rays, first, last, light, depth, thing, keys, keyed, scrat
                 x, y = rays[line, column, 0], rays[line, column, 1]
                 meeting = meet(world, scratch.things, count, x, y, scratch.stack)
                 shadows = shadows_of(world, meeting, x, y, scratch.stack)
-                if keyed:
-                    keys[line, column] = key_of(world, meeting[0], meeting[2], x, y, shadows, scratch.stack)
+                keys[line, column] = key_of(world, meeting[0], meeting[1], meeting[2], shadows, math.inf)
+                depth[line, column] = meeting[1]
                 if 0 < line < height - 1 and 0 < column < width - 1:
                     across, down = steps(rays, line, column)
                     r, g, b = light_of(world, meeting, x, y, across, down, shadows)
                     light[line - 1, column - 1, 0] = r
                     light[line - 1, column - 1, 1] = g
                     light[line - 1, column - 1, 2] = b
-                    depth[line - 1, column - 1] = meeting[1]
                     thing[line - 1, column - 1] = meeting[0]
 
 
 @walk
-def smooth_band(world, rays, first, last, cells, details, light, keys, scratch):
+def smooth_band(world, rays, first, last, cells, details, light, depth, keys, scratch):
     """Light anew where the keys of rows first ... last - 1 differ from a neighbour's, and in finer cells at details.
 
     cells    into how many a pixel is cut each way: usually, and at details
@@ -56,10 +56,10 @@ def smooth_band(world, rays, first, last, cells, details, light, keys, scratch):
         right, count = min(left + TILE, width), -1
         for line in range(max(first, 1), min(last, height - 1)):
             for column in range(max(left, 1), min(right, width - 1)):
-                if details[line, column] or differs(keys, line, column):
+                across, down = steps(rays, line, column)
+                if details[line, column] or differs(world, keys, depth, line, column, across):
                     if count < 0:
                         count = things_in_tile(world, rays, first, last, left, right, scratch.things)
-                    across, down = steps(rays, line, column)
                     cut = cells[1] if details[line, column] else cells[0]
                     found = measure(world, rays, column - 1, line - 1, cut, count, scratch)
                     if scratch.odd[0] and cut < cells[1]:
@@ -79,12 +79,14 @@ def cast(world, rays, depth, thing, scratch):
 
 
 @law
-def differs(keys, line, column):
-    """Whether any of the eight neighbours has another key."""
-    key, same = keys[line, column], True
+def differs(world, keys, depth, line, column, across):
+    """Whether any of the eight neighbours has another key, or on a mesh a depth at which it may hide itself."""
+    key, here, same, jump = keys[line, column], depth[line, column], True, math.inf
+    if key >= 0 and world.kind[key // THING] == MESH:
+        jump = JUMP * here * math.sqrt(across[0] * across[0] + across[1] * across[1])
     for j in range(line - 1, line + 2):
         for i in range(column - 1, column + 2):
-            same = same and keys[j, i] == key
+            same = same and keys[j, i] == key and not abs(depth[j, i] - here) > jump
     return not same
 
 
