@@ -208,4 +208,9 @@ def _within(folder: Path) -> Path:
         if path.exists():
             return path
     bag = folder / "metadata.yaml"
+    cameras = sorted(path.parent.name for path in folder.glob("*/manifest.json"))
+    if cameras and not bag.exists():
+        raise UsageError(
+            f"{folder} is a recording of the cameras {', '.join(cameras)}; give one: {folder / cameras[0]}"
+        )
     return bag if bag.exists() else folder / "events.h5"
