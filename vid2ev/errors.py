@@ -38,6 +38,8 @@ def nearest(word: str, words: Iterable[str]) -> str:
 
 def clause(message: str) -> str:
     """What pydantic says of a value, as a clause within a sentence."""
-    message = message.removeprefix("Value error, ").rstrip(".")
+    message = message.removeprefix("Value error, ").rstrip(".").replace("\n", " ")
     message = re.sub(r", (unable|got) .*", "", message)
-    return re.sub(r"^Input should be", "it must be", message).replace("a valid tuple", "a list")
+    message = re.sub(r"^Tuple should have at (least|most) (\d+) items?.*", r"it must have at \1 \2 entries", message)
+    message = re.sub(r"^Input should (be|have)", r"it must \1", message)
+    return message.replace("a valid tuple", "a list").replace("valid dictionary", "table")

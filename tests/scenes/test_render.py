@@ -10,8 +10,9 @@ import pytest
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import IDENTITY, Pose
-from vid2ev.scenes.lens import pixels_of, rays_of_pixels
+from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.snapshot import Lamp, Shape, Snapshot, Surface, Texture, Thing
 

@@ -12,8 +12,6 @@ import pytest
 
 from vid2ev import Dvs, load_sensor
 from vid2ev.errors import UsageError
-from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.source import SceneSource, parse_request, split_outside
 from vid2ev.scenes.world import World
 from vid2ev.sources import open_source
@@ -59,18 +57,14 @@ def test_parts_and_sizes_are_those_of_any_source() -> None:
     assert next(iter(open_source(TEXT, fps=1000, crop="24x20+2+3", size="12").frames())).light.shape == (10, 12)
 
 
-def test_cameras_of_a_rig_see_the_same_instants() -> None:
+def test_instants_between_two_are_those_of_the_frames() -> None:
     source = open_source(TEXT, fps=100)
     assert isinstance(source, SceneSource)
-    cameras = [
-        (source.world.intrinsics, IDENTITY),
-        (Intrinsics.of_field((16, 12), 70), Pose.of((0, 5, 0), (0.01, 0, 0))),
-    ]
-    views = list(source.views(cameras))
-    assert [view.t_ns for view in views] == [frame.t_ns for frame in source.frames()]
-    assert all(np.isfinite(view.pictures[1].light).all() and view.pictures[1].depth.shape == (12, 16) for view in views)
-    reference = next(iter(open_source(TEXT, fps=100, colour="rgb").frames()))
-    assert np.array_equal(views[0].pictures[0].light, reference.light)
+    instants = [frame.t_ns for frame in source.frames()]
+    assert source.instants_between(None, None) == instants
+    assert source.instants_between(instants[1], instants[-2], 1) == instants[2:-1]
+    between = [frame.t_ns for frame in source.frames_between(instants[1] - 5, instants[-2] + 5)]
+    assert between == instants[1:-1]
 
 
 def test_a_scene_file_is_a_source(tmp_path: Path) -> None:

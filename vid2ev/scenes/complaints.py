@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
-import re
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+
+from vid2ev.errors import clause, nearest
 
 TAGS = ("fixed", "straight", "spin", "orbit", "keyframes", "shake", "look-at", "str", "Pattern")  # of unions
 
@@ -33,23 +33,8 @@ def sentence(error: ValidationError, tables: Mapping[str, Any], name: str, scene
         tag = complaint.get("ctx", {}).get("tag")
         return f"{name}: {path}.kind = {tag!r} is impossible: it must be one of {_tags(complaint)}"
     if isinstance(complaint["input"], dict):
-        return f"{name}: {path}: {plain(complaint['msg'])}"
-    return f"{name}: {path} = {value} is impossible: {plain(complaint['msg'])}"
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """A word that may have been meant, in brackets."""
-    close = difflib.get_close_matches(word, list(words), n=1)
-    return f" (did you mean {close[0]}?)" if close else ""
-
-
-def plain(message: str) -> str:
-    """Pydantic's message as a clause within a sentence."""
-    message = message.removeprefix("Value error, ").rstrip(".").replace("\n", " ")
-    message = re.sub(r", (unable|got) .*", "", message)
-    message = re.sub(r"Input should be a valid tuple", "it must be a list", message)
-    message = re.sub(r"^Tuple should have at (least|most) (\d+) items?.*", r"it must have at \1 \2 entries", message)
-    return re.sub(r"^Input should (be|have)", r"it must \1", message).replace("valid dictionary", "table")
+        return f"{name}: {path}: {clause(complaint['msg'])}"
+    return f"{name}: {path} = {value} is impossible: {clause(complaint['msg'])}"
 
 
 @cache

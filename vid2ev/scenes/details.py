@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import Pose
-from vid2ev.scenes.lens import pixels_of
 from vid2ev.scenes.rays.layout import World
 from vid2ev.scenes.snapshot import Snapshot, Thing
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import Pose
-from vid2ev.scenes.lens import pixels_of, rays_of_pixels
+from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.rays.scratch import scratch_for
 from vid2ev.scenes.rays.walk import cast
 from vid2ev.scenes.render import Picture

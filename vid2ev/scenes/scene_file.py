@@ -16,8 +16,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from vid2ev.errors import DataError, UsageError
-from vid2ev.scenes.complaints import nearest, sentence
+from vid2ev.errors import DataError, UsageError, nearest
+from vid2ev.scenes.complaints import sentence
 from vid2ev.scenes.ranges import Chance, chance_of, drawn, extremes, is_range
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.textures import ANY, IN_COLOUR, PHOTOGRAPHS
