@@ -79,3 +79,10 @@ def test_light_moves_smoothly() -> None:
 def test_means_over_pixels_are_means() -> None:
     fine = np.random.default_rng(3).random((12, 8, 3), np.float32)
     np.testing.assert_allclose(pixel_means(fine, 4), fine.reshape(3, 4, 2, 4, 3).mean(axis=(1, 3)), atol=1e-6)
+
+
+def test_light_that_is_nowhere_negative_stays_so() -> None:
+    light = np.random.default_rng(4).integers(0, 2, (40, 50)).astype(np.float32)  # black pixels beside white ones
+    x, y = np.random.default_rng(5).uniform(-1, 51, (2, 60, 70)).astype(np.float32)
+    spline = Spline(light, Bands(1))
+    assert sampled(spline, x, y, Bands(1)).min() >= 0

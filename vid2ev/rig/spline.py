@@ -8,8 +8,8 @@ frequencies up to 0.25 cycles per pixel is met to 61 dB, where cubic convolution
 34 dB.
 
 **It stays near the pixels.**  The nine pixels around the nearest one allow light from low to high; the curve may leave
-that range by half of it, as a peak between pixels does, and not go below low / 4 if low is positive.  So nothing rings
-far from a lamp, nor goes below zero beside it, and flat light stays exactly flat.
+that range by half of it, as a peak between pixels does, and not go below low / 4 unless low is negative.  So nothing
+rings far from a lamp, nor goes below zero beside it, and flat light stays exactly flat.
 
 Light that is not a number counts as black, infinite light as 65504, the brightest of half floats: one such pixel would
 otherwise be all over its row and column.
@@ -142,5 +142,5 @@ def _limits(begin, end, pixels, lowest, highest):
             dark = min(min(low[left], low[i]), low[right])
             bright = max(max(high[left], high[i]), high[right])
             room = _HALF * (bright - dark)
-            lowest[j, i] = max(dark - room, _QUARTER * dark) if dark > _ZERO else dark - room
+            lowest[j, i] = max(dark - room, _QUARTER * dark) if dark >= _ZERO else dark - room
             highest[j, i] = bright + room
