@@ -22,7 +22,7 @@ Convert = Callable[[str, Path], dict[str, Any]]
 def sources_in(video: str) -> list[str]:
     """The sources that an argument stands for: itself, or what a folder without pictures holds: videos, arrays and
     folders of pictures, in natural order."""
-    from vid2ev.sources.images import natural
+    from vid2ev.light.recognise import natural
 
     folder = Path(video)
     if video == "-" or not folder.is_dir() or _holds_pictures(folder) or (folder / "manifest.json").exists():

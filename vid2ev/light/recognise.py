@@ -67,3 +67,9 @@ def _holds_arrays(path: Path) -> bool:
             return any(name.endswith(".npy") for name in archive.namelist())
     except (OSError, ValueError, RuntimeError, zipfile.BadZipFile):
         return path.suffix.lower() == ".npz"
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Sort key by which `frame2` comes before `frame10`."""
+    parts = re.split(r"(\d+)", name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts] + [(-2, name)]

@@ -56,5 +56,7 @@ def write_npz(path: Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
     """An npz file; the same arrays give the same bytes."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w") as member:
+            entry = zipfile.ZipInfo(f"{name}.npy")  # (without a time, which would be another at every run)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w") as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)

@@ -16,7 +16,6 @@ KITTI's development kit, "Stereo evaluation 2015".
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +23,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
-from vid2ev.light.recognise import EXR, head_of, recognise
+from vid2ev.light.recognise import EXR, head_of, natural, recognise
 from vid2ev.rig.depth import DepthScale, between
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
@@ -48,7 +47,7 @@ class DepthFiles:
         self._files, self._stack = [path], None
         if path.is_dir():
             found = (file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.name[0] != ".")
-            self._files = sorted(found, key=_natural)
+            self._files = sorted(found, key=lambda file: natural(file.name))
             if not self._files:
                 raise DataError(f"{path}: no depth maps in this folder; expected {', '.join(SUFFIXES)}")
         else:
@@ -141,8 +140,3 @@ def _read_exr(path: Path) -> np.ndarray:
 
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
-
-
-def _natural(file: Path) -> list[tuple[int, str]]:
-    parts = re.split(r"(\d+)", file.name)
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]

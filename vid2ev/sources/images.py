@@ -8,7 +8,6 @@ a transfer is given, 16-bit ones too; floating point is linear light, 1.0 white 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.light.pictures import PictureReader
-from vid2ev.light.recognise import PICTURE_SUFFIXES
+from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, remarks_on_unit, stamps_beside
 from vid2ev.stream.frames import Colour, Frame
 
@@ -122,12 +121,6 @@ class Images:
         if len(stamps) != len(self._places):
             raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
         return stamps, unit
-
-
-def natural(name: str) -> list[tuple[int, str]]:
-    """Sort key by which `frame2` comes before `frame10`."""
-    parts = re.split(r"(\d+)", name)
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts] + [(-2, name)]
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:
