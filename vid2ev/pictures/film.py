@@ -22,7 +22,10 @@ from vid2ev.pictures.colours import BLUE, BLUE_SPAN, GREEN, NEUTRAL, RED, RED_SP
 
 BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
 MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins while the file is still loading
-ENCODER = {"preset": "veryfast", "crf": "18"}
+# (nothing that looks at shrunken pictures in advance: of narrow ones the encoder reads what it never wrote, and now and
+# then makes other bytes)
+NO_LOOKAHEAD = "mbtree=0:rc-lookahead=0:scenecut=0:weightp=0"
+ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 
 
 class Film:
@@ -70,7 +73,14 @@ def open_film(
 
 def film_frame(picture: np.ndarray, number: int, rate: Fraction) -> Any:
     """Planes Y, U, V, one after the other as yuv420p has them, as the frame of a number."""
-    frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
+    rows, width = picture.shape
+    height = rows * 2 // 3
+    frame = av.VideoFrame(width, height, "yuv420p")
+    chroma = picture[height:].reshape(2, height // 2, width // 2)
+    for plane, content in zip(frame.planes, (picture[:height], *chroma), strict=True):
+        room = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
+        room[:, : plane.width] = content
+        room[:, plane.width :] = content[:, -1:]  # (the encoder looks there, too)
     frame.pts, frame.time_base = number, 1 / rate
     frame.colorspace = frame.color_primaries = frame.color_trc = BT709
     frame.color_range = LIMITED
