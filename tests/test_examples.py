@@ -14,6 +14,7 @@ import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.image import imread
 
 from vid2ev import DvsSpec, load_sensor
 from vid2ev.__main__ import main
@@ -22,14 +23,18 @@ ROOT = Path(__file__).parents[1]
 FROM_V2E = ROOT / "docs" / "from_v2e.md"
 
 
-@pytest.fixture(scope="module")
-def against_v2e() -> ModuleType:
-    path = ROOT / "examples" / "against_v2e.py"
+def example(name: str) -> ModuleType:
+    path = ROOT / "examples" / f"{name}.py"
     specification = importlib.util.spec_from_file_location(path.stem, path)
     assert specification and specification.loader
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def against_v2e() -> ModuleType:
+    return example("against_v2e")
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +99,52 @@ def test_a_checkout_that_is_none_is_one_sentence(against_v2e: ModuleType, tmp_pa
         pytest.raises(click.ClickException, match="cannot run v2e"),
     ):
         run("clean", {}, scene)
+
+
+def test_a_longer_exposure_blurs_and_a_later_line_leans(tmp_path: Path) -> None:
+    """At the top all lines open together, whatever the readout time; further down they see something else."""
+    shutter = example("figure_shutter")
+    scene = shutter.SCENE.replace("size=480x360", "size=64x48")
+    pictures = np.int64(shutter.exposed(scene, [0, 20], [0, 300]))
+    (sharp, blurred), (leaning, both) = pictures
+    for still, late in ((sharp, leaning), (blurred, both)):
+        assert np.array_equal(still[0], late[0]) and np.abs(still[-8:] - late[-8:]).mean() > 5
+    roughness = [np.abs(np.diff(picture, axis=1)).mean() for picture in (sharp, blurred, leaning, both)]
+    assert roughness[1] < 0.8 * roughness[0] and roughness[3] < 0.8 * roughness[2]
+    shutter.drawn(pictures.astype(np.uint8), [0, 20], [0, 300]).savefig(tmp_path / "shutter.png")
+    assert run(shutter, ["--scene", scene, "--exposures", "1", "--lines", "0"], tmp_path).startswith("out.png: 1 exp")
+
+
+def test_crossings_lie_on_the_response_and_events_are_those_that_are_not_too_early(tmp_path: Path) -> None:
+    crossings = example("figure_crossings")
+    course = crossings.course_of(["refractory_us=1200"])
+    levels = (crossings.at(course, 1e-3 * course.crossings.t) - course.filtered[0]) / 0.2
+    assert np.abs(levels - np.rint(levels)).max() < 0.005
+    assert levels.max() > 6.9 and len(course.crossings.t) == 14
+    sent, silent = [course.crossings.t[0]], []
+    for t_us in course.crossings.t[1:]:
+        (sent if t_us - sent[-1] > 1200 else silent).append(t_us)
+    assert course.sent.t.tolist() == sent and len(silent) == 3
+    assert not (course.fixed.t % 2000).any() and len(course.fixed.t) < len(sent)
+    assert not np.array_equal(course.linear.t, course.sent.t)
+    assert "off by 186 us, at most 1412 us" in run(crossings, [], tmp_path)
+
+
+def test_the_picture_of_the_rig_is_made(tmp_path: Path) -> None:
+    rig_picture = example("rig_picture")
+    printed = run(rig_picture, ["--scene", "scene:parallax,seed=8,size=96x72,duration_s=0.1", "--start", "0"], tmp_path)
+    counts = [int(count.replace(",", "")) for count in re.findall(r"([\d,]+) events", printed)]
+    assert len(counts) == 2 and min(counts) > 100
+
+
+def run(module: ModuleType, arguments: list[str], folder: Path) -> str:
+    """What an example prints; its picture is there and is more than one colour."""
+    with contextlib.chdir(folder):
+        done = CliRunner().invoke(module.main, [*arguments, "-o", "out.png"], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    picture = imread(folder / "out.png")
+    assert min(picture.shape[:2]) > 200 and picture[..., :3].std() > 0.05
+    return done.output
 
 
 def our_options() -> set[str]:
