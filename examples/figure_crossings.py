@@ -72,8 +72,7 @@ def course_of(settings: Sequence[str] = ()) -> Course:
 def frames(t_ms: np.ndarray, light: np.ndarray) -> list[Frame]:
     """Frames of a single pixel."""
     return [
-        Frame(np.array([[value]], np.float32), round(1e6 * instant))
-        for instant, value in zip(t_ms, light, strict=True)
+        Frame(np.array([[value]], np.float32), round(1e6 * instant)) for instant, value in zip(t_ms, light, strict=True)
     ]
 
 

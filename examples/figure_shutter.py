@@ -4,8 +4,8 @@
     python examples/figure_shutter.py                         posts and boxes, to shutter.png
     python examples/figure_shutter.py --scene scene:spinning-shapes -o mine.png
 
-The camera turns to the right.  Columns: a longer exposure blurs what moves.  Rows: when each line of pixels opens later than the one above it, what
-moves sideways leans.  All frames open at the same instant, all are of the same light, and
+The camera turns to the right.  Columns: a longer exposure blurs what moves.  Rows: when each line of pixels opens later
+than the one above it, what moves sideways leans.  All frames open at the same instant, all are of the same light, and
 nothing but the two times differs.
 """
 
