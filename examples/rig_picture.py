@@ -7,9 +7,9 @@
 Each pair is a frame camera and an event camera in one place.  On the left, a phone's colour sensor with a rolling
 shutter and an event camera of the same size; on the right, both halves of a DAVIS346.  The recording is that of
 
-    vid2ev convert scene:parallax,seed=8 --rig rig.toml --cis-out png --start 1 --stop 1.1
+    vid2ev convert scene:parallax,seed=8 --rig examples/rig.toml --cis-out png --start 1 --stop 1.1
 
-with the rig that this script writes.  The events are those of the 8 milliseconds in the middle of the frame beside
+The events are those of the 8 milliseconds in the middle of the frame beside
 them.
 """
 
@@ -31,36 +31,9 @@ from vid2ev.pictures.colours import GROUND, MOST, OFF, ON, event_colours
 
 SCENE = "scene:parallax,seed=8"
 WINDOW_US = 8000
+RIG = Path(__file__).with_name("rig.toml")
+PAIRS = ("phone", "davis")  # each has its events beside it, in NAME-events
 INK, FAINT = "#d8dce4", "#8a92a0"
-RIG = """\
-[[camera]]
-name = "phone"
-kind = "cis"
-sensor = "phone"
-set = {{ line_us = 57 }}  # all {lines} lines in {readout_ms:.0f} ms, as a phone's 1080
-size = [{width}, {height}]
-translation_mm = [-40, 0, 0]
-
-[[camera]]
-name = "events"
-kind = "dvs"
-size = [{width}, {height}]
-translation_mm = [-40, 0, 0]
-
-[[camera]]
-name = "aps"
-kind = "cis"
-sensor = "davis346-aps"
-size = [346, 260]
-translation_mm = [40, 0, 0]
-
-[[camera]]
-name = "davis"
-kind = "dvs"
-sensor = "davis346"
-size = [346, 260]
-translation_mm = [40, 0, 0]
-"""
 
 
 class Pair(NamedTuple):
@@ -73,13 +46,10 @@ class Pair(NamedTuple):
 
 
 def recorded(scene: str, start_s: float, stop_s: float, folder: Path) -> dict[str, Pair]:
-    """Record a scene by the rig; the second frame of each frame camera, or its last."""
-    width, height = open_source(scene).size
-    rig = folder / "rig.toml"
-    rig.write_text(RIG.format(width=width, height=height, lines=height, readout_ms=0.057 * height), encoding="utf-8")
+    """Record a scene by the rig: the second frame of each frame camera, or its last, and events with it."""
     made = folder / "recording"
-    convert(scene, made, rig=rig, pictures=["png"], preview=False, start=start_s, stop=stop_s)
-    return {left: pair_of(made / left, made / right) for left, right in (("phone", "events"), ("aps", "davis"))}
+    convert(scene, made, rig=RIG, pictures=["png"], preview=False, start=start_s, stop=stop_s)
+    return {name: pair_of(made / name, made / f"{name}-events") for name in PAIRS}
 
 
 def pair_of(frames: Path, events: Path) -> Pair:
@@ -105,12 +75,12 @@ def drawn(scene: str, source: np.ndarray, pairs: dict[str, Pair]) -> Figure:
     """Source and plan, then a column for each pair."""
     figure = Figure(figsize=(10.4, 5.6), layout="constrained", facecolor=GROUND)
     axes = figure.subplots(2, 3)
-    phone, aps = pairs["phone"], pairs["aps"]
+    phone, davis = (pairs[name] for name in PAIRS)
     show(axes[0, 0], source, f"{scene}\nsource, {size_of(source)}")
-    show(axes[0, 1], phone.frame, f"A  --cis phone, rolling shutter\n{size_of(phone.frame)}, {span(phone)}")
-    show(axes[1, 1], phone.events, f"--sensor paper, {size_of(phone.events)}\n{sent(phone)}", below=True)
-    show(axes[0, 2], aps.frame, f"B  --cis davis346-aps, global shutter\n{size_of(aps.frame)}, {span(aps)}")
-    show(axes[1, 2], aps.events, f"--sensor davis346, {size_of(aps.events)}\n{sent(aps)}", below=True)
+    show(axes[0, 1], phone.frame, f"A: phone, rolling shutter\n{size_of(phone.frame)}, {span(phone)}")
+    show(axes[1, 1], phone.events, f"events: paper, {size_of(phone.events)}\n{sent(phone)}", below=True)
+    show(axes[0, 2], davis.frame, f"B: davis346-aps, global shutter\n{size_of(davis.frame)}, {span(davis)}")
+    show(axes[1, 2], davis.events, f"events: davis346, {size_of(davis.events)}\n{sent(davis)}", below=True)
     draw_plan(axes[1, 0])
     return figure
 

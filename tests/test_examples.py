@@ -16,11 +16,14 @@ import pytest
 from click.testing import CliRunner
 from matplotlib.image import imread
 
-from vid2ev import DvsSpec, load_sensor
+from vid2ev import CisSpec, DvsSpec, cis_names, load_sensor
 from vid2ev.__main__ import main
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.rig_file import read_rig
+from vid2ev.sources.with_depth import parse_depth
 
 ROOT = Path(__file__).parents[1]
-FROM_V2E = ROOT / "docs" / "from_v2e.md"
+FROM_V2E, CAMERAS = ROOT / "docs" / "from_v2e.md", ROOT / "docs" / "cameras.md"
 
 
 def example(name: str) -> ModuleType:
@@ -175,6 +178,31 @@ def test_the_page_names_options_keys_and_files_that_are_there() -> None:
     assert len(keys) > 10
     assert keys <= set(DvsSpec.model_fields), keys - set(DvsSpec.model_fields)
     assert all((ROOT / name).exists() for name in re.findall(r"examples/[\w.]+", page))
+
+
+def test_the_page_of_cameras_names_keys_options_and_sensors_that_are_there(tmp_path: Path) -> None:
+    page = CAMERAS.read_text(encoding="utf-8")
+    for k, text in enumerate(re.findall(r"```toml\n(.*?)```", page, re.DOTALL)):
+        (tmp_path / f"{k}.toml").write_text(text, encoding="utf-8")
+        assert read_rig(tmp_path / f"{k}.toml").resolved((741, 500) if k else (640, 480)).viewpoints
+    assert k == 1
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", page)) <= our_options() | {"--from", "--as", "--threads"}
+    rows = page.partition("| keys | what they do |")[2].partition("\n\n")[0]
+    keys = {key for line in rows.splitlines() for key in re.findall(r"`(\w+)`", line.split(" | ")[0])}
+    assert keys == set(CisSpec.model_fields)
+    assert all(f"`{name}`" in page for name in cis_names())
+
+
+def test_the_depths_of_the_page_are_understood(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "maps").mkdir()
+    for name in ("depth.npy", "disparity.npy", "inverse.npy", "maps/0.npy"):
+        np.save(name, np.ones((6, 8), np.float32))
+    table = CAMERAS.read_text(encoding="utf-8").partition("| `--depth` |")[2].partition("\n\n")[0]
+    texts = [text for text in re.findall(r"^\| `([^`]+)`", table, re.MULTILINE) if not text.startswith("model:")]
+    assert len(texts) == 5
+    found = {text: parse_depth(text, Intrinsics.of_field((8, 6), 60)).at(0)[0, 0] for text in texts}
+    assert [float(f"{depth_m:.4g}") for depth_m in found.values()] == [2.5, 1, 0.001, 5.985, 5]
 
 
 def test_the_python_of_the_page_runs() -> None:
