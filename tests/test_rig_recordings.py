@@ -115,6 +115,8 @@ def test_depth_maps_serve_as_a_plane_does(tmp_path: Path, depth: str) -> None:
         ({"rig": rig(), "depth": "plane:2", "cis": "papr"}, "did you mean paper"),
         ({"rig": "missing.toml"}, "missing.toml"),
         ({"cis": "paper", "overrides": ["cis.exposure_us=-1"]}, "exposure_us"),
+        ({"cis": "paper", "overrides": ["exposure_us=1"]}, r"did you mean cis\.exposure_us"),
+        ({"pictures": "png"}, "expected a frame camera"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any], message: str) -> None:
@@ -174,3 +176,25 @@ def test_a_scene_brings_its_own_rig(tmp_path: Path) -> None:
     assert np.hypot(*(np.subtract(poses[frames], poses[events])[:2])) == pytest.approx(0.015)
     with pytest.raises(UsageError, match="leave --depth out"):
         convert(scene, tmp_path / "other", depth="plane:2", **OPTIONS)
+
+
+def test_frames_are_asked_for_beside_any_rig(tmp_path: Path) -> None:
+    events = Rig(cameras=(Camera(name="left", kind="dvs"),))
+    manifest = convert(CLIP, tmp_path / "one", rig=events, frame_camera=True, **OPTIONS)
+    assert {name: camera["kind"] for name, camera in manifest["cameras"].items()} == {"left": "dvs", "cis": "cis"}
+    manifest = convert(CLIP, tmp_path / "other", rig=rig(), frame_camera=True, **OPTIONS)
+    assert list(manifest["cameras"]) == ["left", "right", "aps"]
+    assert list(convert(CLIP, tmp_path / "plain", frame_camera=True, **OPTIONS)["cameras"]) == ["dvs", "cis"]
+
+
+def test_codes_of_a_sensor_are_not_taken_for_pictures(tmp_path: Path) -> None:
+    convert(CLIP, tmp_path / "out", frame_camera=True, pictures="raw,png", **OPTIONS)
+    with pytest.raises(UsageError, match="codes of a sensor's ADC"):
+        convert(tmp_path / "out" / "cis" / "raw", tmp_path / "again", **OPTIONS)
+    with pytest.raises(UsageError, match=r"out/cis/frames"):
+        convert(tmp_path / "out" / "cis", tmp_path / "again", **OPTIONS)
+    again = convert(tmp_path / "out" / "cis" / "frames", tmp_path / "again", **OPTIONS)
+    assert again["counts"]["frames"] == 6
+    for folder, message in ((tmp_path / "out", "cameras cis, dvs"), (tmp_path / "out" / "cis", "frames and no events")):
+        with pytest.raises(UsageError, match=message):
+            next(read_events(folder))

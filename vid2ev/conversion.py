@@ -16,7 +16,7 @@ from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.recorder import Progress, Recorder, growing
-from vid2ev.recording.folder import Folder, begun_job
+from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.spec import DvsSpec
 
@@ -60,6 +60,7 @@ def convert(
     if seed is None:
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
+    check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
     if resume and not recipe.source.rewindable:
@@ -99,6 +100,8 @@ def usable_cores() -> int:
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
     """Raise UsageError where a format cannot hold what a camera may send, or a probed pixel is not there."""
     seconds = recipe.source.duration_expected_s
+    if outputs.pictures != Outputs().pictures and all(mount.kind == "dvs" for mount in recipe.mounts):
+        raise UsageError(f"pictures as {', '.join(outputs.pictures)}: expected a frame camera; add --frames or --cis")
     for mount in recipe.mounts:
         if mount.kind == "dvs":
             outputs.check(mount.size, None if seconds is None else round(1e6 * seconds))

@@ -13,6 +13,7 @@ from vid2ev.errors import UsageError
 from vid2ev.formats import recognise
 from vid2ev.mounts import Mount, Sensors, mounts_of
 from vid2ev.physics.bayer import check_pattern
+from vid2ev.recording import exposures
 from vid2ev.recording.manifest import identity, versions
 from vid2ev.requests import names_in
 from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
@@ -28,6 +29,7 @@ from vid2ev.upsample import Upsampler, make_upsampler
 THRESHOLD = 0.15  # nat, where there are frame cameras only
 
 CUTS = ("restart", "keep")
+RAW = exposures.KINDS["raw"]
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Recipe:
         overrides: Sequence[str] = (),
         *,
         cis: str | Path | CisSpec | None = None,
+        frame_camera: bool = False,
         rig: str | Path | Rig | None = None,
         depth: str | Path | None = None,
         truth: str | Sequence[str] = (),
@@ -81,7 +84,8 @@ class Recipe:
         video      a video file, a folder of images, an array file, `synthetic:NAME` or `scene:NAME`
         sensor     of event cameras that name none: a preset, a TOML file, or a specification
         overrides  `key=value` texts that change presets or files; keys of frame sensors begin with `cis.`
-        cis        the same of frame cameras; without a rig it puts one where the video was taken
+        cis        the same of frame cameras; without a rig there is then one, as with `frame_camera`
+        frame_camera   put a frame camera where the video was taken, if the rig has none
         rig        the cameras: a rig file, or what is in one; without it that of a scene, or else an event camera where
                    the video was taken
         depth      how far the scene is, as `rig.depth` has it; needed where cameras stand elsewhere
@@ -92,9 +96,11 @@ class Recipe:
             raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
         if rest.get("bayer"):
             rest["bayer"] = check_pattern(rest["bayer"].upper())
-        refuse_recordings(Path(video))
-        rig = rig or (_rig_of_scene(str(video)) if cis is None else None)
+        refuse_recordings(Path(video), rest.get("transfer", "auto"))
+        rig = rig or _rig_of_scene(str(video))
         asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
+        asked = asked.with_frames() if frame_camera else asked
+        alone = rig is None and len(asked.cameras) == 1
         chosen = Sensors(sensor, cis or "paper", overrides)
         sensors = [chosen.of(camera) for camera in asked.cameras]
         coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
@@ -104,7 +110,7 @@ class Recipe:
         rest |= {"upsample": "none"} if source.dense else {}
         scene = scene_of(source)
         resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None)
-        mounts = mounts_of(resolved, sensors, seed, alone=rig is None and cis is None)
+        mounts = mounts_of(resolved, sensors, seed, alone)
         wanted = Wanted(names_in(truth), truth_rate_hz) if truth else None
         depth = None if depth is None else str(depth)
         recipe = cls(str(video), source, resolved, mounts, depth, truth=wanted, **rest)
@@ -120,6 +126,8 @@ class Recipe:
             if self.depth is not None:
                 raise UsageError(f"depth '{self.depth}' of a scene, which knows its own; leave --depth out")
             return
+        if self.plane_m is None and self.depth is not None and self.source.describe().get("kind") == "photograph":
+            raise UsageError(f"depth '{self.depth}' of a photograph that moves: expected plane:METRES")
         kinds = {*self.truth.kinds} if self.truth else set()
         if "flow" in kinds:
             raise UsageError("truth 'flow' of a video is known to nobody: expected a scene; leave it out")
@@ -203,14 +211,21 @@ def plain(facts: dict[str, Any]) -> dict[str, Any]:
     return json.loads(json.dumps(facts))
 
 
-def refuse_recordings(path: Path) -> None:
-    """Raise UsageError for what holds events already, and no frames."""
+def refuse_recordings(path: Path, transfer: str = "auto") -> None:
+    """Raise UsageError for what holds events already, and for frames that would be taken for something else."""
+    if path.name == RAW and (path.parent / "manifest.json").is_file() and transfer == "auto":
+        raise UsageError(
+            f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted"
+        )
     if (path / "manifest.json").is_file():
-        what = "a recording"
-    elif path.is_file() and (kind := recognise(path)):
-        what = f"an event file ({kind.name})"
-    else:
-        return
-    raise UsageError(
-        f"{path} is {what} already; `vid2ev render` shows it, `vid2ev reformat` turns it into another format"
-    )
+        if (path / "frames").is_dir():
+            raise UsageError(f"{path} is a recording already; its frames can be converted: {path / 'frames'}")
+        raise UsageError(
+            f"{path} is a recording already; `vid2ev render` shows its events, `vid2ev reformat` turns them into"
+            " another format"
+        )
+    if path.is_file() and (kind := recognise(path)):
+        raise UsageError(
+            f"{path} is an event file ({kind.name}) already; `vid2ev render` shows it, `vid2ev reformat` turns it into"
+            " another format"
+        )

@@ -11,7 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from vid2ev.__main__ import main
-from vid2ev.recipe import Recipe, events_of
+from vid2ev.instants import events_of
+from vid2ev.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=40x30,duration_s=0.2,fps=100"
 

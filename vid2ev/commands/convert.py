@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from vid2ev.commands.source_options import source_options
-from vid2ev.errors import UsageError
 
 
 class Auto(click.ParamType):
@@ -57,7 +56,9 @@ class Auto(click.ParamType):
     "--depth", metavar="DEPTH",
     help="How far the scene is, for cameras that stand elsewhere: plane:METRES, a map or a folder of maps, model:NAME.",
 )  # fmt: skip
-@click.option("--frames", "with_frames", is_flag=True, help="Without a rig: a frame camera, too, in the same place.")
+@click.option(
+    "--frames", "frame_camera", is_flag=True, help="A frame camera, too, in the same place, if the rig has none."
+)
 @click.option(
     "--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames.  [default: paper]"
 )
@@ -147,7 +148,6 @@ def convert(
     verbose: bool,
     quiet: bool,
     as_json: bool,
-    with_frames: bool,
     **options: Any,
 ) -> None:
     """Turn each VIDEO into the recording of an event camera.
@@ -163,9 +163,6 @@ def convert(
 
     quiet |= as_json
     options["seed"] = None if options["seed"] == "random" else options["seed"]
-    options["cis"] = options["cis"] or ("paper" if with_frames else None)
-    if with_frames and options["rig"]:
-        raise UsageError("--frames with --rig: the rig's file says which cameras there are; leave --frames out")
     found = [source for video in videos for source in batch.sources_in(video)]
     if len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/"):
         directory = Path(output) if output else conversion.default_directory(videos[0])

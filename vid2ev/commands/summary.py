@@ -11,7 +11,9 @@ NAME = 10  # width of the names
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:
     """Facts under each other, their names in a column."""
-    return "\n".join(f"{name + ' ':<{NAME}}{text}" for name, text in facts)
+    facts = list(facts)
+    width = max(NAME, *(len(name) + 1 for name, _ in facts))
+    return "\n".join(f"{name:<{width}}{text}" for name, text in facts)
 
 
 def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -213,4 +213,6 @@ def _within(folder: Path) -> Path:
         raise UsageError(
             f"{folder} is a recording of the cameras {', '.join(cameras)}; give one: {folder / cameras[0]}"
         )
+    if (folder / "timestamps.txt").exists() or any((folder / name).exists() for name in ("raw", "frames.mp4")):
+        raise UsageError(f"{folder} holds frames and no events; give the folder of an event camera")
     return bag if bag.exists() else folder / "events.h5"

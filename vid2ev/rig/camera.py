@@ -193,6 +193,11 @@ class Rig(BaseModel):
             seen[folded] = camera.name
         return self
 
+    def with_frames(self) -> Rig:
+        """The rig with a frame camera: its own, or else one where the video was taken."""
+        has_one = any(camera.kind == "cis" for camera in self.cameras)
+        return self if has_one else Rig(source=self.source, cameras=(*self.cameras, Camera(name="cis", kind="cis")))
+
     def resolved(self, source_size: tuple[int, int], known: Intrinsics | None = None) -> ResolvedRig:
         """The rig around a video of this size, with every number known; or around a camera that is `known`, such as
         that of a scene, whatever the rig says of it.  Raises UsageError where they do not fit."""

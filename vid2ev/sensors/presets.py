@@ -201,7 +201,8 @@ def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
         return f"The values {where} do not go together: {clause(complaint['msg'])}."
     key = str(complaint["loc"][0])
     if complaint["type"] == "extra_forbidden":
-        hint = nearest(key, kind.spec.model_fields)
+        other = next((each for each in KINDS if each is not kind and key in each.spec.model_fields), None)
+        hint = f" (did you mean {other.table}.{key}?)" if other else nearest(key, kind.spec.model_fields)
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
     default = kind.spec.model_fields[key].default
     value = reprlib.repr(complaint["input"])
