@@ -6,7 +6,7 @@ and meshes, which do not change.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -26,19 +26,24 @@ from vid2ev.scenes.snapshot import Lamp, Mesh, Shape, Snapshot, Surface, Texture
 from vid2ev.scenes.textures import pixels_of
 from vid2ev.scenes.trajectory import Fixed, pose_of
 
+Renderer = Callable[[Snapshot, Intrinsics, Pose], Picture]  # of a camera with a pose (camera to world)
+
 
 class World:
     """A scene, ready to be rendered; `seed` settles the ranges of a scene file.
 
     threads     that render; None for all cores.  They change nothing but the time it takes
+    renderer    what makes pictures, such as `blender.renderer.Cycles`; the embedded renderer if there is none
     viewpoints  the cameras of the scene's rig, in the coordinates of the reference camera; none without a rig
 
     Raises UsageError for a scene that cannot be, DataError for a texture, a mesh or a rig that cannot be read.
     """
 
-    def __init__(self, scene: Scene | SceneFile, seed: int = 0, *, threads: int | None = None):
+    def __init__(
+        self, scene: Scene | SceneFile, seed: int = 0, *, threads: int | None = None, renderer: Renderer | None = None
+    ):
         self.scene = scene if isinstance(scene, Scene) else scene.resolved(seed)
-        self.threads = threads
+        self.threads, self.renderer = threads, renderer
         self._textures: dict[Look, Texture] = {}
         self._looks = [(thing, self._shape(thing), self._surface(thing)) for thing in self.scene.objects]
         self._still = {id(thing): pose_of(thing.trajectory, 0.0) for thing in self.scene.objects if is_still(thing)}
@@ -78,9 +83,11 @@ class World:
 
     def render(self, t_ns: int, intrinsics: Intrinsics | None = None, pose_in_rig: Pose = IDENTITY) -> Picture:
         """What a camera sees: by default the reference camera, otherwise one with a pose in its coordinates."""
-        pose = self.camera_pose(t_ns) @ pose_in_rig
+        snapshot, pose = self.snapshot(t_ns), self.camera_pose(t_ns) @ pose_in_rig
+        if self.renderer:
+            return self.renderer(snapshot, intrinsics or self.intrinsics, pose)
         samples = self.scene.scene.samples
-        return render(self.snapshot(t_ns), intrinsics or self.intrinsics, pose, samples=samples, threads=self.threads)
+        return render(snapshot, intrinsics or self.intrinsics, pose, samples=samples, threads=self.threads)
 
     def flow(
         self,

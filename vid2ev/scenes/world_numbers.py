@@ -21,7 +21,7 @@ def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
     to_things = [thing.pose.inverse() @ camera for thing in things]
     balls = np.array([_ball(thing, camera) for thing in things]).reshape(-1, 4)
     nearest = np.maximum(np.linalg.norm(balls[:, :3], axis=1) - balls[:, 3], 0)
-    textures = tuple(dict.fromkeys(t for t in (*map(_texture, things), snapshot.environment) if t is not None))
+    textures = tuple(dict.fromkeys(t for t in (*map(texture_on, things), snapshot.environment) if t is not None))
     numbers = {texture: number for number, texture in enumerate(textures)}
     meshes = tuple(dict.fromkeys(thing.shape.mesh for thing in things if thing.shape.mesh is not None))
     mesh, roots = joined(meshes)
@@ -40,8 +40,8 @@ def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
         colour=_rows([surface.colour for surface in surfaces], 3),
         gloss=_rows([(surface.specular, surface.shininess, surface.emission) for surface in surfaces], 3),
         repeat=_rows([surface.repeat for surface in surfaces], 2),
-        wraps=_rows([_wraps(thing) for thing in things], 2).astype(np.int64),
-        texture=np.array([_number(_texture(thing), numbers) for thing in things], np.int64),
+        wraps=_rows([wraps_on(thing) for thing in things], 2).astype(np.int64),
+        texture=np.array([_number(texture_on(thing), numbers) for thing in things], np.int64),
         environment=NOTHING if sky is None else numbers[sky],
         to_environment=_to_environment(snapshot, camera),
         environment_gain=float(snapshot.environment_gain),
@@ -64,7 +64,7 @@ def _rows(values: Sequence, *shape: int) -> np.ndarray:
     return np.array(values, np.float64).reshape(-1, *shape)
 
 
-def _texture(thing: Thing) -> Texture | None:
+def texture_on(thing: Thing) -> Texture | None:
     """The picture on a thing: the surface's, or else that of its mesh; none on a mesh without (u, v)."""
     mesh = thing.shape.mesh
     if mesh is None:
@@ -76,7 +76,7 @@ def _number(texture: Texture | None, numbers: dict[Texture, int]) -> int:
     return NOTHING if texture is None else numbers[texture]
 
 
-def _wraps(thing: Thing) -> tuple[bool, bool]:
+def wraps_on(thing: Thing) -> tuple[bool, bool]:
     kind, (across, down) = thing.shape.kind, thing.surface.repeat
     around = kind in ("sphere", "cylinder", "mesh")
     return around or abs(across) > 1, kind == "mesh" or abs(down) > 1

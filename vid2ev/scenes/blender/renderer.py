@@ -1,0 +1,126 @@
+"""Cycles as a renderer of worlds.
+
+    with Cycles(samples=16) as cycles:
+        world = World(scene, renderer=cycles)     # pictures by Cycles; flow, poses and instants as ever
+
+Depth and things are those at the centres of the pixels, and true flow follows from them (`scenes.flow`), exact for any
+motion.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.scenes.blender.answer import openexr_module, read_answers
+from vid2ev.scenes.blender.exchange import Exchange
+from vid2ev.scenes.blender.program import Blender, find_blender
+from vid2ev.scenes.render import Picture
+from vid2ev.scenes.snapshot import Snapshot
+from vid2ev.scenes.world import World
+
+SAMPLES = 32
+
+
+class Cycles:
+    """Blender's renderer, as a context; the process is started by the first picture.
+
+    samples  of each pixel's light
+    folder   for the exchange; what is rendered stays there, and is not rendered again.  By default one that goes away
+    program  Blender, or a Python that has bpy (`program.py`)
+    threads  that render; None for all cores
+
+    Raises UsageError where there is no Blender or a package is missing.
+    """
+
+    def __init__(
+        self,
+        samples: int = SAMPLES,
+        folder: Path | None = None,
+        *,
+        program: str | None = None,
+        threads: int | None = None,
+    ):
+        if not 1 <= samples <= 1 << 16:
+            raise UsageError(f"{samples} samples must be 1 to 65536; {SAMPLES} are usual")
+        openexr_module()
+        self.program, self.samples, self.threads = find_blender(program), samples, threads
+        self._temporary = tempfile.TemporaryDirectory(prefix="vid2ev-blender-") if folder is None else None
+        self._folder = Path(self._temporary.name) if self._temporary else Path(folder or "")
+        self._exchange: Exchange | None = None
+        self._blender: Blender | None = None
+
+    @property
+    def version(self) -> str:
+        """Blender's; starts it if need be."""
+        return self._running().version
+
+    def __call__(self, snapshot: Snapshot, intrinsics: Intrinsics, pose: Pose) -> Picture:
+        """What a camera with this pose (camera to world) sees.
+
+        Raises UsageError for a lens with distortion, DataError if Blender fails or the folder cannot be written.
+        """
+        try:
+            request = self._made().request(snapshot, intrinsics, pose)
+        except UsageError:
+            raise
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise DataError(f"{self._folder} cannot be written: {reason}; make room or access there") from error
+        if not all(answer.exists() for answer in request.answers):
+            self._running().ask(request.path)
+        picture = read_answers(request.answers, intrinsics.size, request.larger)
+        if self._temporary:
+            for path in (request.path, *request.answers):
+                path.unlink()
+        return picture
+
+    def close(self) -> None:
+        """End Blender."""
+        if self._blender is not None:
+            self._blender.close()
+            self._blender = None
+        if self._temporary:
+            self._temporary.cleanup()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _running(self) -> Blender:
+        if self._blender is None:
+            self._blender = Blender(self.program)
+        return self._blender
+
+    def _made(self) -> Exchange:
+        if self._exchange is None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._exchange = Exchange(self._folder, self.samples, self.threads)
+        return self._exchange
+
+
+def render_with_blender(
+    world: World,
+    instants: Sequence[int],
+    folder: Path | None = None,
+    *,
+    intrinsics: Intrinsics | None = None,
+    pose_in_rig: Pose = IDENTITY,
+    samples: int = SAMPLES,
+    program: str | None = None,
+) -> Iterator[Picture]:
+    """What a camera of a world sees at instants [ns], one after the other; see `Cycles` for the rest."""
+    with Cycles(samples, folder, program=program, threads=world.threads) as cycles:
+        for t_ns in instants:
+            pose = world.camera_pose(t_ns) @ pose_in_rig
+            yield cycles(world.snapshot(t_ns), intrinsics or world.intrinsics, pose)
