@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from vid2ev.scenes.blender.renderer import Cycles
     from vid2ev.scenes.scene_file import SceneFile
 
 FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elapsed} gone, {remaining} left"
@@ -45,6 +46,15 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
 @click.option(
     "--truth", default="poses", show_default=True, metavar="LIST", help="depth, flow, poses; depth:png, flow:flo; none."
 )
+@click.option(
+    "--renderer",
+    type=click.Choice(["embedded", "blender"]),
+    default="embedded",
+    show_default=True,
+    help="blender: Cycles, by a Blender that is installed; slower.",
+)
+@click.option("--samples", type=click.IntRange(1, 1 << 16), metavar="N", help="Of a pixel, by Cycles.  [default: 32]")
+@click.option("--blender", metavar="PROGRAM", help="Blender.  [default: $VID2EV_BLENDER, or blender on the PATH]")
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace scenes that are there.")
 @click.option("--resume", is_flag=True, help="Leave scenes that are there, and go on with those that are not.")
@@ -114,10 +124,11 @@ def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[d
     )
     keep = {"overwrite": options["overwrite"], "resume": options["resume"]}
     for seed, directory in directories.items():
-        source = SceneSource(World(file, seed), file.name, seed=seed, fps=options["fps"])
-        rate = f"{options['fps']:g} fps" if options["fps"] else "all instants"
-        with _bar(str(directory), quiet) as report:
-            new = write_scene(directory, source, contents, f"{file.name}, seed {seed}, {rate}", report=report, **keep)
+        with _renderer(directory, options) as renderer, _bar(str(directory), quiet) as report:
+            source = SceneSource(World(file, seed, renderer=renderer), file.name, seed=seed, fps=options["fps"])
+            how = f"{file.name}, seed {seed}, " + (f"{options['fps']:g} fps" if options["fps"] else "all instants")
+            how += f", Cycles with {renderer.samples} samples" if renderer else ""
+            new = write_scene(directory, source, contents, how, report=report, **keep)
         frames, seconds = len(source.instants), source.duration_expected_s
         if not quiet:
             what = f"{frames:,} frames, {seconds:.3g} s, seed {seed}" if new else "is there already"
@@ -125,6 +136,20 @@ def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[d
             for warning in source.warnings:
                 click.echo(f"warning: {warning}")
         yield {"directory": str(directory), "seed": seed, "frames": frames, "duration_s": seconds, "new": new}
+
+
+def _renderer(directory: Path, options: dict[str, Any]) -> AbstractContextManager[Cycles | None]:
+    """Cycles for a folder, or None for the embedded renderer."""
+    from vid2ev.errors import UsageError
+
+    if options["renderer"] == "blender":
+        from vid2ev.scenes.blender.renderer import renderer_beside
+
+        return renderer_beside(directory, options["samples"], options["blender"])
+    for name in ("samples", "blender"):
+        if options[name] is not None:
+            raise UsageError(f"--{name} {options[name]} says nothing to the embedded renderer; add --renderer blender")
+    return nullcontext()
 
 
 @contextmanager

@@ -9,8 +9,10 @@ motion.
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -107,6 +109,20 @@ class Cycles:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._exchange = Exchange(self._folder, self.samples, self.threads)
         return self._exchange
+
+
+@contextmanager
+def renderer_beside(directory: Path, samples: int | None = None, program: str | None = None) -> Iterator[Cycles]:
+    """Cycles for what is to be in a folder; until that is there, what is rendered stays beside it, in NAME.cycles."""
+    folder = directory.with_name(f"{directory.name}.cycles")
+    with Cycles(SAMPLES if samples is None else samples, folder, program=program) as cycles:
+        try:
+            yield cycles
+        except BaseException:
+            if not any(folder.glob("*.exr")):
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def render_with_blender(
