@@ -214,6 +214,8 @@ def set_up_cycles(scene) -> None:  # type: ignore[no-untyped-def]
     settings = render.image_settings
     if hasattr(settings, "media_type"):  # (from Blender 5.0 on)
         settings.media_type = "MULTI_LAYER_IMAGE"
+    if hasattr(settings, "use_exr_interleave"):  # (in several parts, 5.0 writes no pixels that are not square)
+        settings.use_exr_interleave = True
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR_MULTILAYER", "32", "ZIP"
 
 
