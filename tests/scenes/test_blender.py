@@ -278,7 +278,8 @@ def test_the_command(stand: Stand, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     stand()
     assert vid2ev().exit_code == 0
     Path("out").rename("embedded")
-    assert vid2ev("--renderer", "blender", "--samples", "3").exit_code == 0
+    made = vid2ev("--renderer", "blender", "--samples", "3")
+    assert made.exit_code == 0 and "Blender 0.0 of tests, Cycles: 4 pictures, " in made.stdout
     files = [sorted(path.relative_to(top) for path in Path(top).rglob("*")) for top in ("embedded", "out")]
     assert files[0] == files[1]
     assert not Path("out.cycles").exists()

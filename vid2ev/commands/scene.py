@@ -133,6 +133,8 @@ def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[d
         if not quiet:
             what = f"{frames:,} frames, {seconds:.3g} s, seed {seed}" if new else "is there already"
             click.echo(f"{directory}: {what}")
+            if renderer and renderer.describe():
+                click.echo(f"{directory}: {renderer.describe()}")
             for warning in source.warnings:
                 click.echo(f"warning: {warning}")
         yield {"directory": str(directory), "seed": seed, "frames": frames, "duration_s": seconds, "new": new}

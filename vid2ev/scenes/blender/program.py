@@ -67,8 +67,8 @@ class Blender:
         """Have a request answered.  Raises DataError if Blender fails."""
         assert self._process.stdin is not None
         with contextlib.suppress(OSError):  # (it has ended: why is in its errors)
-            self._process.stdin.write(f"{request}\n")
-            self._process.stdin.flush()
+            # (past the buffer, which could not be closed with what a Blender that has ended did not read)
+            os.write(self._process.stdin.fileno(), os.fsencode(f"{request}\n"))
         self._answer()
 
     def close(self) -> None:

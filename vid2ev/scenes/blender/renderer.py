@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Self
 
@@ -57,11 +58,7 @@ class Cycles:
         self._folder = Path(self._temporary.name) if self._temporary else Path(folder or "")
         self._exchange: Exchange | None = None
         self._blender: Blender | None = None
-
-    @property
-    def version(self) -> str:
-        """Blender's; starts it if need be."""
-        return self._running().version
+        self._version, self._pictures, self._seconds = "", 0, 0.0
 
     def __call__(self, snapshot: Snapshot, intrinsics: Intrinsics, pose: Pose) -> Picture:
         """What a camera with this pose (camera to world) sees.
@@ -70,18 +67,27 @@ class Cycles:
         """
         try:
             request = self._made().request(snapshot, intrinsics, pose)
-        except UsageError:
+        except (DataError, UsageError):
             raise
         except OSError as error:
             reason = error.strerror or str(error)
             raise DataError(f"{self._folder} cannot be written: {reason}; make room or access there") from error
         if not all(answer.exists() for answer in request.answers):
-            self._running().ask(request.path)
+            blender, began_s = self._running(), monotonic()
+            blender.ask(request.path)
+            self._pictures, self._seconds = self._pictures + 1, self._seconds + monotonic() - began_s
         picture = read_answers(request.answers, intrinsics.size, request.larger)
         if self._temporary:
             for path in (request.path, *request.answers):
                 path.unlink()
         return picture
+
+    def describe(self) -> str:
+        """Which Blender has rendered how much, on a line; empty if it had nothing to do."""
+        if not self._pictures:
+            return ""
+        each_s = self._seconds / self._pictures
+        return f"Blender {self._version}, Cycles: {self._pictures:,} pictures, {each_s:.2g} s each"
 
     def close(self) -> None:
         """End Blender."""
@@ -102,6 +108,7 @@ class Cycles:
     def _running(self) -> Blender:
         if self._blender is None:
             self._blender = Blender(self.program)
+            self._version = self._blender.version
         return self._blender
 
     def _made(self) -> Exchange:
