@@ -26,6 +26,7 @@ pytestmark = pytest.mark.skipif(
 ODD = Intrinsics(size=(160, 120), focal_px=(150.0, 127.0), centre_px=(71.3, 66.8))  # nothing in it is even
 CAMERA = Pose.of((10, -25, 15), (0.3, -0.2, 0.1))
 HELD_PX = 0.1
+ROUND: tuple[Kind, ...] = ("sphere", "cylinder", "box")
 
 
 @pytest.fixture(scope="module")
@@ -170,6 +171,16 @@ def test_things_that_share_a_surface_are_seen_in_the_same_order(cycles: Cycles) 
     ours, theirs = render(Snapshot(things), ODD, CAMERA, threads=1), cycles(Snapshot(things), ODD, CAMERA)
     assert set(np.unique(theirs.thing)) == set(np.unique(ours.thing))
     assert (ours.thing != theirs.thing).mean() < 1e-3
+
+
+def test_what_has_no_extent_is_seen_by_neither(cycles: Cycles) -> None:
+    line = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]]), np.array([[0, 1, 1], [2, 2, 2]]))
+    things = [before_camera("mesh", line), before_camera("plane")]
+    things += [Thing(kind, Shape(kind, (0, 0, 0)), pose=CAMERA @ Pose.of((0, 0, 0), (0, 0, 1))) for kind in ROUND]
+    ours, theirs = render(Snapshot(things), ODD, CAMERA, threads=1), cycles(Snapshot(things), ODD, CAMERA)
+    assert set(np.unique(theirs.thing)) == {-1, 1}
+    assert (ours.thing != theirs.thing).mean() < 1e-3
+    assert np.isinf(cycles(Snapshot(), ODD, CAMERA).depth).all()
 
 
 def test_the_same_request_gives_the_same_picture(cycles: Cycles) -> None:

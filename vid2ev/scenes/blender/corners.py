@@ -57,11 +57,12 @@ def corners_of(shape: Shape) -> Corners:
 
 
 def _of_mesh(mesh: Mesh) -> Corners:
-    count = len(mesh.triangles)
-    uv = np.zeros((count, 3, 2)) if mesh.uv is None else mesh.uv[mesh.triangles]
-    normals = FLAT if mesh.normals is None else mesh.normals[mesh.triangles]
-    colours = np.ones((count, 3, 3)) if mesh.colours is None else mesh.colours[mesh.triangles]
-    return Corners(mesh.vertices, mesh.triangles, uv, normals, colours)
+    # (Blender takes no triangle with a corner twice)
+    triangles = mesh.triangles[(mesh.triangles != np.roll(mesh.triangles, 1, axis=1)).all(axis=1)]
+    uv = np.zeros((len(triangles), 3, 2)) if mesh.uv is None else mesh.uv[triangles]
+    normals = FLAT if mesh.normals is None else mesh.normals[triangles]
+    colours = np.ones((len(triangles), 3, 3)) if mesh.colours is None else mesh.colours[triangles]
+    return Corners(mesh.vertices, triangles, uv, normals, colours)
 
 
 def _plane(size: np.ndarray) -> Corners:
