@@ -1,0 +1,1 @@
+"""How much of it: how far two recordings are from each other."""

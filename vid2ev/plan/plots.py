@@ -1,0 +1,66 @@
+"""A comparison as a picture: where events are too many or missing, how late they are, and when it goes wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError
+from vid2ev.plan.comparison import Comparison
+from vid2ev.recording.disk import whole_file
+
+BARS = 101  # of the distribution of timing errors; odd, so that one of them is of the pairs without error
+
+
+def plot(comparison: Comparison, picture: Path) -> None:
+    """Draw a comparison into a PNG file, which is there as a whole or not at all; raises DataError."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 9), layout="constrained")
+    panels = figure.subplot_mosaic([["map", "timing"], ["time", "time"]], height_ratios=[2, 1])
+    _draw_map(figure, panels["map"], comparison)
+    _draw_timing(panels["timing"], comparison)
+    _draw_time(panels["time"], comparison)
+    try:
+        with whole_file(picture) as file:
+            figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
+    except OSError as error:
+        picture.with_name(f"{picture.name}.new").unlink(missing_ok=True)
+        reason = error.strerror or str(error)
+        raise DataError(f"{picture} cannot be written: {reason}; make room or access there") from error
+
+
+def _draw_map(figure: Any, axes: Any, comparison: Comparison) -> None:
+    difference = comparison.difference
+    most = max(float(np.quantile(np.abs(difference), 0.999)), 1.0)
+    image = axes.imshow(difference, cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest")
+    figure.colorbar(image, ax=axes, shrink=0.7, label="events more (red) or fewer (blue) than the reference")
+    axes.set_title("events per pixel", loc="left")
+
+
+def _draw_timing(axes: Any, comparison: Comparison) -> None:
+    window_us, errors = comparison.window_us, comparison.timing_errors
+    axes.set_title("timing error of the pairs", loc="left")
+    axes.set_xlabel("A after the reference [us]")
+    axes.set_ylabel("pairs")
+    if not comparison.matched:
+        return
+    error_us = np.arange(1 - window_us, window_us)
+    reach_us = max(int(np.abs(error_us[errors > 0]).max()), BARS // 2)
+    edges = np.linspace(-reach_us - 0.5, reach_us + 0.5, BARS + 1)
+    axes.hist(error_us, edges, weights=errors, color="#444444", log=True)
+
+
+def _draw_time(axes: Any, comparison: Comparison) -> None:
+    squared, events = comparison.by_time
+    first_us, last_us = comparison.span_us
+    edges_s = np.linspace(0, (last_us + 1 - first_us) / 1e6, len(events) + 1)
+    tau_us = next(iter(comparison.distances))
+    axes.stairs(2 * squared / np.maximum(events, 1), edges_s, color="black")
+    axes.axhline(comparison.distance, color="#e08a00", linewidth=1)
+    axes.set_title(f"distance over time, tau {tau_us} us; the line is that of all", loc="left")
+    axes.set_xlabel(f"time after {first_us} us [s]")
+    axes.set_ylabel("distance")
+    axes.set_ylim(bottom=0)
