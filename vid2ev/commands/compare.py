@@ -48,34 +48,37 @@ def compare(
     """
     from vid2ev.commands import summary
     from vid2ev.commands.progress import event_bar
+    from vid2ev.plan.plots import plot as draw
     from vid2ev.plan.recordings import compare_recordings
-    from vid2ev.plan.rigs import compare_rigs, is_rig
+    from vid2ev.plan.rigs import pairs
 
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise UsageError(f"--plot {plot}: expected a name that ends in .png")
-    if is_rig(Path(recording)) and is_rig(Path(reference)):
+    cameras = pairs(recording, reference)
+    pictures = _pictures(plot, list(cameras), overwrite)
+    found = {}
+    for name, (one, other) in cameras.items():
         with event_bar(quiet) as report:
-            cameras = compare_rigs(Path(recording), Path(reference), report=report, **options)
-        _draw(cameras, plot, overwrite)
-        texts = [f"{name}\n{summary.lines(compared.facts())}" for name, compared in cameras.items()]
-        found = {"cameras": {name: compared.as_dict() for name, compared in cameras.items()}}
-        click.echo(json.dumps(found, indent=2) if as_json else "\n\n".join(texts))
-        return
-    with event_bar(quiet) as report:
-        compared = compare_recordings(recording, reference, report=report, **options)
-    _draw({"": compared}, plot, overwrite)
-    click.echo(json.dumps(compared.as_dict(), indent=2) if as_json else summary.lines(compared.facts()))
+            found[name] = compare_recordings(one, other, report=report, **options)
+        if name in pictures:
+            draw(found[name].comparison, pictures[name])
+    if as_json:
+        numbers = {name: compared.as_dict() for name, compared in found.items()}
+        click.echo(json.dumps(numbers.get("", {"cameras": numbers}), indent=2))
+    else:
+        click.echo("\n\n".join(summary.lines(_facts(name, compared)) for name, compared in found.items()))
 
 
-def _draw(cameras: dict[str, Compared], picture: Path | None, overwrite: bool) -> None:
-    """The pictures of one comparison, or of each camera's with its name."""
-    from vid2ev.plan.plots import plot
+def _facts(name: str, compared: Compared) -> list[tuple[str, str]]:
+    return [*([("camera", name)] if name else []), *compared.facts()]
 
+
+def _pictures(picture: Path | None, names: list[str], overwrite: bool) -> dict[str, Path]:
+    """The picture of the only comparison, or those of each camera, with its name in theirs."""
     if picture is None:
-        return
-    places = {picture.with_stem(f"{picture.stem}{name and '_'}{name}"): one for name, one in cameras.items()}
-    for place in places:
+        return {}
+    if picture.suffix.lower() != ".png":
+        raise UsageError(f"--plot {picture}: expected a name that ends in .png")
+    places = {name: picture.with_stem(f"{picture.stem}_{name}") if name else picture for name in names}
+    for place in places.values():
         if place.exists() and not overwrite:
             raise UsageError(f"{place} exists; --overwrite replaces it")
-    for place, compared in places.items():
-        plot(compared.comparison, place)
+    return places

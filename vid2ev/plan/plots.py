@@ -24,6 +24,7 @@ def plot(comparison: Comparison, picture: Path) -> None:
     _draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
     try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(picture) as file:
             figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
     except OSError as error:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from vid2ev.errors import UsageError
-from vid2ev.plan.recordings import Compared, compare_recordings
 from vid2ev.recording.manifest import read_manifest
 
 
-def compare_rigs(recording: Path, reference: Path, **options: Any) -> dict[str, Compared]:
-    """Compare the event cameras of two rigs by their names; raises as `compare_recordings`, and UsageError for rigs
-    whose event cameras have other names."""
-    ones, others = event_cameras(recording), event_cameras(reference)
-    if ones != others:
+def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path, Path]]:
+    """What to compare with what: the event cameras of two rigs by their names, or else the two themselves, as ''.
+
+    Raises UsageError for rigs whose event cameras have other names.
+    """
+    one, other = Path(recording), Path(reference)
+    if not (is_rig(one) and is_rig(other)):
+        return {"": (one, other)}
+    names, other_names = event_cameras(one), event_cameras(other)
+    if names != other_names or not names:
         raise UsageError(
-            f"{recording} has the event cameras {', '.join(ones) or '(none)'}, {reference} has"
-            f" {', '.join(others) or '(none)'}; give two rigs with the same names, or two cameras"
+            f"{one} has the event cameras {', '.join(names) or '(none)'}, {other} has"
+            f" {', '.join(other_names) or '(none)'}; give two rigs with the same names, or two cameras"
         )
-    return {name: compare_recordings(recording / name, reference / name, **options) for name in ones}
+    return {name: (one / name, other / name) for name in names}
 
 
 def is_rig(path: Path) -> bool:
@@ -30,4 +33,4 @@ def is_rig(path: Path) -> bool:
 def event_cameras(folder: Path) -> list[str]:
     """The names of a rig's event cameras."""
     manifests = sorted(folder.glob("*/manifest.json"))
-    return [path.parent.name for path in manifests if read_manifest(path.parent)["sensor"]["kind"] != "cis"]
+    return [path.parent.name for path in manifests if read_manifest(path)["sensor"]["kind"] != "cis"]

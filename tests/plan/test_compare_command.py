@@ -1,0 +1,179 @@
+"""`vid2ev compare`: any two recordings, in any formats; what cannot be compared is refused in a sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from event_streams import busy, events_of, isolated
+
+from vid2ev import convert
+from vid2ev.commands.compare import compare as command
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import FORMATS, format_named
+from vid2ev.formats.event_file import Recording
+from vid2ev.formats.hdf5 import write_events
+from vid2ev.plan.recordings import compare_recordings
+from vid2ev.reformat import reformat
+from vid2ev.rig.camera import Camera, Rig, Source
+from vid2ev.stream.events import Events
+
+SIZE = (32, 24)
+WRITTEN = [name for name in FORMATS if format_named(name).write]
+BAG = Path(__file__).parents[3] / "shared" / "data" / "events" / "evt3_vga_legs.bag"
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(
+    events: Events, path: str, size: tuple[int, int] = SIZE, start_us: int = 0, duration_us: int | None = None
+) -> str:
+    last_us = int(events.t[-1]) if len(events) else start_us
+    duration_us = last_us - start_us if duration_us is None else duration_us
+    write_events(Path(path), Recording(size, start_us, duration_us, len(events), lambda: iter([events])))
+    return path
+
+
+def moved(events: Events, shift_us: int) -> Events:
+    return Events(events.t + shift_us, events.x, events.y, events.p)
+
+
+def compare(*arguments: str) -> dict[str, Any]:
+    result = CliRunner().invoke(command, [*arguments, "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_another_format_is_the_same_recording(name: str) -> None:
+    source = write(busy(3000, SIZE), "events.h5")
+    target = f"other{format_named(name).suffix}"
+    reformat(source, target, name)
+    found = compare(target, source)
+    assert found["events"] == found["reference_events"] == found["matched"] == 3000
+    assert found["distance"] == found["count_error"] == found["timing_error_abs_p95_us"] == 0
+    assert found["left_out"] == found["reference_left_out"] == 0
+
+
+def test_a_recording_of_a_camera_and_its_copy() -> None:
+    if not BAG.exists():
+        pytest.skip(f"{BAG} is not there")
+    pytest.importorskip("rosbags")
+    reformat(BAG, "copy.raw")
+    found = compare("copy.raw", str(BAG))
+    assert found["events"] > 10_000 and found["distance"] == 0 and found["matched_share"] == 1
+
+
+def test_numbers_and_text_and_picture() -> None:
+    events = isolated(500, size=SIZE)
+    mine = write(moved(events.select(np.arange(500) % 50 != 0), 40), "mine.h5")
+    theirs = write(events, "theirs.h5")
+    found = compare(mine, theirs)
+    share = 0.02 / 1.98
+    assert found["distance"] == pytest.approx(share + (1 - share) * (1 - np.exp(-0.04)))
+    assert found["timing_error_median_us"] == 40 and found["matched_share_of_reference"] == 0.98
+    result = CliRunner().invoke(command, [mine, theirs, "--plot", "new/picture.png"], catch_exceptions=False)
+    assert "490 events against 500" in result.stdout and "40 us late" in result.stdout
+    assert Path("new/picture.png").read_bytes()[:4] == b"\x89PNG"
+    assert [path.name for path in Path("new").iterdir()] == ["picture.png"]
+    with pytest.raises(UsageError, match="--overwrite"):
+        CliRunner().invoke(command, [mine, theirs, "--plot", "new/picture.png"], catch_exceptions=False)
+    compare(mine, theirs, "--plot", "new/picture.png", "--overwrite")
+    with pytest.raises(UsageError, match=r"\.png"):
+        CliRunner().invoke(command, [mine, theirs, "--plot", "picture.pdf"], catch_exceptions=False)
+
+
+def test_what_both_have_is_compared() -> None:
+    events = busy(20_000, SIZE, duration_us=2_000_000)
+    whole = write(events, "whole.h5")
+    part = write(events.select(events.t < 1_000_000), "part.h5")
+    last_us = int(events.t[events.t < 1_000_000][-1])
+    found = compare(part, whole)
+    assert found["distance"] == 0 and found["span_us"] == [0, last_us]
+    assert found["left_out"] == 0 and found["reference_left_out"] == np.count_nonzero(events.t > last_us) > 9000
+    assert "left out" in CliRunner().invoke(command, [part, whole]).stdout
+    late = write(events.select(events.t >= 500_000), "late.h5", start_us=500_000)
+    assert compare(late, part)["distance"] == 0
+    assert compare(late, part)["left_out"] > 9000 and compare(late, part)["reference_left_out"] > 4000
+
+
+def test_an_event_missing_at_the_end_is_missing() -> None:
+    events = busy(1000, SIZE)
+    found = compare(write(events.stretch(0, 999), "less.h5"), write(events, "all.h5"))
+    assert found["distance"] == pytest.approx(1 / 1999) and found["reference_left_out"] == 0
+    assert compare(write(moved(events, 70), "later.h5"), "all.h5")["matched"] == 1000
+    empty = compare(write(Events.empty(), "empty.h5"), "all.h5")
+    assert empty["matched_share_of_reference"] == 0 and empty["reference_events"] == 1000
+
+
+def test_clocks_that_differ_are_laid_on_one_another_on_request() -> None:
+    events = busy(1000, SIZE)
+    here = write(events, "here.h5")
+    there = write(moved(events, 10**9), "there.h5", start_us=10**9)
+    with pytest.raises(UsageError, match="--align start") as raised:
+        compare(here, there)
+    assert "\n" not in str(raised.value)
+    found = compare(here, there, "--align", "start")
+    assert found["distance"] == 0 and found["reference_shifted_us"] == -(10**9) and found["events"] == 1000
+
+
+def test_sensors_of_different_sizes_are_refused_but_not_a_file_that_does_not_say() -> None:
+    events = busy(100, (10, 10))
+    small, large = write(events, "small.h5", (10, 10)), write(events, "large.h5", (12, 10))
+    with pytest.raises(UsageError, match=r"10x10 pixels, .* 12x10"):
+        compare(small, large)
+    reformat(large, "unsaid.csv")
+    assert compare("unsaid.csv", large)["size"] == [12, 10]
+    assert compare(small, "unsaid.csv")["distance"] == 0
+    reformat(write(events_of([1], x=20), "far.h5"), "far.csv")
+    with pytest.raises(UsageError, match="one size"):
+        compare("far.csv", large)
+    assert compare("far.csv", "unsaid.csv")["size"] == [21, 10]
+
+
+def test_what_is_no_recording_is_refused() -> None:
+    good = write(busy(10, SIZE), "good.h5")
+    with pytest.raises(UsageError, match="no such file"):
+        compare(good, "nothing.h5")
+    Path("text.txt").write_text("nothing of the kind\n")
+    with pytest.raises(DataError, match="no event file"):
+        compare("text.txt", good)
+
+
+@pytest.mark.parametrize("limit", [1, 300, 4000])
+def test_bands_of_rows_change_nothing(limit: int) -> None:
+    a, b = write(busy(3000, SIZE, seed=1), "a.h5"), write(busy(2500, SIZE, seed=2), "b.h5")
+    read: list[tuple[int, int]] = []
+    whole = compare_recordings(a, b)
+    parts = compare_recordings(a, b, limit=limit, report=lambda recording, done: read.append((recording.count, done)))
+    assert parts.as_dict() == whole.as_dict()
+    np.testing.assert_array_equal(parts.comparison.squared_distance, whole.comparison.squared_distance)
+    assert read[-1][0] == read[-1][1] > 5500
+
+
+def test_rigs_camera_by_camera() -> None:
+    clip = "synthetic:moving-edge,size=64x48,fps=200,duration_s=0.1"
+    for folder, names in (("one", ("left", "right")), ("two", ("left", "right")), ("three", ("left", "top"))):
+        cameras = (*(Camera(name=name, kind="dvs") for name in names), Camera(name="aps", kind="cis"))
+        seed = {"one": 1, "two": 2, "three": 1}[folder]
+        rig = Rig(source=Source(fov_deg=60.0), cameras=cameras)
+        convert(clip, folder, rig=rig, upsample="none", seed=seed, threads=1, preview=False)
+    found = compare("one", "two", "--plot", "rig.png")["cameras"]
+    assert list(found) == ["left", "right"]
+    assert all(camera["distance"] > 0 and camera["reference"] == f"two/{name}" for name, camera in found.items())
+    assert Path("rig_left.png").exists() and Path("rig_right.png").exists()
+    text = CliRunner().invoke(command, ["one", "one"], catch_exceptions=False).stdout
+    assert text.count("distance  0 at 1 ms") == 2 and "camera    right" in text
+    with pytest.raises(UsageError, match="left, top"):
+        compare("one", "three")
+    with pytest.raises(UsageError, match="left"):
+        compare("one", "two/left")
+    assert compare("one/left", "two/left")["distance"] == found["left"]["distance"]
