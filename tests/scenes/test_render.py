@@ -168,3 +168,11 @@ def test_rays_through_a_lens_land_where_opencv_projects():
 def test_samples_that_cannot_be_meant_are_refused():
     with pytest.raises(UsageError, match="samples"):
         render(Snapshot(), CAMERA, IDENTITY, samples=0)
+
+
+def test_an_even_sky_lights_a_white_surface_as_itself() -> None:
+    wall = Thing("wall", Shape("plane", (9.0, 9.0, 0.0)), pose=Pose.of((0, 0, 0), (0, 0, 2)))
+    for size in ((1, 1), (2, 3), (64, 128)):
+        around = Texture(np.full((*size, 3), 0.2, np.float32))
+        light = render(Snapshot([wall], environment=around), Intrinsics.of_field((8, 6)), IDENTITY, threads=1).light
+        assert np.allclose(light, 0.2, rtol=2e-3), size

@@ -20,7 +20,7 @@ from vid2ev.scenes.snapshot import Texture
 WEIGHTS = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274]) ** 2 * np.array(
     [1, *[2 / 3] * 3, *[1 / 4] * 5]
 )
-ENOUGH, ROWS = 64, 256  # rows of the picture; rows that are summed over
+ENOUGH = 64  # rows
 
 
 @lru_cache(maxsize=4)
@@ -29,8 +29,9 @@ def irradiance_of(environment: Texture) -> np.ndarray:
     levels, sizes = environment.levels
     first, width, height = next((size for size in sizes if size[2] <= ENOUGH), sizes[-1])
     pixels = levels[first : first + width * height].reshape(height, width, 3).astype(np.float64)
-    pixels = np.repeat(pixels, -(-ROWS // height), axis=0)  # (sums over few rows would not be integrals)
-    height = len(pixels)
+    # (the centres of few and large pixels do not stand for all that these cover: cut them up)
+    pixels = pixels.repeat(-(-ENOUGH // height), axis=0).repeat(-(-2 * ENOUGH // width), axis=1)
+    height, width = pixels.shape[:2]
     edges = np.cos(np.linspace(0, np.pi, height + 1))
     area = (edges[:-1] - edges[1:]) * 2 * np.pi / width
     latitude = (np.arange(height)[:, None] + 0.5) / height * np.pi
