@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from vid2ev import Events, UsageError, convert, read_events
+from vid2ev.recipe import Recipe
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.pose import IDENTITY
@@ -198,3 +199,12 @@ def test_codes_of_a_sensor_are_not_taken_for_pictures(tmp_path: Path) -> None:
     for folder, message in ((tmp_path / "out", "cameras cis, dvs"), (tmp_path / "out" / "cis", "frames and no events")):
         with pytest.raises(UsageError, match=message):
             next(read_events(folder))
+
+
+def test_a_camera_with_finer_pixels_sees_a_scene_more_often() -> None:
+    scene = "scene:parallax,seed=4,scene.duration_s=0.3,size=48x36,scene.min_fps=1"
+    alone = Recipe.of(scene).source.frames_expected
+    finer = Recipe.of(scene, rig=rig(size=(192, 144))).source.frames_expected
+    coarser = Recipe.of(scene, rig=rig(size=(24, 18))).source.frames_expected
+    assert alone is not None and finer is not None and coarser == alone
+    assert 3.5 * (alone - 1) < finer - 1 < 4.5 * (alone - 1)

@@ -52,15 +52,18 @@ NEAREST_M = 0.05
 
 
 class Instants:
-    """The instants of a world [ns]; with `fps` at k / fps, otherwise as motion and light ask for."""
+    """The instants of a world [ns]; with `fps` at k / fps, otherwise as motion and light ask for.
 
-    def __init__(self, world: World, fps: float | Fraction | None = None):
+    finer   how much finer the pixels of the finest camera are than those of the reference camera, 1 or more
+    """
+
+    def __init__(self, world: World, fps: float | Fraction | None = None, finer: float = 1.0):
         self._end_ns = world.duration_ns
         self._fps = None if fps is None else _rate(fps)
         if self._fps is not None:
             self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
             return
-        knots, rates = _rates(world)
+        knots, rates = _rates(world, finer)
         self.slowest_hz, self.fastest_hz = float(rates.min()), float(rates.max())
         spans = 1e-9 * np.diff(knots) * np.maximum(rates[1:], rates[:-1])
         self._knots, self._steps = knots, np.concatenate([[0.0], np.cumsum(spans)])
@@ -83,31 +86,31 @@ class Instants:
         return bisect_left(range(self.count), t_ns, key=self.__getitem__)
 
 
-def _rates(world: World) -> tuple[np.ndarray, np.ndarray]:
+def _rates(world: World, finer: float) -> tuple[np.ndarray, np.ndarray]:
     """The knots [ns], and the rates at them."""
     parts = max(1, math.ceil(world.duration_ns / COARSEST_NS))
     coming = [round(world.duration_ns * k / parts) for k in range(parts, -1, -1)]  # (the earliest last)
-    known = {t_ns: rate_hz(world, t_ns) for t_ns in coming}
+    known = {t_ns: rate_hz(world, t_ns, finer) for t_ns in coming}
     knots = [coming.pop()]
     while coming:
         low, high = sorted((known[knots[-1]], known[coming[-1]]))
         middle = (knots[-1] + coming[-1]) // 2
         if high > STEADY * low and middle - knots[-1] >= FINEST_NS:
-            known[middle] = rate_hz(world, middle)
+            known[middle] = rate_hz(world, middle, finer)
             coming.append(middle)
         else:
             knots.append(coming.pop())
     return np.array(knots, np.float64), np.array([known[t_ns] for t_ns in knots])
 
 
-def rate_hz(world: World, t_ns: int) -> float:
+def rate_hz(world: World, t_ns: int, finer: float = 1.0) -> float:
     """Instants per second that motion and light ask for at an instant."""
     setting = world.scene.scene
     lit: list[LightSource | Object] = [*world.scene.lights, *world.scene.objects]
     asked = [
         setting.min_fps,
         *(setting.samples_per_period * thing.flicker.frequency_hz for thing in lit if thing.flicker),
-        speed_px_s(world, t_ns) / setting.max_shift_px,
+        finer * speed_px_s(world, t_ns) / setting.max_shift_px,
     ]
     if any(light.flicker or not is_still(light) for light in world.scene.lights):
         asked.append(light_rate(world, t_ns) / setting.max_light_step)

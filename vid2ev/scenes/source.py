@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -49,15 +50,32 @@ class SceneSource:
         colour: Colour = "luminance",
     ):
         self.world, self.name, self.seed, self.colour = world, name, seed, colour
-        self.instants = Instants(world, fps)
         self.size = world.intrinsics.size
-        self.warnings: list[str] = []
-        limit = world.scene.scene.max_fps
-        if fps is None and self.instants.fastest_hz >= limit:
-            self.warnings.append(
-                f"{name}: more changes between two instants than was asked for, as there are {limit:g} a second at"
-                " most; raise max_fps"
-            )
+        self._fps, self._finer = fps, 1.0
+        if fps is not None:
+            self.instants  # noqa: B018  (refuses a rate that cannot be)
+
+    @cached_property
+    def instants(self) -> Instants:
+        """When it is rendered."""
+        return Instants(self.world, self._fps, self._finer)
+
+    def watched_by(self, finer: float) -> None:
+        """Let the instants suit cameras whose pixels are so much finer than those of the reference camera."""
+        if finer > 1:
+            self._finer = finer
+            vars(self).pop("instants", None)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Whether it is rendered less often than was asked for."""
+        limit = self.world.scene.scene.max_fps
+        if self._fps is not None or self.instants.fastest_hz < limit:
+            return []
+        return [
+            f"{self.name}: more changes between two instants than was asked for, as there are {limit:g} a second at"
+            " most; raise max_fps"
+        ]
 
     @property
     def frames_expected(self) -> int:
