@@ -48,9 +48,8 @@ def by_pixel(blocks: Iterable[Events], width: int, rows: range) -> ByPixel:
         if int(events.x.max()) >= width:
             raise ValueError(f"events outside of a sensor {width} pixels wide")
         last_us = events.t[-1]
-        pixels, moments, many = _of_rows(events.t, events.x, events.y, events.p, width, rows.start, rows.stop)
-        parts.append((pixels[:many], moments[:many]))
-        _count(pixels[:many], begins)
+        parts.append(_of_rows(events.t, events.x, events.y, events.p, width, rows.start, rows.stop))
+        _count(parts[-1][0], begins)
     np.cumsum(begins, out=begins)
     places, ordered = begins[:-1].copy(), np.empty(begins[-1], np.int64)
     for pixels, moments in parts:
@@ -60,14 +59,17 @@ def by_pixel(blocks: Iterable[Events], width: int, rows: range) -> ByPixel:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _of_rows(t, x, y, p, width, first, stop):  # type: ignore[no-untyped-def]
-    pixels, moments = np.empty(len(t), np.uint32), np.empty(len(t), np.int64)
+    many = 0
+    for row in y:
+        many += first <= row < stop
+    pixels, moments = np.empty(many, np.uint32), np.empty(many, np.int64)
     many = 0
     for i in range(len(t)):
         if first <= y[i] < stop:
             pixels[many] = (np.int64(y[i]) - first) * width + np.int64(x[i])
             moments[many] = 2 * t[i] + np.int64(p[i] != 0)
             many += 1
-    return pixels, moments, many
+    return pixels, moments
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -49,10 +49,10 @@ class Comparison:
     window_us: int
     distances: dict[int, float]
     polarity_errors: int
-    squared_distance: np.ndarray = field(repr=False)
-    difference: np.ndarray = field(repr=False)
-    timing_errors: np.ndarray = field(repr=False)
-    by_time: np.ndarray = field(repr=False)
+    squared_distance: np.ndarray = field(repr=False, compare=False)
+    difference: np.ndarray = field(repr=False, compare=False)
+    timing_errors: np.ndarray = field(repr=False, compare=False)
+    by_time: np.ndarray = field(repr=False, compare=False)
 
     @property
     def distance(self) -> float:

@@ -18,7 +18,8 @@ end next to k = 0 of two stacks, and what has reached the window at the other en
 are left of those, noted for each event, leads back from k = 0 at the end to the events that have partners.  All numbers
 are whole, in half microseconds.
 
-Events that remain are paired the same way with those of the other polarity: these are errors of polarity.
+Events that remain are paired the same way with those of the other polarity: these are errors of polarity.  Where events
+are dense, chance finds partners, too, and near ones: read their share and errors beside the distance, never alone.
 
 Source: J. D. Victor, K. P. Purpura (1997), "Metric-space analysis of spike trains", Network 8, 127-164.
 """

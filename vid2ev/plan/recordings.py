@@ -5,8 +5,8 @@ than a matching window apart are the same end, for it may only be an event that 
 out is counted.
 
 Streams of any length are compared in bands of rows: all events of a band of both recordings are in memory at a time, at
-most `LIMIT` of them (or those of one row), 20 bytes each, and the files are read once more for each band.  Pixels know
-nothing of each other here, so the numbers are the same however the bands are cut.
+most `LIMIT` of them (or those of one row) at 20 bytes each, 60 if one pixel has them all, and the files are read once
+more for each band.  Pixels know nothing of each other here, so the numbers are the same however the bands are cut.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vid2ev.plan.comparison import Comparison, Tally
 from vid2ev.plan.matching import WINDOW_US
 from vid2ev.stream.events import Events
 
-LIMIT = 1 << 24  # events in memory at a time
+LIMIT = 1 << 25  # events in memory at a time: 0.7 GB
 
 Report = Callable[[Recording, int], object]
 

@@ -27,7 +27,8 @@ def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path,
 
 def is_rig(path: Path) -> bool:
     """Whether a folder is the recording of several cameras."""
-    return path.is_dir() and not any(path.glob("events*")) and any(path.glob("*/manifest.json"))
+    alone = any(file.is_file() for file in path.glob("events*"))
+    return path.is_dir() and not alone and any(path.glob("*/manifest.json"))
 
 
 def event_cameras(folder: Path) -> list[str]:
