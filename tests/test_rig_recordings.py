@@ -179,6 +179,16 @@ def test_a_scene_brings_its_own_rig(tmp_path: Path) -> None:
         convert(scene, tmp_path / "other", depth="plane:2", **OPTIONS)
 
 
+def test_other_depth_is_another_recording(tmp_path: Path) -> None:
+    np.save(tmp_path / "depth.npy", np.full((48, 64), 2, np.float32))
+    options = OPTIONS | {"rig": rig(translation_mm=(40.0, 0.0, 0.0)), "depth": f"{tmp_path / 'depth.npy'},scale=1"}
+    made = convert(CLIP, tmp_path / "out", **options)
+    assert convert(CLIP, tmp_path / "out", resume=True, **options) == made
+    np.save(tmp_path / "depth.npy", np.full((48, 64), 3, np.float32))
+    with pytest.raises(UsageError, match="was begun with"):
+        convert(CLIP, tmp_path / "out", resume=True, **options)
+
+
 def test_frames_are_asked_for_beside_any_rig(tmp_path: Path) -> None:
     events = Rig(cameras=(Camera(name="left", kind="dvs"),))
     manifest = convert(CLIP, tmp_path / "one", rig=events, frame_camera=True, **OPTIONS)

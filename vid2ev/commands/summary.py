@@ -39,7 +39,7 @@ def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
 def sensor_text(sensor: Mapping[str, Any]) -> str:
     """A sensor's description as one line."""
     parameters = sensor["parameters"]
-    if sensor["kind"] == "cis":
+    if sensor.get("kind") == "cis":
         shutter = f", lines {parameters['line_us']:g} us apart" if parameters["line_us"] else ""
         how = f"{parameters['frame_rate_hz']:g} frames/s of {parameters['exposure_us']:g} us{shutter}"
     else:
@@ -55,7 +55,7 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
         warnings = {text: None for result in results.values() for text in result["warnings"]}
         return [*counts, _duration(next(iter(results.values()))), *(("warning", text) for text in warnings)]
     sensor = manifest["sensor"]
-    what = "frames" if sensor["kind"] == "cis" else "events"
+    what = "frames" if sensor.get("kind") == "cis" else "events"
     warnings = manifest["warnings"]
     return [
         (what, _count_text(manifest, sensor, named=True)),
@@ -67,7 +67,7 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: bool = False) -> str:
     """Events or frames of a camera; `named`: which of them it is stands before."""
     counts, seconds, (width, height) = result["counts"], result["duration_us"] / 1e6, sensor["size"]
-    if sensor["kind"] == "cis":
+    if sensor.get("kind") == "cis":
         return f"{counts['exposures']:,}{'' if named else ' frames'}, {counts['unfinished']:,} cut off by the end"
     per_s = counts["events"] / seconds if seconds else 0.0
     rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"

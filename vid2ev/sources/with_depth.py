@@ -10,9 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import UsageError, nearest
+from vid2ev.recording.manifest import identity
 from vid2ev.rig.depth import KINDS, Depth, open_depth
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.sources.edit import Edit
@@ -20,6 +22,7 @@ from vid2ev.sources.source import Source
 from vid2ev.stream.frames import Frame
 
 NUMBERS = ("scale", "shift", "focal_px", "baseline_m")
+_SETTING = re.compile(r"(,\w+=[^,=]*)+$")
 
 
 class WithDepth(Edit):
@@ -30,8 +33,9 @@ class WithDepth(Edit):
         self._depth, self._name = depth, name
 
     def edits(self) -> dict[str, Any]:
-        """Where the depth is from."""
-        return {"depth": self._name}
+        """Where the depth is from, and by what its files are known again."""
+        path = Path(_SETTING.sub("", self._name))
+        return {"depth": {"named": self._name} | (identity(path) if path.exists() else {})}
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
