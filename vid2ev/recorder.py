@@ -86,8 +86,7 @@ class Recorder:
                 track.begin(frame)
             if not self.done.frames:
                 self._add_truth(instant)
-        if not self.done.frames:
-            self.done.add(instant)
+                self.done.add(instant)
 
     def add(self, instant: Instant) -> None:
         """The next instant, and what the sensors make of it."""

@@ -24,7 +24,6 @@ class Sight:
 
     plane_m  how far the scene is, if it is a plane before the source's camera; None where frames carry their depth
     bayer    the pattern of colour filters before the pixels of event cameras, or None
-    threads  that form the views; they change nothing but the time it takes
     """
 
     def __init__(
@@ -33,12 +32,11 @@ class Sight:
         mounts: Sequence[Mount],
         plane_m: float | None,
         bayer: str | None = None,
-        threads: int = 1,
     ):
         self._mounts = mounts
         self.free = all(is_same(source, mount.intrinsics, mount.pose) for mount in mounts)  # of any work
         self._groups = [  # (those that see colours, and those that see luminance: a third of the work)
-            (coloured, places, Views(source, [mounts[k].view for k in places], plane_m, threads=threads))
+            (coloured, places, Views(source, [mounts[k].view for k in places], plane_m))
             for coloured in (True, False)
             if (places := [k for k, mount in enumerate(mounts) if sees_colour(mount, bayer) == coloured])
         ]

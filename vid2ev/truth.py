@@ -25,9 +25,12 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.truth import depth_of_plane, depth_seen, pixel_map
 from vid2ev.rig.views import is_same
+from vid2ev.scenes.render import Picture
+from vid2ev.scenes.world import World
 from vid2ev.stream.frames import Frame
 
 EARLY = 0.05  # of a period
+NOTHING = np.zeros((0, 0), np.float32)
 KINDS = ("depth", "flow", "mask", "map", "poses")
 
 
@@ -61,17 +64,23 @@ class Wanted:
         return before_ns is None or self._period(t_ns) > self._period(before_ns)
 
     def of_views(
-        self, frame: Frame, source: Intrinsics, plane_m: float | None, mounts: Sequence[Mount], masks: Any
+        self,
+        frame: Frame,
+        source: Intrinsics,
+        plane_m: float | None,
+        mounts: Sequence[Mount],
+        masks: Sequence[np.ndarray],
     ) -> tuple[Truth, ...]:
         """What is known of the views of a frame; `masks` [h, w] are those of the views."""
-        depths = [_depth_of_view(frame, source, plane_m, mount) for mount in mounts]
+        needed = {"depth", "map"} & {*self.kinds}
+        depths = [_depth_of_view(frame, source, plane_m, mount) if needed else NOTHING for mount in mounts]
         return tuple(
             self._truth(mounts, k, frame.t_ns, [mount.pose for mount in mounts], depths, mask=masks[k])
             for k, mount in enumerate(mounts)
         )
 
     def of_pictures(
-        self, world: Any, t_ns: int, next_ns: int | None, pictures: Sequence[Any], mounts: Sequence[Mount]
+        self, world: World, t_ns: int, next_ns: int | None, pictures: Sequence[Picture], mounts: Sequence[Mount]
     ) -> tuple[Truth, ...]:
         """What is known of the pictures of a world at an instant; the flow is that to the next one."""
         poses = [world.camera_pose(t_ns) @ mount.pose for mount in mounts]
@@ -88,7 +97,7 @@ class Wanted:
         )
 
     def _truth(
-        self, mounts: Sequence[Mount], k: int, t_ns: int, poses: list[Pose], depths: list[Any], **rest: Any
+        self, mounts: Sequence[Mount], k: int, t_ns: int, poses: list[Pose], depths: list[np.ndarray], **rest: Any
     ) -> Truth:
         mount = mounts[k]
         maps = {

@@ -9,7 +9,9 @@ so that a single coloured pixel on gray ground keeps its colour; where all are a
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -52,6 +54,21 @@ class Film:
                 self._container.mux(self._stream.encode(None))
         finally:
             self._container.close()
+
+
+def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int) -> int:
+    """A film of pictures of one size, at least one, R'G'B' uint8 [height, width, 3]; returns how many there are.
+
+    Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.  Raises OSError.
+    """
+    coming = iter(pictures)
+    first = next(coming)
+    height, width = first.shape[:2]
+    margin = (0, height % 2), (0, width % 2), (0, 0)
+    with Film(path, (width + width % 2, height + height % 2), fps) as film:
+        for picture in chain([first], coming):
+            film.add(np.pad(picture, margin, mode="edge"))
+    return film.frames
 
 
 def open_film(

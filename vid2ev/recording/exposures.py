@@ -24,7 +24,6 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +109,9 @@ class ExposureFiles:
             shutil.rmtree(copy_of, ignore_errors=True)
             shutil.copytree(self._folders[kind], copy_of, copy_function=_linked)
         if "mp4" in self.kinds and self.count:
-            _write_film(into / KINDS["mp4"], self._pictures(), self.rate)
+            from vid2ev.pictures.film import write_film
+
+            write_film(into / KINDS["mp4"], self._pictures(), self.rate)
         return [KINDS[kind] for kind in self.kinds if kind != "mp4" or self.count]
 
     def _pictures(self) -> Iterator[np.ndarray]:
@@ -138,17 +139,6 @@ def read_codes(path: Path) -> np.ndarray:
     if pixels is None:
         raise DataError(f"{path}: not a picture that can be read, expected one written here; start again")
     return pixels if pixels.ndim == 2 else pixels[..., ::-1]
-
-
-def _write_film(path: Path, pictures: Iterator[np.ndarray], rate: Fraction) -> None:
-    from vid2ev.pictures.film import Film
-
-    first = next(pictures)
-    height, width = first.shape[:2]
-    margin = (0, height % 2), (0, width % 2), (0, 0)  # 4:2:0 needs even sides
-    with Film(path, (width + width % 2, height + height % 2), rate) as film:
-        for picture in chain([first], pictures):
-            film.add(np.pad(picture, margin, mode="edge"))
 
 
 def _linked(source: str, target: str) -> None:

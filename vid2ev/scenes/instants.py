@@ -59,7 +59,7 @@ class Instants:
 
     def __init__(self, world: World, fps: float | Fraction | None = None, finer: float = 1.0):
         self._end_ns = world.duration_ns
-        self._fps = None if fps is None else _rate(fps)
+        self._fps = None if fps is None else rate_of(fps)
         if self._fps is not None:
             self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
             return
@@ -178,7 +178,7 @@ def _coarse(intrinsics: Intrinsics) -> Intrinsics:
     return intrinsics.scaled_to((across, max(1, round(height * across / width))))
 
 
-def _rate(fps: float | Fraction) -> Fraction:
+def rate_of(fps: float | Fraction) -> Fraction:
     if not math.isfinite(fps) or not 0 < fps <= 10**9:
         raise UsageError(f"fps {fps}: expected more than 0 and at most 1e9 frames per second")
     return Fraction(str(fps))

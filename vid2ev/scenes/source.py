@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vid2ev.errors import UsageError
-from vid2ev.scenes.instants import Instants
+from vid2ev.scenes.instants import Instants, rate_of
 from vid2ev.scenes.scene_file import plain_size, read_scene
 from vid2ev.scenes.world import World
 from vid2ev.stream.frames import LUMINANCE, Colour, Frame
@@ -51,9 +51,8 @@ class SceneSource:
     ):
         self.world, self.name, self.seed, self.colour = world, name, seed, colour
         self.size = world.intrinsics.size
-        self._fps, self._finer = fps, 1.0
-        if fps is not None:
-            self.instants  # noqa: B018  (refuses a rate that cannot be)
+        self._fps = None if fps is None else rate_of(fps)
+        self._finer = 1.0
 
     @cached_property
     def instants(self) -> Instants:

@@ -9,10 +9,10 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.exposures import add_rows, read_rows, take_rows
-from vid2ev.kernels.layout import PIXEL_LIMIT
 from vid2ev.physics.shutter import interval_weights, opening_ns
 from vid2ev.sensors.cis_readout import frozen_of, numbers_of
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
@@ -57,15 +57,8 @@ class Cis:
         threads: int = 1,
         linear: bool = False,
     ):
+        check_sensor(size, seed, camera, threads)
         width, height = size
-        if width < 1 or height < 1 or width * height > PIXEL_LIMIT or max(width, height) > 65535:
-            raise UsageError(
-                f"size {width}x{height}: expected 1x1 to {PIXEL_LIMIT} pixels in all; scale the frames down"
-            )
-        if not 0 <= seed < 1 << 64 or not 0 <= camera < 1 << 24:
-            raise UsageError(f"seed {seed}, camera {camera}: expected 0 to 2**64 - 1 and 0 to 2**24 - 1")
-        if threads < 1:
-            raise UsageError(f"threads {threads}: expected at least 1; leave it out for one")
         self.spec, self.size, self.seed, self.camera, self.linear = spec, (width, height), seed, camera, linear
         self.effects = spec.effects()
         self._rows = (height, width * (3 if spec.colour else 1))

@@ -9,13 +9,14 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
-from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, PIXEL_LIMIT, SWALLOWED, TALLIES
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, SWALLOWED, TALLIES
 from vid2ev.kernels.order import order_keys, unpack
 from vid2ev.kernels.work import new_work
 from vid2ev.light.transfer import code_table
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
+from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
@@ -54,15 +55,8 @@ class Dvs:
         labels: bool = False,
         transfer: str | None = None,
     ):
+        check_sensor(size, seed, camera, threads)
         width, height = size
-        if width < 1 or height < 1 or width * height > PIXEL_LIMIT or max(width, height) > 65535:
-            raise UsageError(
-                f"size {width}x{height}: expected 1x1 to {PIXEL_LIMIT} pixels in all; scale the frames down"
-            )
-        if not 0 <= seed < 1 << 64 or not 0 <= camera < 1 << 24:
-            raise UsageError(f"seed {seed}, camera {camera}: expected 0 to 2**64 - 1 and 0 to 2**24 - 1")
-        if threads < 1:
-            raise UsageError(f"threads {threads}: expected at least 1; leave it out for one")
         self.spec, self.size, self.seed, self.camera, self.labels = (
             spec,
             (width, height),

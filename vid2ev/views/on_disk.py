@@ -21,7 +21,6 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -118,16 +117,10 @@ def write_picture(path: Path, picture: np.ndarray) -> None:
 
 
 def write_film(path: Path, pictures: Pictures, fps: Fraction | int) -> int:
-    """A film of pictures of one size, at least one; returns how many there are."""
-    from vid2ev.pictures.film import Film
+    """A film of the pictures of slices; returns how many there are."""
+    from vid2ev.pictures import film
 
-    first = next(pictures)
-    height, width = first[1].shape[:2]
-    margin = (0, height % 2), (0, width % 2), (0, 0)  # 4:2:0 needs even sides
-    with Film(path, (width + width % 2, height + height % 2), fps) as film:
-        for _, picture in chain([first], pictures):
-            film.add(np.pad(picture, margin, mode="edge"))
-    return film.frames
+    return film.write_film(path, (picture for _, picture in pictures), fps)
 
 
 @contextmanager
