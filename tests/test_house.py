@@ -41,7 +41,7 @@ FLOORS = {
     "views": 3,
     "kernels": 3,
     "sensors": 6,
-    "plan": 7,
+    "compare": 7,
     "outputs": 6,
     "mounts": 7,
     "sight": 8,

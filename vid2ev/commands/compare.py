@@ -11,7 +11,7 @@ import click
 from vid2ev.errors import UsageError
 
 if TYPE_CHECKING:
-    from vid2ev.plan.recordings import Compared
+    from vid2ev.compare.recordings import Compared
 
 
 @click.command(short_help="Say how different two recordings are.")
@@ -48,9 +48,9 @@ def compare(
     """
     from vid2ev.commands import summary
     from vid2ev.commands.progress import event_bar
-    from vid2ev.plan.plots import plot as draw
-    from vid2ev.plan.recordings import compare_recordings
-    from vid2ev.plan.rigs import pairs
+    from vid2ev.compare.plots import plot as draw
+    from vid2ev.compare.recordings import compare_recordings
+    from vid2ev.compare.rigs import pairs
 
     cameras = pairs(recording, reference)
     pictures = _pictures(plot, list(cameras), overwrite)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from vid2ev.plan.comparison import Comparison, compare, percentile
-from vid2ev.plan.matching import partners
+from vid2ev.compare.comparison import Comparison, compare, percentile
+from vid2ev.compare.matching import partners
 from vid2ev.stream.events import Events
 
 TIMES = st.one_of(

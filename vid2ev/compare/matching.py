@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from vid2ev.plan.by_pixel import ByPixel
+from vid2ev.compare.by_pixel import ByPixel
 
 WINDOW_US = 5000
 

@@ -13,11 +13,11 @@ from event_streams import busy, events_of, isolated
 
 from vid2ev import convert
 from vid2ev.commands.compare import compare as command
+from vid2ev.compare.recordings import compare_recordings
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import FORMATS, format_named
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
-from vid2ev.plan.recordings import compare_recordings
 from vid2ev.reformat import reformat
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.stream.events import Events

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.plan.by_pixel import ByPixel, by_pixel
-from vid2ev.plan.distance import TAUS_US, normalised, squared_distances
-from vid2ev.plan.matching import WINDOW_US, match
+from vid2ev.compare.by_pixel import ByPixel, by_pixel
+from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
+from vid2ev.compare.matching import WINDOW_US, match
 from vid2ev.stream.events import Events
 
 BINS = 100  # parts of the time for which the distance is kept

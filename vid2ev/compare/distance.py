@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from vid2ev.plan.by_pixel import ByPixel
+from vid2ev.compare.by_pixel import ByPixel
 
 TAUS_US = (1000, 100)  # the headline, and a magnifier for small errors of time
 _NEVER = np.int64(1 << 62)

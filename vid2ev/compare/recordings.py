@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.compare.by_pixel import by_pixel
+from vid2ev.compare.comparison import Comparison, Tally
+from vid2ev.compare.matching import WINDOW_US
 from vid2ev.errors import UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import Recording
-from vid2ev.plan.by_pixel import by_pixel
-from vid2ev.plan.comparison import Comparison, Tally
-from vid2ev.plan.matching import WINDOW_US
 from vid2ev.stream.events import Events
 
 LIMIT = 1 << 25  # events in memory at a time: 0.7 GB

@@ -11,9 +11,9 @@ from event_streams import SIZE, busy, events_of, isolated, streams
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vid2ev.plan.by_pixel import by_pixel
-from vid2ev.plan.comparison import compare
-from vid2ev.plan.distance import TAUS_US, normalised, squared_distances
+from vid2ev.compare.by_pixel import by_pixel
+from vid2ev.compare.comparison import compare
+from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.stream.events import Events
 
 

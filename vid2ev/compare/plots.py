@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.compare.comparison import Comparison
 from vid2ev.errors import DataError
-from vid2ev.plan.comparison import Comparison
 from vid2ev.recording.disk import whole_file
 
 BARS = 101  # of the distribution of timing errors; odd, so that one of them is of the pairs without error
