@@ -51,10 +51,11 @@ FLOORS = {
     "recipe": 9,
     "reformat": 9,
     "recorder": 11,
-    "conversion": 12,
-    "": 13,  # vid2ev/__init__.py: the public names
-    "commands": 14,
-    "__main__": 15,
+    "plan": 12,
+    "conversion": 13,
+    "": 14,  # vid2ev/__init__.py: the public names
+    "commands": 15,
+    "__main__": 16,
 }
 
 

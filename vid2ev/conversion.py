@@ -14,6 +14,8 @@ from typing import Any
 from vid2ev.errors import DataError, UsageError
 from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
+from vid2ev.plan.plan import TOLERANCE
+from vid2ev.plan.recordings import described, planned
 from vid2ev.recipe import Recipe
 from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job, check_free
@@ -39,6 +41,8 @@ def convert(
     resume: bool = False,
     report: Report | None = None,
     piece: int = PIECE,
+    effects: str | Sequence[str] = "all",
+    tolerance: float = TOLERANCE,
     **rest: Any,
 ) -> dict[str, Any]:
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
@@ -49,6 +53,7 @@ def convert(
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
     piece      pixel-steps between two checkpoints
+    effects    those to simulate: all, auto (what the clip calls for, by bounds within `tolerance`), none, or names
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
 
@@ -63,9 +68,10 @@ def convert(
     check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
+    recipe, plans = planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
-    job = recipe.describe() | {"outputs": outputs.describe()}
+    job = recipe.describe() | {"outputs": outputs.describe()} | described(plans)
     beside = growing(recipe, outputs)
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:

@@ -103,6 +103,14 @@ class Auto(click.ParamType):
     "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False),
     help="Colour filters before the pixels.  [default: none, they see luminance]",
 )  # fmt: skip
+@click.option(
+    "--effects", default="all", show_default=True, metavar="all|auto|none|NAME[,NAME...]",
+    help="Effects to simulate; auto: those that the clip calls for (`vid2ev plan` shows them).",
+)  # fmt: skip
+@click.option(
+    "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",
+    help="How far from all effects the events may be with auto, as a distance.",
+)  # fmt: skip
 @click.option("--labels", is_flag=True, help="Store the cause of each event (signal, shot, leak, hot).")
 @click.option(
     "--format", "formats", multiple=True, default=["hdf5"], show_default=True, metavar="NAME[,NAME...]",
@@ -209,12 +217,15 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.outputs import Outputs
+    from vid2ev.plan.recordings import check_effects
     from vid2ev.recipe import Recipe
     from vid2ev.recording.folder import check_free
 
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
     overwrite, resume = options.pop("overwrite"), options.pop("resume")
+    effects, tolerance = options.pop("effects"), options.pop("tolerance")
     recipe = Recipe.of(video, seed=seed or 0, **options)
+    check_effects(recipe, effects, tolerance)
     conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}

@@ -31,9 +31,18 @@ def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
             *facts,
             ("depth", recipe["depth"] or "not needed"),
             *((name, sensor_text(sensor)) for name, sensor in cameras),
+            *((f"plan {name}", plan_text(plan)) for name, plan in recipe.get("plan", {}).items()),
         ]
     effects = ", ".join(recipe["sensor"]["effects"]) or "none"
+    facts += [("plan", plan_text(plan)) for plan in recipe.get("plan", {}).values()]
     return [*facts, ("sensor", f"{sensor_text(recipe['sensor'])}, seed {recipe['seed']}"), ("effects", effects)]
+
+
+def plan_text(plan: Mapping[str, Any]) -> str:
+    """A plan's description as one line."""
+    gone = [f"{row['effect']} {row['fate']}" for row in plan["rows"] if row["fate"] != "kept"]
+    bound = "no bound" if plan["distance"] is None else f"at most {plan['distance']:.2g}"
+    return f"{', '.join(gone) or 'all effects kept'}; changes the distance by {bound}"
 
 
 def sensor_text(sensor: Mapping[str, Any]) -> str:

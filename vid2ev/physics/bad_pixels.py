@@ -6,17 +6,23 @@
 A hot pixel sends ON events as a Poisson process of `hot_rate_hz`, whatever the light; a cold pixel sends none.  Which
 pixels are bad is drawn once per camera and seed.
 
+What leaving them out changes: hot pixels send as many events more, and those of light come from other levels; the
+events of cold pixels come back.
+
 Source: the paper, "bad pixel probability", drawn anew at each conversion; the rate is ours (the paper: "always
 emitted").
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.random import HOT_MAP, philox, unit
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
 
 
 class BadPixels(BaseModel, frozen=True, extra="forbid"):
@@ -38,3 +44,21 @@ def bad_pixel_map(n, seed, camera, hot_probability, cold_probability):
         elif unit(words[1]) < cold_probability:
             kind[pixel] = 2
     return kind
+
+
+def omission_of_hot(scene: Scene, spec: Any) -> Omission:
+    """The hot pixels."""
+    extra = at_most(at_most(spec.hot_probability * scene.pixels) * spec.hot_rate_hz * scene.seconds)
+    bunched = 1.0 + 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S
+    events = 2.0 * scene.events + extra
+    distance = added(scene, extra, surely(scene, spec.hot_probability)) + extra * (bunched - 1.0) / max(events, 1.0)
+    figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
+    return Omission(distance, "99.9 % bound", figure, f"{extra:.0f} events at most")
+
+
+def omission_of_cold(scene: Scene, spec: Any) -> Omission:
+    """The cold pixels."""
+    share = min(surely(scene, spec.cold_probability), 1.0)
+    bunched = 1.0 + 2.0 * DISTANCE_TAU_S * float(scene.slope_max.max()) / scene.threshold
+    distance = 0.0 if scene.still else share / (2.0 - share) * bunched
+    return Omission(distance, "99.9 % bound", f"{spec.cold_probability:.3g} of the events", "silent pixels")

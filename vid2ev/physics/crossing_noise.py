@@ -10,11 +10,16 @@ Source: the paper, section II.A: time-variant Gaussian noise, drawn "at each pot
 
 from __future__ import annotations
 
+import math
+from statistics import NormalDist
+from typing import Any
+
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.mismatch import clipped
+from vid2ev.physics.mismatch import FLOOR, clipped
 from vid2ev.physics.random import CROSSING, normal_pair, philox
+from vid2ev.stream.scene import Omission, Scene, off_by
 
 
 class CrossingNoise(BaseModel, frozen=True, extra="forbid"):
@@ -31,3 +36,26 @@ def noisy_thresholds(on, off, sigma, seed, camera, pixel, count):
     words = philox(seed, CROSSING + 256 * camera, pixel, count)
     z_on, z_off = normal_pair(words[0], words[1])
     return clipped(on, sigma, z_on), clipped(off, sigma, z_off)
+
+
+def chance_below(level: float, mean: float, spec: Any) -> float:
+    """The share of thresholds of this mean [nat], with mismatch and noise, that are at or below a level [nat]."""
+
+    def clip(mean: float, sigma: float, z: float) -> float:
+        limit = min(4.0, (1.0 - FLOOR) * mean / sigma) if sigma > 0 else 0.0
+        return mean + sigma * min(max(z, -limit), limit)
+
+    normal, total, steps = NormalDist(), 0.0, 256
+    for k in range(steps):
+        pixel = clip(mean, spec.mismatch, normal.inv_cdf((k + 0.5) / steps) if k else -math.inf)
+        least = clip(pixel, spec.crossing_noise, -math.inf)
+        if level >= least:
+            total += normal.cdf((level - pixel) / spec.crossing_noise) if spec.crossing_noise > 0 else 1.0
+    return total / steps
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The noise at crossings: never left out by a bound, as every event moves."""
+    distance = min(off_by(scene, 0.5 * spec.crossing_noise + 0.0 * scene.travel, echoes=False), 1.0)
+    figure = f"{spec.crossing_noise / scene.threshold:.2g} of the threshold at each event"
+    return Omission(distance, "estimate", figure, "every event moves")

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.stream.events import Events
+from vid2ev.stream.scene import Omission, Scene
 
 
 class FixedRate(BaseModel, frozen=True, extra="forbid"):
@@ -95,3 +96,10 @@ class EventFrames:
         label = state["held_label"]
         held = (state[f"held_{k}"] for k in "txyp")
         self.held = Events(*held, label if len(label) else None)
+
+
+def omission(scene: Scene, spec: FixedRate) -> Omission:
+    """The readout's clock."""
+    late_us = 1e6 / spec.frame_rate_hz * (0.5 if spec.rounding == "nearest" else 1.0)
+    why = "all times are those of the readout; never left out"
+    return Omission(min(late_us / 1000.0, 1.0), "estimate", f"at most {late_us:.3g} us", why)

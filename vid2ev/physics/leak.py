@@ -4,15 +4,37 @@
 
 The drift is added to the signal inside each interval, not per frame, so its rate does not depend on the sampling.
 
+What leaving it out changes: after a time t the level is off by leak_rate_hz threshold_on t, and a pixel has sent
+leak_rate_hz t events more.
+
 Source: junction and parasitic photocurrent leakage of the reset switch, about 0.1 Hz (Nozaki, Delbruck, IEEE TED 2017).
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from pydantic import BaseModel, Field
+
+from vid2ev.physics.comparator import echoes, obstacle
+from vid2ev.stream.scene import Omission, Scene, added, off_by, surely, together
 
 
 class Leak(BaseModel, frozen=True, extra="forbid"):
     """Parameter of the leak."""
 
     leak_rate_hz: float = Field(0.0, ge=0, le=1e6, description="ON events of a pixel at rest [Hz]")
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The leak."""
+    per_pixel = spec.leak_rate_hz * scene.seconds
+    figure = f"{spec.leak_rate_hz:.3g} events/pixel/s"
+    if reason := obstacle(spec):
+        return Omission(None, "no bound yet", figure, reason)
+    error = np.full(len(scene.travel), per_pixel * spec.threshold_on)
+    moved = off_by(scene, error, echoes=echoes(spec))
+    extra = added(scene, per_pixel * scene.pixels, min(per_pixel, 1.0) if echoes(spec) else 0.0)
+    why = f"{per_pixel:.2g} events more per pixel, and levels off by as many thresholds"
+    return Omission(surely(scene, together(moved, extra)), "99.9 % bound", figure, why)

@@ -12,11 +12,14 @@ contrast.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
+from vid2ev.stream.scene import Omission, Scene, off_by
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean
 
@@ -44,3 +47,10 @@ def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
         on, off = normal_pair(words[0], words[1])
         theta[i, 0] = np.float32(clipped(mean_on, sigma, on))
         theta[i, 1] = np.float32(clipped(mean_off, sigma, off))
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The mismatch: never left out by a bound, as every event moves."""
+    distance = min(off_by(scene, 0.5 * spec.mismatch + 0.0 * scene.travel, echoes=False), 1.0)
+    figure = f"{spec.mismatch / scene.threshold:.2g} of the threshold in each pixel"
+    return Omission(distance, "estimate", figure, "every pixel is another")

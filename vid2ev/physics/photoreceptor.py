@@ -16,6 +16,16 @@ interval of length T in which u rises by du, with a = T/tau1 and b = T/tau2:
 Two equal poles are held apart by 1e-4 of their mean (`separate`), which keeps the one formula.  The output depends on
 the two alike, so it moves by the square of that: by (1e-4 t/tau)**2 / 24 of itself, and four digits of float64 cancel.
 
+What leaving a pole out changes: an exponential of mean tau delays by tau on average, with variance tau^2, and as
+u is straight but for its bends, shifting the events by tau is all that happens away from these.  A bend of the slope by
+r is rounded off: within r reach of the shifted line, over an area of r variance / 2 (`stream/scene.py: delayed`), with
+
+    variance = tau1^2 + tau2^2 of the poles left out
+    reach = E (D - E D)+ = tau/e for one,   <= sqrt(variance)/2 for two
+
+A first pole that stays rounds off what the second does by reach <= tau2^2 / (2 tau1).  Before the log, bends are
+relative to the light where they are.
+
 Sources: the cascade is the paper's "two-pole low pass filter"; weights by the variation of constants (any text on
 linear systems), checked against 60-digit arithmetic in the tests. `bandwidth = "light"` is v2e's intensity-dependent
 first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark), dark = 20/255.
@@ -24,13 +34,15 @@ first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.comparator import echoes, obstacle
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
+from vid2ev.stream.scene import Omission, Scene, delayed, surely
 
 F = np.float32
 _APART = 1e-4
@@ -187,3 +199,58 @@ def separate_rates(a, b):
     """a, moved away from b where the two rates are closer than 2e-7 of b: for a first pole that differs from pixel to
     pixel, and so is hardly ever that close."""
     return b * (1.0 + _APART_RATES) if (b > 0.0) & (abs(a - b) < _APART_RATES * b) else a
+
+
+def steepest(scene: Scene, spec: Any) -> np.ndarray:
+    """Bound on the slope of the comparator's input [tiles, nat/s].
+
+    A filtered signal's slope is a mean of its input's (and before the log both are means by one weight).  A pole that
+    is faster in the light may follow a change in the dark with the speed of the light.
+    """
+    if spec.bandwidth != "light" or spec.photoreceptor_tau_us == 0:
+        return scene.slope_max
+    dark = min(spec.bandwidth_dark, spec.dark_level) if spec.log_curve == "offset" else spec.bandwidth_dark
+    return scene.slope_max * (scene.light_max + spec.bandwidth_dark) / (scene.light_min + dark)
+
+
+def omission_of_follower(scene: Scene, spec: Any) -> Omission:
+    """The second pole alone, replaced by its mean delay."""
+    tau1_s, tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
+    reach_s = min(tau2_s / math.e, 0.5 * tau2_s**2 / tau1_s if tau1_s else math.inf)
+    return _delay_instead(scene, spec, tau2_s, tau2_s**2, reach_s, {"follower_tau_us": 0.0})
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """Both poles, replaced by their mean delay."""
+    tau1_s, tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
+    variance_s2 = tau1_s**2 + tau2_s**2
+    reach_s = 0.5 * math.sqrt(variance_s2) if tau2_s else tau1_s / math.e
+    off = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0}
+    return _delay_instead(scene, spec, tau1_s + tau2_s, variance_s2, reach_s, off)
+
+
+def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
+    """The first pole's dependence on light, at the median of the pixels: a figure, not a bound."""
+    share = (1.0 + spec.bandwidth_dark) / (scene.percentile(0.5) + spec.bandwidth_dark) - 1.0
+    late_us = spec.photoreceptor_tau_us * abs(share)
+    why = "the first pole is slower in the dark; no bound is known yet"
+    return Omission(min(late_us / 1000.0, 1.0), "estimate", f"{late_us:.3g} us at the median light", why)
+
+
+def _delay_instead(
+    scene: Scene, spec: Any, delay_s: float, variance_s2: float, reach_s: float, off: dict[str, float]
+) -> Omission:
+    spread = f"{math.sqrt(variance_s2) * 1e6:.3g} us of spread"
+    if spec.photoreceptor_noise > 0:
+        return Omission(None, "no bound yet", spread, "photoreceptor noise needs both poles")
+    if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
+        return Omission(None, "no bound yet", spread, "the delay differs with the light")
+    if spec.timing != "response" or (reason := obstacle(spec)):
+        why = reason if spec.timing == "response" else f"timing {spec.timing} takes the signal at the frames"
+        return Omission(None, "no bound yet", spread, why)
+    delay_us = spec.delay_us + delay_s * 1e6
+    whole_us = math.floor(delay_us + 0.5)
+    rounded = abs(delay_us - whole_us) / 1000.0
+    mean = delayed(scene, variance_s2, reach_s, echoes=echoes(spec)) + (0.0 if scene.still else rounded)
+    why = f"a delay of {delay_us:g} us instead; what is left are rounded bends"
+    return Omission(surely(scene, mean), "99.9 % bound", spread, why, (*off.items(), ("delay_us", delay_us)))

@@ -18,7 +18,7 @@ Source: Rice 1944 for the rate; the covariance of white noise through two poles 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -27,6 +27,7 @@ from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
+from vid2ev.stream.scene import Omission, Scene, added
 
 RESOLVED = 8.0
 
@@ -92,3 +93,13 @@ def rice_gap(pixel, k, num, iv):
     """The exponential number that stands for the wait of candidate k of a pixel in this interval."""
     words = philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 16) + k)
     return -log64(unit(words[0]))
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The noise, by Rice's rate at one threshold's distance: a figure, not a bound."""
+    far = min(spec.threshold_on, spec.threshold_off) / spec.photoreceptor_noise
+    period_s = 2.0 * math.pi * math.sqrt(spec.photoreceptor_tau_us * spec.follower_tau_us) * 1e-6
+    rate_hz = 2.0 * math.exp(-0.5 * far * far) / period_s
+    distance = added(scene, rate_hz * scene.pixels * scene.seconds, 0.0)
+    why = "every event moves by noise over slope; no bound is known yet"
+    return Omission(distance, "estimate", f"{rate_hz:.3g} events/pixel/s", why)

@@ -3,14 +3,24 @@
     quantised   a crossing within `refractory_us` of the last event moves the memory and sends nothing (the paper)
     track       no crossing is seen; when the period ends the memory becomes the signal (silicon: the switch reopens)
 
+What leaving it out changes: none is lost if the signal cannot go a threshold far in the period,
+
+    refractory_us slope_max < least threshold
+
+and else at most the share of thresholds that are so low; the memory moves alike (`quantised`).
+
 Sources: the paper, algorithm step 2e; `track` as the reset of the differencing amplifier in Lichtsteiner et al. 2008.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, Field
+
+from vid2ev.physics.crossing_noise import chance_below
+from vid2ev.physics.photoreceptor import steepest
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, surely
 
 
 class Refractory(BaseModel, frozen=True, extra="forbid"):
@@ -23,3 +33,23 @@ class Refractory(BaseModel, frozen=True, extra="forbid"):
         "quantised",
         description="in the refractory period the memory follows the crossings, or jumps to the signal at its end",
     )
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The refractory period."""
+    slope = float(steepest(scene, spec).max())
+    way = slope * spec.refractory_us * 1e-6
+    figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
+    if spec.refractory == "track":
+        return Omission(None, "no bound yet", figure, "the memory jumps to the signal when the period ends")
+    if spec.photoreceptor_noise > 0 or spec.shot_rate_hz > 0 or spec.hot_probability > 0:
+        return Omission(None, "no bound yet", figure, "events of noise may come at any time")
+    if spec.leak_rate_hz > 0:
+        way += spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
+    share = sum(chance_below(way, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
+    if share == 0.0:
+        return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
+    bunched = 1.0 + 2.0 * DISTANCE_TAU_S * slope / scene.threshold
+    mean = min(share / (2.0 - min(share, 1.0)) * bunched, 2.0)
+    why = f"a share of {share:.2g} of the crossings may be swallowed"
+    return Omission(surely(scene, mean), "99.9 % bound", figure, why)

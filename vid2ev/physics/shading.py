@@ -2,13 +2,22 @@
 
     gain(r) = 1 + c1 r + c2 r^2 + ...,   r = distance from the image centre / image width,   gain >= 0
 
+What leaving it out changes: on ln(light + dark) nothing but
+
+    h = ln((light + dark) / (gain light + dark)),   from its least to its greatest in the range of light of a pixel
+
 Source: the paper, section II.A: a polynomial of the distance from the centre relative to the frame's width.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import BaseModel, Field
+
+from vid2ev.physics.comparator import echoes, obstacle
+from vid2ev.stream.scene import Omission, Scene, off_by, surely
 
 
 class Shading(BaseModel, frozen=True, extra="forbid"):
@@ -24,3 +33,23 @@ def shading_map(coefficients: tuple[float, ...], width: int, height: int) -> np.
     r = np.hypot(x[None, :], y[:, None]) / width
     gain = np.polynomial.polynomial.polyval(r, (1.0, *coefficients))
     return np.maximum(gain, 0.0).astype(np.float32)
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The shading; the scene's light is what arrives behind it."""
+    gains = [float(np.polynomial.polynomial.polyval(r, (1.0, *spec.shading))) for r in np.linspace(0.0, 1.0, 65)]
+    reason = obstacle(spec)
+    if spec.log_curve != "offset":
+        reason = f"of the curve {spec.log_curve} the contrast changes with light"
+    elif (spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0) or spec.shot_rate_hz > 0:
+        reason = "bandwidth or shot noise depend on light, too"
+    gain = min(gains)
+    figure = f"light x {max(gain, 0.0):.2g} at a distance of one width"
+    if reason or gain <= 0.0 or max(gains) > 1.0:
+        return Omission(None, "no bound yet", figure, reason or "the gain is not between 0 and 1")
+    dark, least, most = spec.dark_level, scene.light_min, scene.light_max
+    error = np.log((most / gain + dark) / (most + dark)) - np.log((least / gain + dark) / (least + dark))
+    distance = surely(scene, off_by(scene, np.abs(error), echoes=echoes(spec)))
+    return Omission(
+        distance, "99.9 % bound", f"{np.abs(error).max():.2g} nat", "a constant gain does not change the log"
+    )

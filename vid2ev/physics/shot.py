@@ -6,14 +6,22 @@ ON and OFF together, half each; each resets the memory to the signal.  They are 
 `shot_rate_hz` in each aligned block of 2048 pixels and each cell of a fixed 1 ms clock, and each is kept with the
 probability that the light at its instant asks for, so neither frames nor tiles change anything.
 
+What leaving it out changes: at most shot_rate_hz share(least light) events per pixel and second come or go, and the
+events after one of them in its pixel come from other levels.
+
 Source: v2e (Hu, Liu, Delbruck 2021), rate falling to a quarter at full scale, there at most one event per frame.
 """
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
 
 CELL_NS = 1_000_000
 
@@ -29,3 +37,14 @@ class Shot(BaseModel, frozen=True, extra="forbid"):
 def shot_share(light, factor):
     """The share of the dark rate that is left at a light."""
     return 1.0 - (1.0 - factor) * min(max(light, 0.0), 1.0)
+
+
+def omission(scene: Scene, spec: Any) -> Omission:
+    """The shot noise."""
+    least = np.clip(scene.light_min, 0.0, 1.0)
+    rate_hz = spec.shot_rate_hz * float(np.mean(1.0 - (1.0 - spec.shot_light_factor) * least))
+    extra = at_most(rate_hz * scene.pixels * scene.seconds)
+    touched = surely(scene, -math.expm1(-spec.shot_rate_hz * scene.seconds))
+    distance = added(scene, extra * (1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S), touched)
+    why = f"{extra:.0f} events at most, and their pixels' levels"
+    return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)

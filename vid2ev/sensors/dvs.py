@@ -13,6 +13,7 @@ from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, SWALLOWED, TALLIES
 from vid2ev.kernels.order import order_keys, unpack
 from vid2ev.kernels.work import new_work
 from vid2ev.light.transfer import code_table
+from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
@@ -70,6 +71,7 @@ class Dvs:
         self._numbers = numbers_of(spec, seed, camera)
         self._planes, self._bad = planes_of(spec, self._flags, self._numbers, width, height)
         self._frames = EventFrames(spec, width, height) if spec.frame_rate_hz > 0 else None
+        self._delayed = Delayed(spec.delay_us) if spec.delay_us > 0 else None
         self._tallies = np.zeros((threads, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
@@ -102,6 +104,8 @@ class Dvs:
         self._t_ns = t_ns
         self._step += 1
         self._fresh_noise = not interval.noise_resolved
+        if self._delayed is not None:
+            events = self._delayed.push(events, t_ns // 1000)
         if self._frames is not None:
             events = self._frames.push(events, t_ns // 1000)
         return self._counted(events)
@@ -117,6 +121,8 @@ class Dvs:
             self._frames.origin_us = int(t_ns) // 1000
         t_ns = self._later(t_ns)
         self._settle(flat, table, t_ns)
+        if self._delayed is not None:
+            self._delayed.forget()
         released = Events.empty(self.labels)
         if self._frames is not None:
             released = self._frames.push(released, t_ns // 1000)
@@ -147,8 +153,8 @@ class Dvs:
         state["clock"] = np.array(numbers, np.int64)
         state["tallies"] = self._tallies.sum(axis=0)
         state["polarities"] = self._polarities.copy()
-        if self._frames is not None:
-            state |= self._frames.state()
+        for part in (self._frames, self._delayed):
+            state |= part.state() if part is not None else {}
         return state
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -168,8 +174,9 @@ class Dvs:
         self._tallies[...] = 0
         self._tallies[0] = state["tallies"]
         self._polarities[...] = state["polarities"]
-        if self._frames is not None:
-            self._frames.restore(state)
+        for part in (self._frames, self._delayed):
+            if part is not None:
+                part.restore(state)
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""

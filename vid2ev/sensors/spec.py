@@ -9,6 +9,7 @@ from pydantic import ConfigDict, model_validator
 from vid2ev.physics.bad_pixels import BadPixels
 from vid2ev.physics.comparator import Comparator
 from vid2ev.physics.crossing_noise import CrossingNoise
+from vid2ev.physics.delay import Delay
 from vid2ev.physics.fixed_rate import FixedRate
 from vid2ev.physics.leak import Leak
 from vid2ev.physics.log_curve import LogCurve
@@ -22,6 +23,7 @@ from vid2ev.physics.shot import Shot
 
 class DvsSpec(  # the order of the bases, last to first, is the order of the fields: the path of light
     FixedRate,
+    Delay,
     BadPixels,
     Shot,
     Leak,
@@ -73,6 +75,7 @@ class DvsSpec(  # the order of the bases, last to first, is the order of the fie
             "shot": self.shot_rate_hz > 0,
             "hot": self.hot_probability > 0 and self.hot_rate_hz > 0,
             "cold": self.cold_probability > 0,
+            "delay": self.delay_us > 0,
             "fixed_rate": self.frame_rate_hz > 0,
         }
         return [name for name, used in on.items() if used]

@@ -1,0 +1,1 @@
+"""How much of it: what of a sensor a scene calls for."""

@@ -1,0 +1,209 @@
+"""Plan: which effects of a sensor a scene calls for.
+
+For each effect: what leaving it out changes, what kind of statement that is, and what it costs.  `auto` leaves out, or
+replaces, the effects that cost something and whose bounds together stay within the tolerance.  As the root of the
+distance is a metric, bounds b_1, b_2, ... are together
+
+    (sqrt b_1 + sqrt b_2 + ...)^2 <= tolerance
+
+Estimates leave out nothing, and what costs nothing stays.  Effects are tried in the order of their bounds; the second
+pole before both.
+
+Costs are of one thread at 1280x720, from the tables of the README and of the kernels' benchmark: nanoseconds per pixel
+and frame, and per event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from pydantic import ValidationError
+
+from vid2ev.errors import UsageError, nearest
+from vid2ev.physics import (
+    bad_pixels,
+    crossing_noise,
+    fixed_rate,
+    leak,
+    mismatch,
+    photoreceptor,
+    photoreceptor_noise,
+    refractory,
+    shading,
+    shot,
+)
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream.scene import Omission, Scene, together
+
+TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
+WORDS = ("auto", "all", "none")
+
+
+class Effect(NamedTuple):
+    """An effect: its omission, the keys that switch it off, and its cost."""
+
+    omission: Callable[[Scene, Any], Omission]
+    off: dict[str, Any]
+    ns_per_pixel: float
+    ns_per_event: float
+
+
+EFFECTS = {
+    "shading": Effect(shading.omission, {"shading": ()}, 0.03, 0),
+    "photoreceptor": Effect(photoreceptor.omission, {"photoreceptor_tau_us": 0.0}, 0.6, 20),
+    "follower": Effect(photoreceptor.omission_of_follower, {"follower_tau_us": 0.0}, 0.5, 10),
+    "bandwidth": Effect(photoreceptor.omission_of_bandwidth, {"bandwidth": "constant"}, 0.6, 5),
+    "photoreceptor_noise": Effect(photoreceptor_noise.omission, {"photoreceptor_noise": 0.0}, 0.9, 0),
+    "mismatch": Effect(mismatch.omission, {"mismatch": 0.0}, 0, 0),
+    "crossing_noise": Effect(crossing_noise.omission, {"crossing_noise": 0.0}, 0, 12),
+    "refractory": Effect(refractory.omission, {"refractory_us": 0.0}, 0, 5),
+    "leak": Effect(leak.omission, {"leak_rate_hz": 0.0}, 0.05, 5),
+    "shot": Effect(shot.omission, {"shot_rate_hz": 0.0}, 0.03, 0),
+    "hot": Effect(bad_pixels.omission_of_hot, {"hot_probability": 0.0}, 0, 0),
+    "cold": Effect(bad_pixels.omission_of_cold, {"cold_probability": 0.0}, 0, 0),
+    "delay": Effect(lambda scene, spec: DELAY, {"delay_us": 0.0}, 0, 1),
+    "fixed_rate": Effect(fixed_rate.omission, {"frame_rate_hz": 0.0}, 0, 100),
+}
+DELAY: Omission = Omission(None, "no bound yet", "", "all times are later; never left out")
+
+
+@dataclass(frozen=True)
+class Row:
+    """An effect in a plan: what becomes of it, what that changes, and why."""
+
+    effect: str
+    fate: Literal["kept", "dropped", "replaced"]
+    omission: Omission
+    ns_per_pixel: float
+    ns_per_event: float
+
+    def describe(self) -> dict[str, Any]:
+        """The row, ready for JSON."""
+        said = self.omission
+        return {
+            "effect": self.effect,
+            "fate": self.fate,
+            "distance": said.distance,
+            "kind": said.kind,
+            "figure": said.figure,
+            "why": said.why,
+            "ns_per_pixel": self.ns_per_pixel,
+            "ns_per_event": self.ns_per_event,
+        }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What of a sensor is simulated: a row for each of its effects, and the specification that is left.
+
+    distance   bound on what all that is dropped or replaced changes; None where it was asked for and has no bound
+    """
+
+    effects: str
+    tolerance: float
+    rows: tuple[Row, ...]
+    spec: DvsSpec
+    distance: float | None
+    scene: dict[str, Any]
+
+    def describe(self) -> dict[str, Any]:
+        """The plan, ready for JSON."""
+        rows = [row.describe() for row in self.rows]
+        whole = {"effects": self.effects, "tolerance": self.tolerance, "distance": self.distance}
+        return whole | {"scene": self.scene, "rows": rows}
+
+    def __str__(self) -> str:
+        """The table."""
+        head = ("effect", "fate", "distance", "kind", "figure", "cost", "why")
+        table = [head, *(_cells(row) for row in self.rows)]
+        widths = [max(len(line[k]) for line in table) for k in range(len(head) - 1)]
+        lines = ["  ".join(map(str.ljust, line, [*widths, 0])) for line in table]
+        what = "no bound" if self.distance is None else f"at most {self.distance:.2g}"
+        return "\n".join([*lines, f"all that is left out changes the distance by {what}, tolerance {self.tolerance:g}"])
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    said = row.omission
+    distance = "-" if said.distance is None else f"{said.distance:.2g}"
+    cost = f"{row.ns_per_pixel:g} ns/px, {row.ns_per_event:g} ns/event" if _costs(row.effect) else "0"
+    return row.effect, row.fate, distance, said.kind, said.figure, cost, said.why
+
+
+def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
+    """The plan for a scene that was measured for `spec`.
+
+    effects  "auto", "all", "none", or the names of those to keep; those without a bound go, too, where that is asked
+    Raises UsageError for an effect that there is not, or a specification that cannot be without what is left out.
+    """
+    check_tolerance(tolerance)
+    used = spec.effects()
+    omissions = {name: EFFECTS[name].omission(scene, spec) for name in used}
+    if effects == "auto":
+        gone = _within(omissions, tolerance)
+        changes = dict(change for name in gone for change in omissions[name].replace or EFFECTS[name].off.items())
+    else:
+        kept = names_of(effects)
+        gone = [name for name in used if name not in kept]
+        changes = {key: value for name in gone for key, value in EFFECTS[name].off.items()}
+    bounds = [omissions[name].distance for name in _counted(gone) if omissions[name].sure]
+    distance = together(*bounds) if len(bounds) == len(_counted(gone)) else None  # type: ignore[arg-type]
+    if effects != "auto" and {"photoreceptor", "follower", "delay"} & {*gone}:
+        distance = None  # (the bounds of the poles are those of a delay in their place)
+    fates = {name: _fate(name, gone, said, effects == "auto") for name, said in omissions.items()}
+    rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
+    shown = effects if isinstance(effects, str) else ",".join(effects)
+    return Plan(shown, tolerance, rows, _without(spec, changes), distance, scene.describe())
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise UsageError for a tolerance that is no distance."""
+    if not 0 <= tolerance <= 1:
+        raise UsageError(f"tolerance {tolerance}: expected a distance from 0 to 1, such as {TOLERANCE}")
+
+
+def names_of(effects: str | Sequence[str]) -> list[str]:
+    """The effects to keep, of a word other than auto, a text with commas, or names; raises UsageError."""
+    if effects == "all":
+        return list(EFFECTS)
+    names = [] if effects == "none" else effects.split(",") if isinstance(effects, str) else list(effects)
+    for name in names:
+        if name not in EFFECTS:
+            raise UsageError(f"effect '{name}': expected {', '.join(WORDS)} or names{nearest(name, EFFECTS)}")
+    return names
+
+
+def _within(omissions: dict[str, Omission], tolerance: float) -> list[str]:
+    """The effects to leave out, in order of their bounds."""
+    gone: list[str] = []
+    sure = {name: said.distance or 0.0 for name, said in omissions.items() if said.sure and _costs(name)}
+    for name in sorted(sure, key=lambda name: (sure[name], name != "follower")):
+        asked = [*gone, name]
+        if name == "photoreceptor" and "follower" in omissions and "follower" not in gone:
+            asked = [*gone, "follower", name]
+        if together(*(sure.get(each, 0.0) for each in _counted(asked))) <= tolerance:
+            gone = asked
+    return gone
+
+
+def _counted(gone: Sequence[str]) -> list[str]:
+    """Those whose bounds count: that of both poles has the second's in it."""
+    return [name for name in gone if name != "follower" or "photoreceptor" not in gone]
+
+
+def _costs(name: str) -> bool:
+    return EFFECTS[name].ns_per_pixel > 0 or EFFECTS[name].ns_per_event > 0
+
+
+def _fate(name: str, gone: Sequence[str], said: Omission, auto: bool) -> Literal["kept", "dropped", "replaced"]:
+    if name not in gone:
+        return "kept"
+    return "replaced" if auto and said.replace else "dropped"
+
+
+def _without(spec: DvsSpec, changes: dict[str, Any]) -> DvsSpec:
+    try:
+        return DvsSpec(**(spec.model_dump() | changes))
+    except ValidationError as error:
+        raise UsageError(f"effects left out by {', '.join(changes)}: {error.errors()[0]['msg']}") from error
