@@ -40,8 +40,8 @@ def fma(typing_context, a, b, c):
     return a(a, a, a), codegen
 
 
-_bits32 = _bitcast(types.float32, types.int32)
-_float32 = _bitcast(types.int32, types.float32)
+bits_32 = _bitcast(types.float32, types.int32)
+float_32 = _bitcast(types.int32, types.float32)
 _bits64 = _bitcast(types.float64, types.int64)
 _float64 = _bitcast(types.int64, types.float64)
 
@@ -72,12 +72,18 @@ _HALF, _ONE = F(0.5), F(1.0)
 
 
 @compiled
+def exponent_32(x):
+    """The octave [2**k, 2**(k + 1)) that a float32 >= 0 is in; -127 of zero."""
+    return np.int64(bits_32(x) >> np.int32(23)) - 127
+
+
+@compiled
 def log32(x):
     """Natural logarithm of a positive normal float32."""
-    bits = _bits32(x)
+    bits = bits_32(x)
     # Each step is cast back: numba widens int32 sums to int64, which halves the width of the vectors.
     exponent = np.int32(np.int32(bits - _SQRT_HALF_32) >> np.int32(23))
-    f = _float32(np.int32(bits - np.int32(exponent << np.int32(23)))) - _ONE
+    f = float_32(np.int32(bits - np.int32(exponent << np.int32(23)))) - _ONE
     k = F(exponent)
     z = f * f
     y = fma(fma(fma(_L0, f, _L1), f, _L2), f, _L3)
@@ -143,7 +149,7 @@ def expm1_32(x):
     shifted = fma(x, F(_LOG2_E), _ROUND_32)
     k = shifted - _ROUND_32
     r = fma(-k, _LN2_LO_32, fma(-k, _LN2_HI_32, x))
-    scale = _float32(np.int32(np.int32(_bits32(shifted) << np.int32(23)) + np.int32(0x3F800000)))
+    scale = float_32(np.int32(np.int32(bits_32(shifted) << np.int32(23)) + np.int32(0x3F800000)))
     p = fma(r, F(1.0 / 5040.0), F(1.0 / 720.0))
     p = fma(r, fma(r, p, F(1.0 / 120.0)), F(1.0 / 24.0))
     p = fma(r, fma(r, p, F(1.0 / 6.0)), _HALF)

@@ -213,11 +213,18 @@ def steepest(scene: Scene, spec: Any) -> np.ndarray:
     return scene.slope_max * (scene.light_max + spec.bandwidth_dark) / (scene.light_min + dark)
 
 
+def slopes_of(scene: Scene, spec: Any) -> np.ndarray:
+    """Bound on the slope of the comparator's input in each octave of `Scene.by_slope` [nat/s]."""
+    faster = float((steepest(scene, spec) / np.maximum(scene.slope_max, 1e-30)).max())
+    octaves = np.exp2(np.arange(scene.by_slope.shape[1]) - 23.0)
+    return np.minimum(octaves, float(scene.slope_max.max())) * max(faster, 1.0)
+
+
 def omission_of_follower(scene: Scene, spec: Any) -> Omission:
     """The second pole alone, replaced by its mean delay."""
     tau1_s, tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
     reach_s = min(tau2_s / math.e, 0.5 * tau2_s**2 / tau1_s if tau1_s else math.inf)
-    return _delay_instead(scene, spec, tau2_s, tau2_s**2, reach_s, {"follower_tau_us": 0.0})
+    return _delay_instead(scene, spec, spec.follower_tau_us, tau2_s**2, reach_s, {"follower_tau_us": 0.0})
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
@@ -226,7 +233,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     variance_s2 = tau1_s**2 + tau2_s**2
     reach_s = 0.5 * math.sqrt(variance_s2) if tau2_s else tau1_s / math.e
     off = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0}
-    return _delay_instead(scene, spec, tau1_s + tau2_s, variance_s2, reach_s, off)
+    return _delay_instead(scene, spec, sum(spec.pole_taus_us), variance_s2, reach_s, off)
 
 
 def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
@@ -238,7 +245,7 @@ def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
 
 
 def _delay_instead(
-    scene: Scene, spec: Any, delay_s: float, variance_s2: float, reach_s: float, off: dict[str, float]
+    scene: Scene, spec: Any, poles_us: float, variance_s2: float, reach_s: float, off: dict[str, float]
 ) -> Omission:
     spread = f"{math.sqrt(variance_s2) * 1e6:.3g} us of spread"
     if spec.photoreceptor_noise > 0:
@@ -248,7 +255,7 @@ def _delay_instead(
     if spec.timing != "response" or (reason := obstacle(spec)):
         why = reason if spec.timing == "response" else f"timing {spec.timing} takes the signal at the frames"
         return Omission(None, "no bound yet", spread, why)
-    delay_us = spec.delay_us + delay_s * 1e6
+    delay_us = spec.delay_us + poles_us
     whole_us = math.floor(delay_us + 0.5)
     rounded = abs(delay_us - whole_us) / 1000.0
     mean = delayed(scene, variance_s2, reach_s, echoes=echoes(spec)) + (0.0 if scene.still else rounded)

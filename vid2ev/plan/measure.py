@@ -8,21 +8,31 @@ from collections.abc import Iterable
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.kernels.layout import BLOCK
-from vid2ev.kernels.measure import FIGURES, LEAST, PLANES, TRAVEL, measure_frame, settle_measure
+from vid2ev.kernels.layout import BLOCK, PITCH
+from vid2ev.kernels.measure import (
+    FIGURES,
+    LEAST,
+    LIGHT,
+    OCTAVES,
+    PLANES,
+    SCRATCH,
+    TRAVEL,
+    measure_frame,
+    settle_measure,
+)
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.scene import OF_TILES, Scene
+from vid2ev.stream.scene import OF_TILES, SPREAD, Scene
 
-OCTAVES = 41  # of light, from 2**-20 to 2**20
+LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 
 
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 36 bytes a pixel.
+    The light that is measured is that behind the sensor's lens shading.  Memory is 44 bytes a pixel.
     """
 
     def __init__(self, spec: DvsSpec, size: tuple[int, int]):
@@ -31,11 +41,12 @@ class Measure:
         self._curve = curve_of(spec.log_curve, spec.dark_level)
         self._half = 0.5 * min(spec.threshold_on, spec.threshold_off)
         self._shade = shading_map(spec.shading, width, height).ravel() if spec.shading else np.empty(0, np.float32)
-        self._state = np.zeros((PLANES, width * height), np.float32)
         self._tiles = np.zeros((-(-width * height // BLOCK), FIGURES))
+        self._state = np.zeros(len(self._tiles) * PLANES * PITCH, np.float32)
         self._tiles[:, LEAST] = np.inf
-        self._scratch = np.empty((2, BLOCK), np.float32)
-        self._brightness = np.zeros(OCTAVES)
+        self._spread = np.zeros((3, 2, OCTAVES))
+        self._work = (np.empty(SCRATCH, np.float32), np.zeros(BLOCK, np.uint8), np.zeros(BLOCK + 1, np.int32))
+        self._brightness = np.zeros(LIGHTS)
         self._taus_s = [tau * 1e-6 for tau in spec.pole_taus_us]
         self._frames, self._ns = 0, 0
         self._t_ns: int | None = None
@@ -55,17 +66,20 @@ class Measure:
         else:
             self._advance(light, (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
-        self._note_brightness(light[::16])
+        self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
         self._frames, self._t_ns = self._frames + 1, frame.t_ns
 
     def scene(self) -> Scene:
         """What was seen so far."""
+        travel = self._plane(TRAVEL)
         return Scene(
-            pixels=self._state.shape[1],
+            pixels=self.size[0] * self.size[1],
             frames=self._frames,
             seconds=self._ns * 1e-9,
             threshold=2 * self._half,
-            busiest=float(self._state[TRAVEL].max()),
+            busiest=float(travel.max()),
+            travel_squared=float(np.square(travel, dtype=np.float64).sum()),
+            **dict(zip(SPREAD, self._spread.copy(), strict=True)),
             brightness=self._brightness.copy(),
             **dict(zip(OF_TILES, self._tiles.T.copy(), strict=True)),
         )
@@ -73,15 +87,21 @@ class Measure:
     def _advance(self, light: np.ndarray, dt_s: float) -> None:
         delay, slowest = sum(self._taus_s), max(self._taus_s, default=0.0)
         keep = math.exp(-self._dt_s / slowest) if slowest else 0.0
+        recent = 1.0 if self._dt_s <= self.spec.refractory_us * 1e-6 else keep
         measure_frame(
             light, self._shade, self._curve, self._half, self.spec.filter == "before", dt_s,
-            min(delay, self._dt_s), min(4 * delay, dt_s), keep, self._state, self._tiles, self._scratch,
+            min(delay, self._dt_s), min(4 * delay, dt_s), keep, recent,
+            self._state, self._tiles, self._spread, self._work,
         )  # fmt: skip
         self._dt_s = dt_s
 
+    def _plane(self, plane: int) -> np.ndarray:
+        """A plane of the state [tiles, PITCH]; beyond the pixels there is nothing."""
+        return self._state.reshape(-1, PLANES, PITCH)[:, plane]
+
     def _note_brightness(self, light: np.ndarray) -> None:
         octave = np.log2(np.maximum(light, 2.0**-20)) + 20
-        self._brightness += np.bincount(np.clip(octave.astype(np.int64), 0, OCTAVES - 1), minlength=OCTAVES)
+        self._brightness += np.bincount(np.clip(octave.astype(np.int64), 0, LIGHTS - 1), minlength=LIGHTS)
 
 
 def scene_of(spec: DvsSpec, size: tuple[int, int], frames: Iterable[Frame]) -> Scene:

@@ -36,10 +36,8 @@ DISTANCE_TAU_S = 1e-3
 RARE = math.log(1000)  # a chance of 1 in 1000: what a 99.9 % bound leaves
 
 Kind = Literal["exact", "bound", "99.9 % bound", "estimate", "no bound yet"]
-OF_TILES = (
-    *("light_min", "light_max", "slope_max", "travel", "pushed_s"),
-    *("turns", "bend", "bend_at_turns", "echo", "echo_of_bend"),
-)
+OF_TILES = ("light_min", "light_max", "slope_max", "travel", "pushed_s", "turns", "bend", "bend_at_turns")
+SPREAD = ("by_slope", "by_turns", "by_bends")
 LEAST, MOST = ("light_min",), ("light_max", "slope_max")  # of parts of a clip; all else is their sum
 
 
@@ -78,8 +76,9 @@ class Scene:
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
-    echo, echo_of_bend        [tiles] sum over events of the turns before, and of the bends at turns before, x threshold
-    busiest                   the travel of the pixel that has most [nat]
+    by_slope                  [2, octaves] travel, and travel x slope, by the greatest slope around it [nat/s]
+    by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these
+    busiest, travel_squared   the travel of the pixel that has most [nat], and the sum of squares of all pixels'
     brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel
     """
 
@@ -95,9 +94,11 @@ class Scene:
     turns: np.ndarray
     bend: np.ndarray
     bend_at_turns: np.ndarray
-    echo: np.ndarray
-    echo_of_bend: np.ndarray
+    by_slope: np.ndarray
+    by_turns: np.ndarray
+    by_bends: np.ndarray
     busiest: float
+    travel_squared: float
     brightness: np.ndarray
 
     @property
@@ -152,7 +153,7 @@ def off_by(scene: Scene, error_nat: np.ndarray, *, echoes: bool) -> float:
     many = 1.0 + np.floor(error_nat / scene.threshold)  # levels that can be between the two signals
     change = 2.0 * many * error_nat * (scene.pushed_s / DISTANCE_TAU_S + scene.turns)
     if echoes:
-        change = change + error_nat * scene.echo / scene.threshold
+        return float(change.sum() / scene.travel.sum()) + _echo(scene, scene.by_turns, float(error_nat.max()))
     return float(change.sum() / scene.travel.sum())
 
 
@@ -165,19 +166,24 @@ def delayed(scene: Scene, variance_s2: float, reach_s: float, *, echoes: bool) -
     if scene.still:
         return 0.0
     change = 2.0 * (0.5 * variance_s2 * scene.bend / DISTANCE_TAU_S + reach_s * scene.bend_at_turns)
-    if echoes:
-        change = change + reach_s * scene.echo_of_bend / scene.threshold
     lost = 2.0 * reach_s * scene.bend_at_turns.sum()
-    return float(change.sum() / max(scene.travel.sum() - lost, 1e-300))
+    mean = float(change.sum() / max(scene.travel.sum() - lost, 1e-300))
+    return mean + _echo(scene, scene.by_bends, reach_s) if echoes else mean
+
+
+def _echo(scene: Scene, spread: np.ndarray, per_number_nat: float) -> float:
+    """The share of the events that come after a disagreement in their pixel: no more than all of them."""
+    return float(np.minimum(spread[0], spread[1] * per_number_nat / scene.threshold).sum() / scene.travel.sum())
 
 
 def surely(scene: Scene, mean: float) -> float:
-    """The 99.9 % bound on a distance of this mean (Bernstein): pixels are independent, and none can change more than
-    the busiest."""
+    """The 99.9 % bound on a distance of this mean (Bernstein): pixels are independent, none can change more than the
+    busiest, and the mean square of a change is that of an event's pixel."""
     if scene.still or mean == 0.0:
         return mean
     most = (scene.busiest / scene.threshold + 1.0) / scene.events
-    return mean + math.sqrt(2.0 * RARE * most * mean) + most * RARE / 3.0
+    usual = (scene.travel_squared / scene.travel.sum() / scene.threshold + 1.0) / scene.events
+    return mean + math.sqrt(2.0 * RARE * usual * mean) + most * RARE / 3.0
 
 
 def added(scene: Scene, extra: float, touched: float) -> float:

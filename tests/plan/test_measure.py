@@ -1,0 +1,102 @@
+"""Scenes are measured right: the play counts the events of a sensor, extremes are those of all pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against.clips import clean
+
+from vid2ev.errors import UsageError
+from vid2ev.plan.measure import Measure, scene_of
+from vid2ev.stream import Frame
+
+from .clips import clip, sent
+
+SIZE = (50, 45)  # more than one tile, the last one not full
+
+
+def walk(seed: int, frames: int = 40, step: float = 0.2) -> list[Frame]:
+    """Light that wanders: another path in every pixel."""
+    draws = np.random.default_rng(seed)
+    level = np.cumsum(draws.normal(0, step, (frames, SIZE[1], SIZE[0])), axis=0) - 1
+    gaps = draws.integers(1, 9, frames).cumsum() * 1_000_000
+    return [Frame(np.exp(light).astype(np.float32), int(t)) for t, light in zip(gaps, level, strict=True)]
+
+
+@pytest.mark.parametrize("threshold", [0.07, 0.4])
+def test_the_play_counts_the_events(threshold: float) -> None:
+    """Over a random start the mean number of events is travel / threshold, exactly; a standard error is 1/2 a pixel."""
+    spec = clean(filter="after", random_phase=True, threshold_on=threshold, threshold_off=threshold)
+    frames = walk(1)
+    scene = scene_of(spec, SIZE, frames)
+    spread = 5 * 0.5 * np.sqrt(scene.pixels * len(frames))
+    assert abs(len(sent(spec, SIZE, frames)) - scene.events) < spread
+    assert scene.events > 10 * spread
+
+
+def test_extremes_and_times_are_those_of_all_pixels() -> None:
+    spec, frames = clean(filter="after"), walk(2)
+    scene = scene_of(spec, SIZE, frames)
+    light = np.stack([frame.light for frame in frames]).reshape(len(frames), -1).astype(np.float64)
+    t_s = np.array([frame.t_ns for frame in frames]) * 1e-9
+    steepest = np.abs(np.diff(np.log(light + 1e-3), axis=0) / np.diff(t_s)[:, None]).max(axis=0)
+    for tile in range(2):
+        part = slice(2048 * tile, 2048 * (tile + 1))
+        assert scene.light_min[tile] == light[:, part].min() and scene.light_max[tile] == light[:, part].max()
+        assert scene.slope_max[tile] == pytest.approx(steepest[part].max(), rel=1e-4)
+    assert scene.seconds == pytest.approx(t_s[-1] - t_s[0]) and scene.frames == len(frames)
+    assert scene.pushed_s.sum() <= scene.seconds * scene.pixels
+
+
+def test_before_the_log_slopes_are_bounds() -> None:
+    """Straight light is steepest, as a share of itself, where it is darkest."""
+    frames = walk(3)
+    before, after = (scene_of(clean(filter=way), SIZE, frames) for way in ("before", "after"))
+    assert (before.slope_max >= after.slope_max * (1 - 1e-5)).all()
+    assert before.events == pytest.approx(after.events)
+
+
+def test_a_clip_in_two_parts_is_the_clip() -> None:
+    spec, frames = clean(), walk(4)
+    whole = scene_of(spec, SIZE, frames)
+    parts = scene_of(spec, SIZE, frames[:20]).merged(scene_of(spec, SIZE, frames[19:]))
+    assert np.array_equal(parts.light_min, whole.light_min) and np.array_equal(parts.slope_max, whole.slope_max)
+    assert parts.seconds == pytest.approx(whole.seconds)
+    assert parts.events == pytest.approx(whole.events, rel=0.1)  # (the play starts again)
+    assert parts.busiest >= whole.busiest * 0.9
+
+
+def test_nothing_is_carried_across_a_cut() -> None:
+    spec, frames = clean(), walk(5, 4)
+    dark = Frame(np.full(SIZE[::-1], 1e-6, np.float32), frames[-1].t_ns + 1_000_000, cut=True)
+    cut, plain = scene_of(spec, SIZE, [*frames, dark]), scene_of(spec, SIZE, frames)
+    assert cut.events == plain.events and cut.seconds == plain.seconds
+    assert cut.light_min.min() == np.float32(1e-6)
+
+
+def test_a_still_scene_is_still() -> None:
+    frames = [Frame(np.full(SIZE[::-1], 0.3, np.float32), k * 1_000_000) for k in range(5)]
+    scene = scene_of(clean(), SIZE, frames)
+    assert scene.still and scene.slope_max.max() == 0 and scene.describe()["still_tiles"] == 2
+
+
+def test_wrong_frames_are_refused() -> None:
+    measure = Measure(clean(), SIZE)
+    measure.see(Frame(np.ones(SIZE[::-1], np.float32), 5))
+    with pytest.raises(UsageError, match="expected a later one"):
+        measure.see(Frame(np.ones(SIZE[::-1], np.float32), 5))
+    with pytest.raises(UsageError, match="shape"):
+        measure.see(Frame(np.ones(SIZE, np.float32), 6))
+
+
+def test_light_that_is_no_light_leaves_the_scene_finite() -> None:
+    light = np.full((3, *SIZE[::-1]), 0.5, np.float32)
+    light[1, 0, :4] = np.nan, np.inf, -1, 1e38
+    scene = scene_of(clean(), SIZE, [Frame(frame, k * 1_000_000) for k, frame in enumerate(light)])
+    assert np.isfinite(scene.travel).all() and np.isfinite(scene.slope_max).all() and np.isfinite(scene.bend).all()
+
+
+def test_a_clip_with_subframes_has_the_events_of_its_sensor() -> None:
+    size, frames = clip("edge")
+    spec = clean(filter="after", random_phase=True)
+    assert len(sent(spec, size, frames)) == pytest.approx(scene_of(spec, size, frames).events, rel=0.01)

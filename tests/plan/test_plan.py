@@ -1,0 +1,160 @@
+"""Plans: what is left out changes no more than its bound, on clips of all kinds; decisions, tables, refusals."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from against.clips import clean
+
+from vid2ev.errors import UsageError
+from vid2ev.plan.measure import scene_of
+from vid2ev.plan.plan import EFFECTS, Plan, plan_of
+from vid2ev.sensors.presets import load_sensor, preset_names
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream import Frame
+from vid2ev.stream.scene import Scene, added, at_most, delayed, off_by, surely, together
+
+from .clips import MADE, REAL, SCENES, VIDEOS, clip, distance, sent
+
+QUIET = {"mismatch": 0.0, "crossing_noise": 0.0}
+POLES = DvsSpec(**QUIET, refractory_us=0)
+NOISES = {
+    "shading": {"shading": (0.0, -0.5), "dark_level": 0.01},
+    "leak": {"leak_rate_hz": 0.02},
+    "shot": {"shot_rate_hz": 0.02},
+    "hot": {"hot_probability": 0.002, "hot_rate_hz": 50},
+    "cold": {"cold_probability": 0.003},
+    "refractory": {"refractory_us": 3000},
+}
+slow = pytest.mark.slow
+
+
+@cache
+def scene(name: str, spec: DvsSpec = POLES) -> Scene:
+    size, frames = clip(name)
+    return scene_of(spec, size, frames)
+
+
+def changed(name: str, spec: DvsSpec, effect: str) -> tuple[float, float]:
+    """The distance that leaving an effect out makes, and its bound."""
+    size, frames = clip(name)
+    said = EFFECTS[effect].omission(scene(name, spec), spec)
+    assert said.sure, said.why
+    without = DvsSpec(**(spec.model_dump() | (dict(said.replace) or EFFECTS[effect].off)))
+    return distance(sent(spec, size, frames), sent(without, size, frames)), said.distance
+
+
+@pytest.mark.parametrize("effect", ["follower", "photoreceptor"])
+def test_a_pole_that_gives_way_to_a_delay_changes_less_than_its_bound(effect: str) -> None:
+    measured, bound = changed("edge", POLES, effect)
+    assert 0 < measured <= bound <= 10 * measured
+
+
+@slow
+@pytest.mark.parametrize("noise", ["quiet", "paper"])
+@pytest.mark.parametrize("name", [*MADE, *REAL, *SCENES])
+def test_the_paper_s_effects_stay_within_their_bounds(name: str, noise: str) -> None:
+    if name in REAL and not VIDEOS.is_dir():
+        pytest.skip(f"{VIDEOS} is not there")
+    spec = DvsSpec(**(QUIET if noise == "quiet" else {}))
+    for effect in ("follower", "photoreceptor", "refractory"):
+        measured, bound = changed(name, spec, effect)
+        assert measured <= bound, effect
+
+
+@slow
+@pytest.mark.parametrize("effect", NOISES)
+@pytest.mark.parametrize("name", ["edge", "juggle", "karma"])
+def test_other_effects_stay_within_their_bounds(name: str, effect: str) -> None:
+    if name in REAL and not VIDEOS.is_dir():
+        pytest.skip(f"{VIDEOS} is not there")
+    for noise in ({}, {"crossing_noise": 0.035}):
+        measured, bound = changed(name, clean(random_phase=True, **noise, **NOISES[effect]), effect)
+        assert measured <= bound, noise
+
+
+def test_auto_keeps_within_the_tolerance() -> None:
+    """What auto leaves out of the paper's sensor changes no more than it says, and no more than was asked."""
+    size, frames = clip("edge")
+    spec = POLES
+    for tolerance in (0.0, 0.005, 0.05):
+        plan = plan_of(scene("edge"), spec, tolerance)
+        assert plan.distance is not None and plan.distance <= tolerance
+        assert distance(sent(spec, size, frames), sent(plan.spec, size, frames)) <= plan.distance
+    assert plan.spec.pole_taus_us == () and plan.spec.delay_us == 400
+    assert [row.fate for row in plan.rows] == ["replaced", "replaced"]
+
+
+def test_what_costs_nothing_and_what_is_an_estimate_stay() -> None:
+    spec = DvsSpec(hot_probability=1e-9, cold_probability=1e-9, frame_rate_hz=1000)
+    plan = plan_of(scene("edge", spec), spec, 1.0)
+    fates = {row.effect: row.fate for row in plan.rows}
+    assert [fates[name] for name in ("mismatch", "crossing_noise", "hot", "cold", "fixed_rate")] == ["kept"] * 5
+    assert plan.spec.mismatch == spec.mismatch and plan.spec.frame_rate_hz == 1000
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_effect_of_every_preset_has_a_row(name: str) -> None:
+    spec = load_sensor(name)
+    plan = plan_of(scene("edge", spec), spec)
+    assert [row.effect for row in plan.rows] == spec.effects()
+    for row in plan.rows:
+        assert row.omission.why and (row.omission.distance is None or np.isfinite(row.omission.distance))
+        assert row.effect in str(plan)
+    assert json.loads(json.dumps(plan.describe(), allow_nan=False))["rows"] == plan.describe()["rows"]
+
+
+def test_effects_by_name() -> None:
+    spec = DvsSpec()
+    seen = scene("edge", spec)
+    assert plan_of(seen, spec, effects="all").spec == spec
+    none = plan_of(seen, spec, effects="none")
+    assert none.spec.effects() == [] and none.distance is None and "no bound" in str(none)
+    for names in ("mismatch,refractory", ["refractory", "mismatch"]):
+        assert plan_of(seen, spec, effects=names).spec.effects() == ["mismatch", "refractory"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "tolerance", "words"),
+    [("mismach", 0.01, "did you mean mismatch"), ("auto", 2.0, "tolerance 2.0"), ("auto", float("nan"), "tolerance")],
+)
+def test_what_cannot_be_meant_is_refused(effects: str, tolerance: float, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        plan_of(scene("edge"), POLES, tolerance, effects)
+
+
+def test_noise_without_its_poles_is_refused() -> None:
+    spec = DvsSpec(photoreceptor_noise=0.03)
+    with pytest.raises(UsageError, match="photoreceptor_noise"):
+        plan_of(scene("edge", spec), spec, effects="photoreceptor_noise")
+    assert plan_of(scene("edge", spec), spec, 1.0).spec.pole_taus_us == (300.0, 100.0)
+
+
+def test_pixels_in_step_have_no_bounds() -> None:
+    spec = clean(photoreceptor_tau_us=300, follower_tau_us=100, random_phase=False)
+    plan = plan_of(scene("edge", spec), spec, 1.0)
+    assert {row.omission.kind for row in plan.rows} == {"no bound yet"} and plan.spec == spec
+
+
+def test_a_still_scene_needs_no_poles() -> None:
+    frames = [Frame(np.full((8, 8), 0.3, np.float32), k * 1_000_000) for k in range(5)]
+    spec = DvsSpec(shot_rate_hz=10)
+    plan = plan_of(scene_of(spec, (8, 8), frames), spec, 0.0)
+    assert plan.spec.pole_taus_us == () and plan.spec.shot_rate_hz == 10
+    assert isinstance(plan, Plan) and plan.distance == 0.0
+
+
+def test_laws_of_the_bounds() -> None:
+    seen = scene("edge")
+    error = np.full(len(seen.travel), 1e-3)
+    assert 0 < off_by(seen, error, echoes=False) < off_by(seen, 2 * error, echoes=False)
+    assert delayed(seen, 0.0, 0.0, echoes=True) == 0
+    assert delayed(seen, 1e-8, 1e-5, echoes=True) >= delayed(seen, 1e-8, 1e-5, echoes=False)
+    assert surely(seen, 1e-3) > 1e-3 and surely(seen, 0.0) == 0
+    assert together(0.01, 0.04) == pytest.approx(0.09)
+    assert added(seen, 0.0, 0.0) == 0 and added(seen, 2 * seen.events, 0.0) == pytest.approx(0.5)
+    draws = np.random.default_rng(1).poisson(3.0, 100_000)
+    assert np.mean(draws > at_most(3.0)) < 1e-3

@@ -1,0 +1,51 @@
+"""`vid2ev plan`, and `convert --effects`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from vid2ev import convert
+from vid2ev.commands.plan import plan
+from vid2ev.errors import UsageError
+from vid2ev.plan.recordings import plans_of
+from vid2ev.recipe import Recipe
+from vid2ev.recording.manifest import read_manifest
+
+CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.2"
+
+
+def test_the_table_and_the_json_say_the_same() -> None:
+    table = CliRunner().invoke(plan, [CLIP, "--tolerance", "0.05"])
+    found = CliRunner().invoke(plan, [CLIP, "--tolerance", "0.05", "--json"])
+    assert table.exit_code == found.exit_code == 0, table.output + found.output
+    rows = json.loads(found.output)[""]["rows"]
+    lines = table.output.splitlines()
+    assert [line.split()[:2] for line in lines[1 : len(rows) + 1]] == [[row["effect"], row["fate"]] for row in rows]
+    assert lines[0].split() == ["effect", "fate", "distance", "kind", "figure", "cost", "why"]
+
+
+def test_a_recording_is_planned_and_says_so(tmp_path: Path) -> None:
+    manifest = convert(CLIP, tmp_path / "a", effects="auto", tolerance=0.05, preview=False)
+    said = plans_of(Recipe.of(CLIP), "auto", 0.05)[""]
+    assert manifest["plan"][""] == json.loads(json.dumps(said.describe()))
+    assert manifest["sensor"]["parameters"] == said.spec.model_dump(mode="json")
+    assert read_manifest(tmp_path / "a")["plan"] == manifest["plan"]
+
+
+def test_all_effects_leave_no_trace(tmp_path: Path) -> None:
+    assert "plan" not in convert(CLIP, tmp_path / "a", sensor="ideal", preview=False)
+
+
+def test_what_passes_once_is_refused() -> None:
+    class Once:
+        def __getattr__(self, name: str) -> object:
+            return {"rewindable": False}.get(name)
+
+    from dataclasses import replace
+
+    with pytest.raises(UsageError, match="passes once"):
+        plans_of(replace(Recipe.of(CLIP), source=Once()))  # type: ignore[arg-type]
