@@ -112,8 +112,8 @@ def follow(n, half, dt_s, own, tile, spread, work):
     """The play of the n pixels of a tile, from the levels in scratch to those in `own`."""
     half, (scratch, flagged, hits) = F(half), work
     for i in range(n):
-        away = abs(own[LEVEL * PITCH + i] - own[PLAY * PITCH + i]) > half
-        flagged[i] = away | (own[WAY * PITCH + i] != F(0.0))
+        level, play = own[LEVEL * PITCH + i], own[PLAY * PITCH + i]
+        flagged[i] = (level - half > play) | (level + half < play) | (own[WAY * PITCH + i] != F(0.0))
     flagged[n:] = 0
     for k in range(hits_of(flagged, hits)):
         i = hits[k]

@@ -26,6 +26,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.scene import OF_TILES, SPREAD, Scene
 
+BRIGHTNESS_EVERY = 8  # frames
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 
 
@@ -66,7 +67,8 @@ class Measure:
         else:
             self._advance(light, (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
-        self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
+        if self._frames % BRIGHTNESS_EVERY == 0:
+            self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
         self._frames, self._t_ns = self._frames + 1, frame.t_ns
 
     def scene(self) -> Scene:

@@ -170,7 +170,7 @@ def names_of(effects: str | Sequence[str]) -> list[str]:
     names = [] if effects == "none" else effects.split(",") if isinstance(effects, str) else list(effects)
     for name in names:
         if name not in EFFECTS:
-            raise UsageError(f"effect '{name}': expected {', '.join(WORDS)} or names{nearest(name, EFFECTS)}")
+            raise UsageError(f"effect '{name}': expected {', '.join([*WORDS, *EFFECTS])}{nearest(name, EFFECTS)}")
     return names
 
 

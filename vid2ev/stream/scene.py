@@ -79,7 +79,7 @@ class Scene:
     by_slope                  [2, octaves] travel, and travel x slope, by the greatest slope around it [nat/s]
     by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these
     busiest, travel_squared   the travel of the pixel that has most [nat], and the sum of squares of all pixels'
-    brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel
+    brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel, now and then
     """
 
     pixels: int
@@ -152,6 +152,7 @@ def off_by(scene: Scene, error_nat: np.ndarray, *, echoes: bool) -> float:
         return 0.0
     many = 1.0 + np.floor(error_nat / scene.threshold)  # levels that can be between the two signals
     change = 2.0 * many * error_nat * (scene.pushed_s / DISTANCE_TAU_S + scene.turns)
+    change = np.minimum(change, 4.0 * many**2 * scene.travel)  # (each stretch begins with an event of either)
     if echoes:
         return float(change.sum() / scene.travel.sum()) + _echo(scene, scene.by_turns, float(error_nat.max()))
     return float(change.sum() / scene.travel.sum())
