@@ -37,6 +37,7 @@ def convert(
     *,
     seed: int | None = 0,
     threads: int | None = None,
+    skip: bool = True,
     overwrite: bool = False,
     resume: bool = False,
     report: Report | None = None,
@@ -49,6 +50,7 @@ def convert(
 
     seed       of the sensor; None draws one
     threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
+    skip       let blocks of pixels sleep in which nothing can happen; changes nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
@@ -77,11 +79,11 @@ def convert(
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
-        recorder = Recorder(recipe, outputs, folder, threads)
+        recorder = Recorder(recipe, outputs, folder, threads, skip)
         recorder.take_up()
         if not recorder.done.finished:
             _record(recorder, piece, report)
-        manifests = _manifests(job, recorder, _run(video, threads, recorder.done))
+        manifests = _manifests(job, recorder, _run(video, threads, recorder))
         with folder.writing():
             recorder.write(folder.whole)
             for within, manifest in manifests.items():
@@ -151,12 +153,13 @@ def _record(recorder: Recorder, piece: int, report: Report | None) -> None:
     recorder.finish()
 
 
-def _run(video: str | Path, threads: int, done: Progress) -> dict[str, Any]:
+def _run(video: str | Path, threads: int, recorder: Recorder) -> dict[str, Any]:
     """When, where and how fast, for the manifest."""
     return {
         "ended": datetime.now(UTC).isoformat(timespec="seconds"),
         "video": str(video),
-        "seconds": round(done.seconds, 3),
+        "seconds": round(recorder.done.seconds, 3),
         "threads": threads,
+        "blocks_slept": recorder.slept(),
         "machine": machine(),
     }

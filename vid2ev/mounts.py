@@ -108,10 +108,11 @@ class Mount:
         """The camera's part of the recording's folder, with a slash at its end."""
         return f"{self.name}/" if self.name else ""
 
-    def dvs(self, labels: bool = False, threads: int = 1) -> Dvs:
+    def dvs(self, labels: bool = False, threads: int = 1, skip: bool = True) -> Dvs:
         """The event sensor, before its first frame."""
         assert isinstance(self.sensor.spec, DvsSpec)
-        return Dvs(self.sensor.spec, self.size, self.seed, camera=self.number, threads=threads, labels=labels)
+        spec, number = self.sensor.spec, self.number
+        return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip)
 
     def cis(self, threads: int = 1) -> Cis:
         """The frame sensor, before its first frame."""

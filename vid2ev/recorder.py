@@ -64,10 +64,10 @@ class Recorder:
     for each that follows and now and then `checkpoint`, and in the end `finish` and `write`.
     """
 
-    def __init__(self, recipe: Recipe, outputs: Outputs, folder: Folder, threads: int):
+    def __init__(self, recipe: Recipe, outputs: Outputs, folder: Folder, threads: int, skip: bool = True):
         self.recipe, self.outputs, self.folder = recipe, outputs, folder
         self.done = Progress()
-        self.tracks: Sequence[Track] = [self._track(mount, threads) for mount in recipe.mounts]
+        self.tracks: Sequence[Track] = [self._track(mount, threads, skip) for mount in recipe.mounts]
         self._truths = [TruthTrack(mount, folder) for mount in recipe.mounts if recipe.truth]
 
     def take_up(self) -> None:
@@ -136,12 +136,18 @@ class Recorder:
         for track, truth in zip(self._truths, instant.truth, strict=False):
             track.add(truth)
 
-    def _track(self, mount: Mount, threads: int) -> Track:
+    def slept(self) -> dict[str, Any]:
+        """Of each event camera, by name ("" if it is the only one): how many of its blocks' intervals were slept
+        through in this run, of how many."""
+        tracks = zip(self.recipe.mounts, self.tracks, strict=True)
+        return {mount.name: list(track.dvs.slept) for mount, track in tracks if isinstance(track, DvsTrack)}
+
+    def _track(self, mount: Mount, threads: int, skip: bool) -> Track:
         if mount.kind == "cis":
             return CisTrack(mount.cis(threads), self.folder, self.outputs, within=mount.within)
         source = self.recipe.source
         return DvsTrack(
-            mount.dvs(self.recipe.labels, threads),
+            mount.dvs(self.recipe.labels, threads, skip),
             self.folder,
             self.outputs,
             within=mount.within,

@@ -100,6 +100,10 @@ class Auto(click.ParamType):
     help="Changes nothing but the time it takes.  [default: all cores]",
 )
 @click.option(
+    "--skip/--no-skip", default=True,
+    help="Skip pixels in which nothing can happen; changes nothing but the time it takes.  [default: yes]",
+)  # fmt: skip
+@click.option(
     "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False),
     help="Colour filters before the pixels.  [default: none, they see luminance]",
 )  # fmt: skip
@@ -222,7 +226,7 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     from vid2ev.recording.folder import check_free
 
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
-    overwrite, resume = options.pop("overwrite"), options.pop("resume")
+    overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
     effects, tolerance = options.pop("effects"), options.pop("tolerance")
     recipe = Recipe.of(video, seed=seed or 0, **options)
     check_effects(recipe, effects, tolerance)

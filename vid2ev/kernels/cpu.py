@@ -8,9 +8,22 @@ from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernels.crossing import AT, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
-from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LANE_COUNT, LOW, PITCH, last_light, place_of, stride_of
+from vid2ev.kernels.layout import (
+    BLOCK,
+    HIGH,
+    INPUT,
+    LAG1,
+    LANE_COUNT,
+    LOW,
+    NOT_FINITE,
+    PITCH,
+    last_light,
+    place_of,
+    stride_of,
+)
 from vid2ev.kernels.scan import NEW, commit, read_light, scan
 from vid2ev.kernels.shots import aim
+from vid2ev.kernels.sleep import keeps_light, may_sleep, sleep, sleeps_on, stir
 from vid2ev.kernels.slow import climb, load
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
@@ -45,7 +58,7 @@ def hits_of(flagged, hits):
 
 
 @compiled
-def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, iv, work, out, tally):
+def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, num, iv, work, out, tally):
     """Advance blocks first_block ... last_block - 1 by one interval; returns (keys, their number).
 
     Flagged pixels are gathered over as many blocks as fill the lanes, so that the vector code has something to do.
@@ -57,17 +70,33 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
+        same, sleeps = naps.wanted and keeps_light(naps, index, p0, size), False
+        if len(flags.forced):
+            keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+        if same and forced == 0 and sleeps_on(naps, index, iv):
+            sleep(naps, index)
+            continue
         block = planes.fast[index * stride : (index + 1) * stride]
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
-        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
-        scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
+        if naps.wanted and len(flags.noise) == 0:
+            sleeps = may_sleep(block, scratch, index, size, same, naps, flags, num, iv)
+        if sleeps:
+            if forced > 0:
+                stir(block, scratch, flagged, index, size, keys, forced, naps, flags, num, iv)
+            sleep(naps, index)
+            if forced == 0:
+                continue
+        else:
+            mended = tally[NOT_FINITE]
+            read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+            if naps.wanted:
+                naps.mended[index] = np.uint8(tally[NOT_FINITE] > mended)
+            scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
         if len(flags.forced):
             if shots > LANE_COUNT // 2:
                 out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
                 shots = np.int64(0)
-            keys, chance, forced, shots = take_forced(
-                block, work, keys, chance, p0, size, shots, planes, flags, num, iv
-            )
+            forced, shots = take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv)
         for i in range(size, BLOCK):
             flagged[i] = 0
         count = hits_of(flagged, hits)
@@ -83,7 +112,8 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
             some = min(count - first, LANE_COUNT - used)
             load(block, scratch, work.lanes[used:], work.pixels[used:], hits[first:], some, p0, flags)
             first, used = first + some, used + some
-        commit(block, scratch, size, flags)
+        if not sleeps:
+            commit(block, scratch, size, flags)
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
     if len(flags.forced):
         out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
@@ -91,19 +121,17 @@ def walk_tile(first_block, last_block, pixels, light, lut, planes, flags, num, i
 
 
 @inner
-def take_forced(block, work, keys, chance, p0, size, shots, planes, flags, num, iv):
-    """Load the shots of a block, flag the pixels of other forced events: (keys, chance, candidates left, shots)."""
-    keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+def take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv):
+    """Load the shots of a block, flag the pixels of other forced events: (candidates left, shots)."""
     forced = keep_likely(block, work.scratch, keys, chance, forced, flags, num, iv)
     if all_general(flags, iv):
         for j in range(forced):
             work.flagged[place_of_candidate(keys[j], iv)[0]] = 1
-    else:
-        forced, shots = aim(
-            block, work.scratch, work.flagged, keys, chance, forced, p0, work.shot_lanes, work.shot_pixels, shots,
-            planes, flags, num, iv,
-        )  # fmt: skip
-    return keys, chance, forced, shots
+        return forced, shots
+    return aim(
+        block, work.scratch, work.flagged, keys, chance, forced, p0, work.shot_lanes, work.shot_pixels, shots, planes,
+        flags, num, iv,
+    )  # fmt: skip
 
 
 @inner

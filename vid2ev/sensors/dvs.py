@@ -11,6 +11,7 @@ from vid2ev.errors import UsageError
 from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
 from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, SWALLOWED, TALLIES
 from vid2ev.kernels.order import order_keys, unpack
+from vid2ev.kernels.sleep import rouse
 from vid2ev.kernels.work import new_work
 from vid2ev.light.transfer import code_table
 from vid2ev.physics.delay import Delayed
@@ -18,6 +19,7 @@ from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.sleep import Sleep
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
@@ -41,6 +43,8 @@ class Dvs:
     labels    give each event its cause (`vid2ev.stream.events.Label`)
     transfer  what uint8 or uint16 frames are coded with ("srgb", "bt709", "linear", "gamma:2.2"); without it
               they are refused, because linear light was not promised
+    skip      let blocks of pixels sleep in which nothing can happen; changes nothing but the time it takes
+              (`vid2ev.kernels.sleep`), and the frame before is kept for it, in the type of the frames
 
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
@@ -55,6 +59,7 @@ class Dvs:
         threads: int = 1,
         labels: bool = False,
         transfer: str | None = None,
+        skip: bool = True,
     ):
         check_sensor(size, seed, camera, threads)
         width, height = size
@@ -78,6 +83,7 @@ class Dvs:
         self._leak_since_ns = 0
         self._step = 0
         self._fresh_noise = True
+        self._sleep = Sleep(width * height, skip and not self._flags.noise)
         self._tiles = Tiles(-(-width * height // BLOCK), threads)
         self._work = [new_work() for _ in range(self._tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
@@ -100,7 +106,9 @@ class Dvs:
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
         )
+        self._sleep.begin(flat, interval)
         events = self._events(self._walk(flat, table, interval), interval)
+        self._sleep.end()
         self._t_ns = t_ns
         self._step += 1
         self._fresh_noise = not interval.noise_resolved
@@ -148,6 +156,7 @@ class Dvs:
         """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
         if self._t_ns is None:
             return {}
+        self._rouse(np.arange(-(-self._bad.size // BLOCK)))
         state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise)]
         state["clock"] = np.array(numbers, np.int64)
@@ -159,6 +168,7 @@ class Dvs:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
+        self._sleep.forget()
         if not state:
             self._t_ns = None
             return
@@ -180,6 +190,7 @@ class Dvs:
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""
+        self._rouse(np.unique(pixels // BLOCK))
         leak = self._numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
         return inside_of(pixels, self._planes, self._flags, self._numbers, leak)
 
@@ -196,6 +207,11 @@ class Dvs:
         off, on = (int(count) for count in self._polarities)
         swallowed, capped, not_finite = (int(tallies[k]) for k in (SWALLOWED, CAPPED, NOT_FINITE))
         return {"on": on, "off": off, "swallowed": swallowed, "capped": capped, "not_finite": not_finite}
+
+    @property
+    def slept(self) -> tuple[int, int]:
+        """How many times a block of 2048 pixels slept through an interval, of how many."""
+        return self._sleep.count
 
     # ------------------------------------------------------------------------------------------------- inside
 
@@ -241,6 +257,7 @@ class Dvs:
                 self._flags, self._numbers, self._work[k], self._tallies[k],
             )  # fmt: skip
 
+        self._sleep.forget()
         self._tiles.each_blocks(settle)
         self._t_ns = self._leak_since_ns = t_ns
         self._fresh_noise = True
@@ -249,8 +266,8 @@ class Dvs:
     def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> list[np.ndarray]:
         def walk(k: int, first: int, last: int) -> np.ndarray:
             self._buffers[k], n = walk_tile(
-                first, last, self._bad.size, flat, table, self._planes, self._flags, self._numbers, interval,
-                self._work[k], self._buffers[k], self._tallies[k],
+                first, last, self._bad.size, flat, table, self._sleep.naps, self._planes, self._flags, self._numbers,
+                interval, self._work[k], self._buffers[k], self._tallies[k],
             )  # fmt: skip
             return self._buffers[k][:n]
 
@@ -282,3 +299,10 @@ class Dvs:
             risen = rate * (self._t_ns - self._leak_since_ns)
             shift_levels(self._bad.size, risen, self._planes, self._flags, self._numbers, self._work[0])
             self._leak_since_ns = self._t_ns
+            self._sleep.wake()
+
+    def _rouse(self, blocks: np.ndarray) -> None:
+        """Bring these blocks up to the last frame, if they have slept."""
+        late = self._sleep.late(blocks)
+        if late.size:
+            rouse(late, self._bad.size, self._planes, self._sleep.naps, self._flags, self._numbers, self._work[0])

@@ -1,0 +1,180 @@
+"""Blocks that sleep through still light show it in nothing: events, state and counts are the same bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from against.clips import EVERYTHING, clean
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vid2ev import load_sensor
+from vid2ev.sensors.dvs import Dvs, DvsSpec
+
+SIZE = (96, 70)  # three blocks and a part of one
+VIDEOS = Path(__file__).parents[2] / ".." / "shared" / "data" / "videos"
+
+TRACKING = {"leak_rate_hz": 3.0, "refractory": "track", "refractory_us": 900.0}
+SENSORS = {
+    "ideal": load_sensor("ideal"),
+    "paper": load_sensor("paper"),
+    "v2e-noisy": load_sensor("v2e-noisy"),
+}
+MORE = {
+    "davis346": load_sensor("davis346", ["leak_rate_hz=2"]),
+    "imx636": load_sensor("imx636", ["shot_rate_hz=3", "hot_probability=0.01"]),
+    "v2e-clean": load_sensor("v2e-clean"),
+    "dvxplorer": load_sensor("dvxplorer"),
+    "prophesee-gen41": load_sensor("prophesee-gen41"),
+    "photoreceptor noise": EVERYTHING,
+    "after, tracking": DvsSpec(filter="after", crossing_noise=0.03, cold_probability=0.1, **TRACKING),
+    "tracking without poles": clean(filter="after", **TRACKING),
+    "before, one pole, leak, a lin-log": clean(photoreceptor_tau_us=400, leak_rate_hz=4, log_curve="v2e"),
+    "after, one pole, shots": clean(filter="after", follower_tau_us=900, shot_rate_hz=9, mismatch=0.03),
+    "slow poles": DvsSpec(photoreceptor_tau_us=20_000, follower_tau_us=30_000, timing="linear"),
+    "shading, hot, frame times": clean(
+        shading=(0.0, -0.4), hot_probability=0.02, hot_rate_hz=200, timing="frame", photoreceptor_tau_us=100
+    ),
+}
+sensors = pytest.mark.parametrize(
+    "spec",
+    [*SENSORS.values(), *(pytest.param(spec, marks=pytest.mark.slow) for spec in MORE.values())],
+    ids=[*SENSORS, *MORE],
+)
+
+Scene = list[tuple[str, int, int]]
+WHAT = ["still", "still", "pixel", "rows", "flicker", "all", "back", "bad", "restart", "resume", "look"]
+happenings = st.lists(
+    st.tuples(st.sampled_from(WHAT), st.integers(1, 90), st.integers(0, 2**16)), min_size=3, max_size=7
+)
+
+
+def frames_of(scene: Scene, dtype: type, seed: int):
+    """(light, what to do with it) frame by frame: long still stretches with something between."""
+    width, height = SIZE
+    rng = np.random.default_rng(seed)
+    first = np.exp(rng.normal(-2.0, 1.5, (height, width)))
+    light = first = first if dtype is not np.uint8 else np.clip(255 * first, 0, 255)
+    for what, count, place in scene:
+        y, x = place % height, place % width
+        for k in range(1 + count % 8 if what in ("rows", "flicker") else 1):
+            light = light.copy()
+            if what == "pixel":
+                light[y, x] *= 0.4
+            elif what == "rows":
+                light[max(0, y - 3) : y + k] = rng.permutation(light[max(0, y - 3) : y + k])
+            elif what == "flicker":
+                light[y:, :x] = first[y:, :x] * (1.0 + 0.5 * (k % 2))
+            elif what == "all":
+                light *= 1.3
+            elif what == "back":
+                light = first.copy()
+            elif what == "bad" and dtype is not np.uint8:
+                light[y, x] = np.nan
+            yield np.clip(light, 0, 255).astype(dtype), what if k == 0 else "still"
+        for _ in range(count):
+            yield np.clip(light, 0, 255).astype(dtype), "still"
+
+
+def times_ns(count: int, seed: int) -> np.ndarray:
+    """Mostly steady times, with other steps now and then."""
+    rng = np.random.default_rng(seed)
+    steady = [40_000, 1_000_000, 33_000_000][seed % 3]
+    return np.cumsum(np.where(rng.random(count) < 0.9, steady, rng.integers(2_000, 5_000_000, count)))
+
+
+def assert_same_state(one: Dvs, other: Dvs) -> None:
+    ours, theirs = one.state(), other.state()
+    assert ours.keys() == theirs.keys()
+    for name, array in ours.items():
+        assert array.tobytes() == theirs[name].tobytes(), name
+
+
+def play_both(spec: DvsSpec, scene: Scene, dtype: type, seed: int, threads=1, labels=False) -> tuple[int, int]:
+    """Both ways through a scene, compared at every frame; returns what has slept, of how much."""
+    options = {"seed": seed, "transfer": "srgb", "labels": labels}
+    skips = Dvs(spec, SIZE, threads=threads, **options)
+    walks = Dvs(spec, SIZE, skip=False, **options)
+    frames = list(frames_of(scene, dtype, seed))
+    slept = total = 0
+    for (light, what), t_ns in zip(frames, times_ns(len(frames), seed), strict=True):
+        if what == "resume":
+            saved, slept, total = skips.state(), slept + skips.slept[0], total + skips.slept[1]
+            skips = Dvs(spec, SIZE, threads=3 - threads, **options)
+            skips.restore(saved)
+        see = "restart" if what == "restart" else "step"
+        ours, theirs = getattr(skips, see)(light, int(t_ns)), getattr(walks, see)(light, int(t_ns))
+        for name in ("t", "x", "y", "p", "label"):
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+        if what == "look":
+            places = np.array([0, 2047, 2048, SIZE[0] * SIZE[1] - 1])
+            assert np.array_equal(skips.inside(places), walks.inside(places))
+        if what in ("look", "all"):
+            assert_same_state(skips, walks)
+    assert_same_state(skips, walks)
+    assert skips.counts == walks.counts and walks.slept[0] == 0
+    return slept + skips.slept[0], total + skips.slept[1]
+
+
+@sensors
+@settings(max_examples=20, deadline=None)
+@given(happenings, st.integers(0, 1000), st.sampled_from([1, 2]))
+def test_sleep_changes_no_bit(spec, scene, seed, threads):
+    play_both(spec, scene, np.float32, seed, threads)
+
+
+@pytest.mark.parametrize("name", ["ideal", *(pytest.param(name, marks=pytest.mark.slow) for name in SENSORS | MORE)])
+@settings(max_examples=20, deadline=None)
+@given(happenings, st.integers(0, 1000), st.booleans())
+def test_nor_does_it_with_codes_and_labels(name, scene, seed, labels):
+    spec = (SENSORS | MORE)[name]
+    play_both(spec, scene, np.uint8, seed, labels=labels and name != "ideal")
+
+
+@sensors
+def test_still_light_is_slept_through(spec):
+    """What changes in a corner keeps three blocks of four asleep, unless leak or noise of the photoreceptor do not."""
+    scene = [("still", 20, 0), ("pixel", 40, 5), ("rows", 60, 2), ("flicker", 90, 69), ("back", 90, 0)]
+    slept, total = play_both(spec, scene, np.float32, 6)
+    least = 0.0 if spec.photoreceptor_noise > 0 else 0.05 if spec.leak_rate_hz > 0 else 0.7
+    assert slept >= least * total
+    assert (slept > 0) == (spec.photoreceptor_noise == 0)
+
+
+def test_light_may_come_in_one_buffer_that_changes():
+    light = np.full(SIZE[::-1], 0.5, np.float32)
+    dvs = Dvs(load_sensor("ideal"), SIZE)
+    for k in range(4):
+        assert len(dvs.step(light, (k + 1) * 1_000_000)) == 0
+    light[3, 4] = 1.0
+    assert len(dvs.step(light, 5_000_000)) == 4
+    assert dvs.slept == (4 + 4 + 3, 16)
+
+
+def test_light_of_another_type_is_other_light():
+    light = np.full(SIZE[::-1], 0.5, np.float32)
+    skips, walks = (Dvs(load_sensor("ideal"), SIZE, skip=skip, transfer="linear") for skip in (True, False))
+    for k in range(12):
+        other = [light, light.view(np.uint8)[:, :96] + np.uint8(k // 6), light.astype(np.float64)][(k // 2) % 3]
+        ours, theirs = skips.step(other, (k + 1) * 1_000_000), walks.step(other, (k + 1) * 1_000_000)
+        assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.x, theirs.x)
+    assert_same_state(skips, walks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["intel_bottle-detection.mp4", "nasa_13013.mp4"])
+@pytest.mark.parametrize("sensor", ["ideal", "paper", "v2e-noisy"])
+def test_real_clips(name, sensor):
+    if not (VIDEOS / name).exists():
+        pytest.skip(f"needs {name} in ../shared/data/videos")
+    from vid2ev.sources import open_source
+
+    source = open_source(VIDEOS / name)
+    skips, walks = (Dvs(load_sensor(sensor), source.size, skip=skip) for skip in (True, False))
+    for frame, _ in zip(source.frames(), range(40), strict=False):
+        ours, theirs = skips.see(frame), walks.see(frame)
+        for column in ("t", "x", "y", "p"):
+            assert np.array_equal(getattr(ours, column), getattr(theirs, column))
+    assert_same_state(skips, walks)
