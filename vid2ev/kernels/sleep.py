@@ -52,6 +52,7 @@ AWAKE, NAPS, SLEEPS = range(3)
 HISTORY = 64  # intervals that can be made up for
 WEIGHTS = 5  # of an interval: x1, x2, g, a, b
 GLANCE = 67  # every so many pixels are compared first: light that changes mostly does so there
+PATIENCE = 3  # light that keeps changing is noted now, in the next frame, and then in every fourth
 SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
@@ -65,6 +66,8 @@ class Naps(NamedTuple):
     now: np.ndarray  # unsigned integers: the bits of the light [n]
     before: np.ndarray  # the bits of the light that each block saw last
     known: np.ndarray  # uint8: whether `before` has them
+    changes: np.ndarray  # uint8: how many times in a row the light was another
+    wait: np.ndarray  # uint8: frames until it is noted
     mended: np.ndarray  # uint8: whether there is something in them to be mended, and counted, each time
     state: np.ndarray  # uint8: AWAKE, NAPS or SLEEPS
     behind: np.ndarray  # int64: intervals that the lags have still to be stepped
@@ -106,18 +109,25 @@ def sleep(naps, index):
 
 @inner
 def keeps_light(naps, index, p0, n):
-    """Whether a block sees the bits that it saw last; if not, they are noted."""
+    """Whether a block sees the bits that it is known to have seen last; if not, they are noted now or some time later.
+
+    Where light changes again and again it is looked at less and less often.
+    """
     now, before = naps.now[p0 : p0 + n], naps.before[p0 : p0 + n]
     same = naps.known[index] != 0
-    for i in range(0, n, GLANCE):
-        same = same and now[i] == before[i]
-    if same and are_equal(now, before):
-        return True
-    for i in range(n):
-        before[i] = now[i]
-    naps.known[index] = 1
-    naps.mended[index] = 0
-    return False
+    if same:
+        for i in range(0, n, GLANCE):
+            same = same and now[i] == before[i]
+        same = same and are_equal(now, before)
+        naps.changes[index] = np.uint8(0 if same else min(naps.changes[index] + 1, PATIENCE))
+        naps.wait[index] = np.uint8((1 << naps.changes[index]) >> 1)
+    if not same:
+        naps.wait[index] -= np.uint8(naps.wait[index] > 0)
+        naps.known[index] = np.uint8(naps.wait[index] == 0)
+        if naps.wait[index] == 0:
+            for i in range(n):
+                before[i] = now[i]
+    return same
 
 
 @inner

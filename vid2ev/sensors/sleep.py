@@ -22,6 +22,8 @@ class Sleep:
             now=nothing,
             before=nothing,
             known=np.zeros(blocks, np.uint8),
+            changes=np.zeros(blocks, np.uint8),
+            wait=np.zeros(blocks, np.uint8),
             mended=np.zeros(blocks, np.uint8),
             state=np.full(blocks, AWAKE, np.uint8),
             behind=np.zeros(blocks, np.int64),
@@ -53,6 +55,7 @@ class Sleep:
     def forget(self) -> None:
         """Another state: all are awake, and nothing is known of the light that led to it."""
         self.naps.known[...] = 0
+        self.naps.wait[...] = 0
         self.naps.behind[...] = 0
         self.wake()
 

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""What it is worth to let still blocks of pixels sleep: `Dvs(skip=True)` against `skip=False`.
+
+    python examples/benchmark_skip.py                       a still mosaic in which a part of a strip moves
+    python examples/benchmark_skip.py --moving 0.2 --size 640x480
+    python examples/benchmark_skip.py --clip FILE           frames of a clip, as `vid2ev convert` sees them
+
+A block is 2048 pixels in row-major order: at 1280x720, one row and three fifths.  The strip is as high as makes the
+share `--moving` of them change in every frame; in `--width` of it photographs move by half a pixel a frame, 1 ms apart.
+
+Timed is `Dvs.step`, in CPU time of one thread, float32 frames in, arrays of events out.  Both ways see ten
+frames in turn, so that a slow minute of the machine hits both alike and neither empties the caches of the other; the
+table has medians over the frames but the first of ten, and the events of both are compared.
+"""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+from benchmark import mosaic
+
+from vid2ev.kernels.layout import BLOCK
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.presets import load_sensor
+from vid2ev.sources import open_source
+from vid2ev.stream import Events
+
+PRESETS = ("ideal", "v2e-clean", "paper", "v2e-noisy")
+FRAME_NS = 1_000_000
+TURN = 10  # frames; the first ones warm up
+
+
+def moving_strip(count: int, width: int, height: int, moving: float, part: float) -> tuple[np.ndarray, np.ndarray]:
+    """Light float32 [N, height, width], and the times [ns]."""
+    import cv2
+
+    texture = mosaic(height, 2 * width + count)
+    rows = max(1, round(moving * height))
+    first, across = (height - rows) // 2, round(part * width)
+    frames = np.repeat(texture[None, :, :width], count, axis=0)
+    for k in range(count):
+        shift = np.array([[1, 0, -0.5 * k - width], [0, 1, 0]], np.float32)
+        moved = cv2.warpAffine(texture[first : first + rows], shift, (across, rows), flags=cv2.INTER_LINEAR)
+        frames[k, first : first + rows, :across] = moved
+    return frames / np.float32(255), FRAME_NS * np.arange(1, count + 1)
+
+
+def clip_frames(clip: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first frames of a clip as light, and their times [ns]."""
+    frames = list(itertools.islice(open_source(clip).frames(), count))
+    return np.stack([frame.light for frame in frames]), np.array([frame.t_ns for frame in frames])
+
+
+def share_changed(frames: np.ndarray) -> float:
+    """The share of blocks that are not what they were in the frame before, to the bit."""
+    flat = frames.reshape(len(frames), -1).view(np.uint32)
+    starts = np.arange(0, flat.shape[1], BLOCK)
+    changed = [np.logical_or.reduceat(after != before, starts).mean() for before, after in itertools.pairwise(flat)]
+    return float(np.mean(changed))
+
+
+def measure(preset: str, frames: np.ndarray, t_ns: np.ndarray, settings: tuple[str, ...]) -> dict[str, float]:
+    """Medians of both ways [ns per pixel], what has slept, and how many events there are."""
+    size = (frames.shape[2], frames.shape[1])
+    spec = load_sensor(preset, settings)
+    sensors = {skip: Dvs(spec, size, skip=skip) for skip in (True, False)}
+    spent: dict[bool, list[float]] = {True: [], False: []}
+    events = 0
+    for first in range(0, len(frames), TURN):
+        sent: dict[bool, list[Events]] = {True: [], False: []}
+        for skip in (True, False) if first % (2 * TURN) else (False, True):
+            for k in range(first, min(first + TURN, len(frames))):
+                began = time.thread_time_ns()
+                sent[skip].append(sensors[skip].step(frames[k], int(t_ns[k])))
+                if first > 0 and k > first:
+                    spent[skip].append((time.thread_time_ns() - began) / frames[k].size)
+        ours, theirs = Events.concatenate(sent[True]), Events.concatenate(sent[False])
+        if not all(np.array_equal(getattr(ours, name), getattr(theirs, name)) for name in "txyp"):
+            raise click.ClickException(f"{preset}: other events with skip than without from frame {first} on")
+        events += len(ours)
+    slept, of = sensors[True].slept
+    skip_ns, walk_ns = statistics.median(spent[True]), statistics.median(spent[False])
+    return {"skip": skip_ns, "walk": walk_ns, "slept": slept / of, "events": events / frames.size}
+
+
+@click.command(help=__doc__.split("\n\n")[0] if __doc__ else None)
+@click.option("--preset", "presets", multiple=True, default=PRESETS, show_default=True)
+@click.option("--size", default="1280x720", show_default=True, metavar="WIDTHxHEIGHT")
+@click.option("--moving", type=click.FloatRange(0, 1), default=0.05, show_default=True, help="Share of blocks.")
+@click.option("--width", "part", type=click.FloatRange(0, 1), default=0.33, show_default=True, help="Of the strip.")
+@click.option("--count", type=click.IntRange(10), default=80, show_default=True, help="Frames.")
+@click.option("--clip", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Take its first frames.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the sensors.")
+def main(presets, size, moving, part, count, clip, settings) -> None:
+    width, height = (int(word) for word in size.split("x"))
+    frames, t_ns = clip_frames(clip, count) if clip else moving_strip(count, width, height, moving, part)
+    changed = share_changed(frames)
+    click.echo(
+        f"{frames.shape[2]}x{frames.shape[1]}, {len(frames)} frames, {100 * changed:.1f} % of the blocks change\n"
+    )
+    click.echo("| sensor | skip, ns / pixel | --no-skip, ns / pixel | ratio | slept | events / pixel / frame |")
+    click.echo("| --- | --: | --: | --: | --: | --: |")
+    for preset in presets:
+        row = measure(preset, frames, t_ns, settings)
+        ratio = row["walk"] / row["skip"]
+        numbers = f"{row['skip']:.2f} | {row['walk']:.2f} | {ratio:.2f} | {100 * row['slept']:.0f} %"
+        click.echo(f"| {preset} | {numbers} | {row['events']:.4f} |")
+
+
+if __name__ == "__main__":
+    main()
