@@ -25,6 +25,7 @@ F = np.float32
 _NOWHERE = np.zeros((0, 0), np.bool_)
 _SIXTH, _HALF, _ONE, _TWO, _ZERO = F(1 / 6), F(0.5), F(1), F(2), F(0)
 _TWO_THIRDS = F(2 / 3)
+_I, _II, _III = np.uintp(1), np.uintp(2), np.uintp(3)
 
 
 def sampled(
@@ -43,7 +44,7 @@ def sampled(
     out = np.empty((*x.shape, len(spline.pixels)), F)
 
     def sample(begin: int, end: int) -> None:
-        _sample(spline.weights, spline.lowest, spline.highest, x, y, begin, end, out)
+        _sample(spline.weights, spline.limits, x, y, begin, end, out)
         if near_cut.size:
             _sample_beside_cuts(spline.pixels, x, y, near_cut, inverse, F(steep), begin, end, out)
 
@@ -61,32 +62,45 @@ def pixel_means(fine: np.ndarray, samples: int) -> np.ndarray:
     return out
 
 
-@njit(nogil=True, error_model="numpy", inline="always")
-def _row(p, y, x, w0, w1, w2, w3):
-    return w0 * p[y, x] + w1 * p[y, x + np.uintp(1)] + w2 * p[y, x + np.uintp(2)] + w3 * p[y, x + np.uintp(3)]
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sample(weights, lowest, highest, x, y, begin, end, out):
-    channels, height, width = lowest.shape
-    x_last, y_last = F(width - 1), F(height - 1)
+def _sample(weights, limits, x, y, begin, end, out):
+    """Rows of places, each twice: once for where they are and for the weights of the splines there, once for light."""
+    channels, height, width, _ = limits.shape
+    step = np.uintp(width + 2 * MARGIN)
+    splines, allowed = weights.reshape(channels, -1), limits.reshape(channels, height * width, 2)
+    shares = np.empty((x.shape[1], 8), np.float32)
+    firsts, owns = np.empty(x.shape[1], np.uintp), np.empty(x.shape[1], np.uintp)
     for j in range(begin, end):
+        _place(x[j], y[j], width, height, shares, firsts, owns)
         for i in range(x.shape[1]):
-            across, down = min(max(x[j, i], _ZERO), x_last), min(max(y[j, i], _ZERO), y_last)
-            left, top = np.int32(across), np.int32(down)
-            a, b = across - F(left), down - F(top)
-            a1, b1 = _ONE - a, _ONE - b
-            x0, x3, y0, y3 = _SIXTH * a1 * a1 * a1, _SIXTH * a * a * a, _SIXTH * b1 * b1 * b1, _SIXTH * b * b * b
-            x1, y1 = _TWO_THIRDS - a * a * (_ONE - _HALF * a), _TWO_THIRDS - b * b * (_ONE - _HALF * b)
-            x2, y2 = _ONE - x0 - x1 - x3, _ONE - y0 - y1 - y3
-            own_x, own_y = np.uintp(left + (a >= _HALF)), np.uintp(top + (b >= _HALF))
-            column, row = np.uintp(left + (MARGIN - 1)), np.uintp(top + (MARGIN - 1))
-            second, third, fourth = row + np.uintp(1), row + np.uintp(2), row + np.uintp(3)
+            x0, x1, x2, x3 = shares[i, 0], shares[i, 1], shares[i, 2], shares[i, 3]
+            y0, y1, y2, y3 = shares[i, 4], shares[i, 5], shares[i, 6], shares[i, 7]
+            first, second, third, fourth = firsts[i], firsts[i] + step, firsts[i] + _II * step, firsts[i] + _III * step
             for c in range(channels):
-                p = weights[c]
-                light = y0 * _row(p, row, column, x0, x1, x2, x3) + y1 * _row(p, second, column, x0, x1, x2, x3)
-                light += y2 * _row(p, third, column, x0, x1, x2, x3) + y3 * _row(p, fourth, column, x0, x1, x2, x3)
-                out[j, i, c] = min(max(light, lowest[c, own_y, own_x]), highest[c, own_y, own_x])
+                p = splines[c]  # (columns first: the four of them become one vector)
+                v0 = y0 * p[first] + y1 * p[second] + (y2 * p[third] + y3 * p[fourth])
+                v1 = y0 * p[first + _I] + y1 * p[second + _I] + (y2 * p[third + _I] + y3 * p[fourth + _I])
+                v2 = y0 * p[first + _II] + y1 * p[second + _II] + (y2 * p[third + _II] + y3 * p[fourth + _II])
+                v3 = y0 * p[first + _III] + y1 * p[second + _III] + (y2 * p[third + _III] + y3 * p[fourth + _III])
+                light = (x0 * v0 + x1 * v1) + (x2 * v2 + x3 * v3)
+                out[j, i, c] = min(max(light, allowed[c, owns[i], 0]), allowed[c, owns[i], 1])
+
+
+@njit(nogil=True, error_model="numpy", inline="always")
+def _place(x, y, width, height, shares, firsts, owns):
+    """A row of places: the weights of four columns and four rows, the first of these sixteen, and the nearest pixel."""
+    x_last, y_last = F(width - 1), F(height - 1)
+    for i in range(len(x)):
+        across, down = min(max(x[i], _ZERO), x_last), min(max(y[i], _ZERO), y_last)
+        left, top = np.int32(across), np.int32(down)
+        a, b = across - F(left), down - F(top)
+        a1, b1 = _ONE - a, _ONE - b
+        x0, x3, y0, y3 = _SIXTH * a1 * a1 * a1, _SIXTH * a * a * a, _SIXTH * b1 * b1 * b1, _SIXTH * b * b * b
+        x1, y1 = _TWO_THIRDS - a * a * (_ONE - _HALF * a), _TWO_THIRDS - b * b * (_ONE - _HALF * b)
+        shares[i, 0], shares[i, 1], shares[i, 2], shares[i, 3] = x0, x1, _ONE - x0 - x1 - x3, x3
+        shares[i, 4], shares[i, 5], shares[i, 6], shares[i, 7] = y0, y1, _ONE - y0 - y1 - y3, y3
+        firsts[i] = (top + (MARGIN - 1)) * (width + 2 * MARGIN) + left + (MARGIN - 1)
+        owns[i] = (top + (b >= _HALF)) * width + left + (a >= _HALF)
 
 
 @njit(nogil=True, error_model="numpy", inline="always")

@@ -34,7 +34,7 @@ POLE = F(math.sqrt(3) - 2)
 BRIGHTEST = 65504.0
 HORIZON = 16  # pixels after which the filter has forgotten: |POLE| ** 16 < 1e-9
 MARGIN = 2  # px around the weights, so that sampling needs no conditions
-_QUARTER, _HALF, _ONE, _ZERO = F(0.25), F(0.5), F(1), F(0)
+_QUARTER, _HALF, _ONE, _SIX, _ZERO = F(0.25), F(0.5), F(1), F(6), F(0)
 
 
 class Spline:
@@ -42,38 +42,51 @@ class Spline:
 
     pixels            [C, H, W] float32
     weights           [C, H + 2 MARGIN, W + 2 MARGIN], mirrored at the border
-    lowest, highest   [C, H, W] the least and the most light that a place nearest to a pixel may have
+    limits            [C, H, W, 2] the least and the most light that a place nearest to a pixel may have
     """
 
     def __init__(self, light: np.ndarray, bands: Bands):
         channels = 1 if light.ndim == 2 else light.shape[2]
         height, width = light.shape[:2]
         self._bands = bands
-        self.pixels, self.lowest, self.highest = (np.empty((channels, height, width), F) for _ in range(3))
+        self.pixels, self.limits = np.empty((channels, height, width), F), np.empty((channels, height, width, 2), F)
         self.weights = np.empty((channels, height + 2 * MARGIN, width + 2 * MARGIN), F)
         self.fit(light)
 
     def fit(self, light: np.ndarray) -> None:
         """Become the spline of another picture of the same size, in the same memory."""
-        channels, height, width = self.pixels.shape
-        for c in range(channels):  # (one after the other, since one fits into the processor's cache)
-            self.pixels[c] = light if light.ndim == 2 else light[..., c]
-            if not np.isfinite(self.pixels[c]).all():
-                np.nan_to_num(self.pixels[c], copy=False, nan=0, posinf=BRIGHTEST, neginf=-BRIGHTEST)
-            self._bands.run(width, self._filter_down, c)
-            self._bands.run(height, self._filter_across, c)
-            self._bands.run(height, _limits, self.pixels[c], self.lowest[c], self.highest[c])
+        _, height, width = self.pixels.shape
+        self._bands.run(height, _planes, np.asarray(light, F).reshape(height, width, -1), self.pixels)
+        self._bands.run(width, self._filter_down)
+        self._bands.run(height, self._filter_across)
         for k in range(1, MARGIN + 1):
             self.weights[:, MARGIN - k] = self.weights[:, MARGIN + min(k, height - 1)]
             self.weights[:, height + MARGIN - 1 + k] = self.weights[:, MARGIN + max(height - 1 - k, 0)]
 
-    def _filter_down(self, begin: int, end: int, channel: int) -> None:
-        inside = self.weights[channel, MARGIN:-MARGIN, MARGIN + begin : MARGIN + end]
-        inside[:] = self.pixels[channel, :, begin:end]
-        _filter(inside)
+    def _filter_down(self, begin: int, end: int) -> None:
+        for pixels, weights in zip(self.pixels, self.weights, strict=True):
+            inside = weights[MARGIN:-MARGIN, MARGIN + begin : MARGIN + end]
+            inside[:] = pixels[:, begin:end]
+            _filter(inside)
 
-    def _filter_across(self, begin: int, end: int, channel: int) -> None:
-        _filter_rows(self.weights[channel, MARGIN + begin : MARGIN + end])
+    def _filter_across(self, begin: int, end: int) -> None:
+        for pixels, weights, limits in zip(self.pixels, self.weights, self.limits, strict=True):
+            _filter_rows(weights[MARGIN + begin : MARGIN + end])
+            _limits(begin, end, pixels, limits)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _planes(begin, end, light, pixels):
+    """Colour by colour, and each a number."""
+    brightest = F(BRIGHTEST)
+    for c in range(light.shape[2]):
+        for j in range(begin, end):
+            for i in range(light.shape[1]):
+                value = light[j, i, c]
+                if np.isfinite(value):
+                    pixels[c, j, i] = value
+                else:
+                    pixels[c, j, i] = brightest if value > _ZERO else -brightest if value < _ZERO else _ZERO
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -90,11 +103,12 @@ def _filter(c):
         for i in range(m):
             first[i] += power * row[i]
         power *= POLE
-    c[0] = first
+    for i in range(m):
+        c[0, i] = _SIX * first[i]
     for k in range(1, n):
         here, above = c[k], c[k - 1]
         for i in range(m):
-            here[i] += POLE * above[i]
+            here[i] = _SIX * here[i] + POLE * above[i]
     here, above = c[n - 1], c[n - 2]
     for i in range(m):
         here[i] = scale * (here[i] + POLE * above[i])
@@ -102,33 +116,31 @@ def _filter(c):
         here, below = c[k], c[k + 1]
         for i in range(m):
             here[i] = POLE * (below[i] - here[i])
-    for k in range(n):
-        here = c[k]
-        for i in range(m):
-            here[i] *= F(6)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _filter_rows(c):
     """The same along rows with margins, eight at a time lest the processor wait for each step; margins mirrored."""
-    n = c.shape[1] - 2 * MARGIN
+    n, last = c.shape[1] - 2 * MARGIN, c.shape[0] - 1
     block = np.empty((n, 8), np.float32)
-    for row in range(0, c.shape[0], 8):
-        count = min(8, c.shape[0] - row)
-        for j in range(count):
-            for i in range(n):
-                block[i, j] = c[row + j, i + MARGIN]
+    for row in range(0, last + 1, 8):  # (eight names, since a loop over them is not unrolled; the last may come again)
+        r0, r1, r2, r3 = c[row], c[min(row + 1, last)], c[min(row + 2, last)], c[min(row + 3, last)]
+        r4, r5, r6, r7 = (c[min(row + 4, last)], c[min(row + 5, last)], c[min(row + 6, last)], c[min(row + 7, last)])
+        for i in range(n):
+            b, k = block[i], i + MARGIN
+            b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7] = r0[k], r1[k], r2[k], r3[k], r4[k], r5[k], r6[k], r7[k]
         _filter(block)
-        for j in range(count):
-            for i in range(n):
-                c[row + j, i + MARGIN] = block[i, j]
-            for i in range(1, MARGIN + 1):
-                c[row + j, MARGIN - i] = block[min(i, n - 1), j]
-                c[row + j, n + MARGIN - 1 + i] = block[max(n - 1 - i, 0), j]
+        for i in range(n):
+            b, k = block[i], i + MARGIN
+            r0[k], r1[k], r2[k], r3[k], r4[k], r5[k], r6[k], r7[k] = b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]
+    for j in range(last + 1):
+        for i in range(1, MARGIN + 1):
+            c[j, MARGIN - i] = c[j, MARGIN + min(i, n - 1)]
+            c[j, n + MARGIN - 1 + i] = c[j, MARGIN + max(n - 1 - i, 0)]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _limits(begin, end, pixels, lowest, highest):
+def _limits(begin, end, pixels, limits):
     """How low and how high the light nearest to each pixel may be."""
     height, width = pixels.shape
     low, high = np.empty(width, np.float32), np.empty(width, np.float32)
@@ -142,5 +154,5 @@ def _limits(begin, end, pixels, lowest, highest):
             dark = min(min(low[left], low[i]), low[right])
             bright = max(max(high[left], high[i]), high[right])
             room = _HALF * (bright - dark)
-            lowest[j, i] = max(dark - room, _QUARTER * dark) if dark >= _ZERO else dark - room
-            highest[j, i] = bright + room
+            limits[j, i, 0] = max(dark - room, _QUARTER * dark) if dark >= _ZERO else dark - room
+            limits[j, i, 1] = bright + room
