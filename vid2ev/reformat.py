@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named, open_events, survey
 from vid2ev.formats.event_file import Format, Recording
-from vid2ev.recording.disk import sync
+from vid2ev.recording.disk import sync, writing
 from vid2ev.stream.events import Events
 from vid2ev.views.window import beginning_us, window
 
@@ -97,22 +97,18 @@ def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) ->
     assert kind.write is not None
     beside = target.with_name(f".{target.name}.new")
     try:
-        shutil.rmtree(beside, ignore_errors=True)
-        beside.mkdir(parents=True)
-        kind.write(beside / target.name, recording)
-        made = sorted(beside.iterdir())
-        taken = [path.name for path in made if (target.parent / path.name).exists()]
-        if taken and not overwrite:
-            raise UsageError(f"{target.parent / taken[0]} exists; --overwrite replaces it")
-        for path in made:
-            sync(path)
-        places = [path.replace(target.parent / path.name) for path in made]
-        sync(target.absolute().parent)
-    except OSError as error:
-        if isinstance(error, DataError):
-            raise
-        reason = error.strerror or str(error)
-        raise DataError(f"{target} cannot be written: {reason}; make room or access there") from error
+        with writing(target):
+            shutil.rmtree(beside, ignore_errors=True)
+            beside.mkdir(parents=True)
+            kind.write(beside / target.name, recording)
+            made = sorted(beside.iterdir())
+            taken = [path.name for path in made if (target.parent / path.name).exists()]
+            if taken and not overwrite:
+                raise UsageError(f"{target.parent / taken[0]} exists; --overwrite replaces it")
+            for path in made:
+                sync(path)
+            places = [path.replace(target.parent / path.name) for path in made]
+            sync(target.absolute().parent)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
     return places

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.compare.comparison import Comparison
-from vid2ev.errors import DataError
-from vid2ev.recording.disk import whole_file
+from vid2ev.recording.disk import whole_file, writing
 
 BARS = 101  # of the distribution of timing errors; odd, so that one of them is of the pairs without error
 
@@ -23,14 +22,10 @@ def plot(comparison: Comparison, picture: Path) -> None:
     _draw_map(figure, panels["map"], comparison)
     _draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
-    try:
+    with writing(picture):
         picture.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(picture) as file:
             figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
-    except OSError as error:
-        picture.with_name(f"{picture.name}.new").unlink(missing_ok=True)
-        reason = error.strerror or str(error)
-        raise DataError(f"{picture} cannot be written: {reason}; make room or access there") from error
 
 
 def _draw_map(figure: Any, axes: Any, comparison: Comparison) -> None:

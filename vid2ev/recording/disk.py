@@ -1,17 +1,18 @@
-"""Files that survive: written as a whole, brought to the disk, held by one process."""
+"""Files and folders that survive: written as a whole, brought to the disk, held by one process."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 
 
 def lock(folder: Path) -> int:
@@ -33,12 +34,52 @@ def lock(folder: Path) -> int:
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
     """A file to write that is there as a whole or not at all, whenever the process or the machine stops."""
     beside = path.with_name(f"{path.name}.new")
-    with open(beside, "wb") as file:
-        yield file
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    try:
+        with open(beside, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+    except BaseException:
+        _remove(beside)
+        raise
     sync(path.parent)
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A path for a new file or folder, which takes the place of `path` at the end; what goes wrong changes nothing.
+
+    Raises UsageError if another process is at it.
+    """
+    aside = path.with_name(f"{path.name}.new")
+    made, replaced = aside / path.name, aside / "replaced"
+    aside.mkdir(parents=True, exist_ok=True)
+    handle = lock(aside)
+    try:
+        _remove(made)
+        yield made
+        for file in [*made.rglob("*"), made]:
+            sync(file)
+        _exchange(made, path, replaced)
+        sync(path.absolute().parent)
+    finally:
+        for rest in (made, replaced, aside / "lock"):
+            _remove(rest)
+        os.close(handle)
+        with suppress(OSError):
+            aside.rmdir()
+
+
+@contextmanager
+def writing(path: Path, remedy: str = "make room or access there") -> Iterator[None]:
+    """What goes wrong with the disk within becomes one sentence: DataError, with the remedy."""
+    try:
+        yield
+    except (DataError, UsageError):
+        raise
+    except OSError as error:
+        raise DataError(f"{path} cannot be written: {error.strerror or error}; {remedy}") from error
 
 
 def sync(path: Path) -> None:
@@ -60,3 +101,23 @@ def write_npz(path: Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
             entry.compress_type = zipfile.ZIP_DEFLATED
             with archive.open(entry, "w") as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
+
+
+def _exchange(made: Path, path: Path, replaced: Path) -> None:
+    if not path.is_dir():
+        made.replace(path)
+        return
+    path.rename(replaced)
+    try:
+        made.rename(path)
+    except OSError:
+        replaced.rename(path)
+        raise
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)

@@ -20,16 +20,16 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, sync, whole_file
+from vid2ev.errors import UsageError
+from vid2ev.recording.disk import lock, sync, whole_file, writing
 from vid2ev.recording.manifest import difference, read_manifest
 
 FILES = re.compile(  # what a recording holds, and nothing else
@@ -142,19 +142,9 @@ class Folder:
         self.whole.rename(self.directory)
         (self.partial / "checkpoint.npz").unlink(missing_ok=True)
 
-    @contextmanager
-    def writing(self) -> Iterator[None]:
+    def writing(self) -> AbstractContextManager[None]:
         """What goes wrong with the disk within becomes one sentence."""
-        try:
-            yield
-        except (DataError, UsageError):
-            raise
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise DataError(
-                f"{self.directory} cannot be written: {reason}; make room or access there, or choose another folder"
-                " with -o"
-            ) from error
+        return writing(self.directory, "make room or access there, or choose another folder with -o")
 
     def _begin(self) -> None:
         """Take up the checkpoint, find the recording finished, or start."""

@@ -25,7 +25,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import DataError, UsageError, clause, nearest
-from vid2ev.recording.disk import whole_file
+from vid2ev.recording.disk import whole_file, writing
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.toml_text import toml_value
 
@@ -80,11 +80,8 @@ def write_text(path: Path, text: str, overwrite: bool = False) -> None:
     if path.is_dir() or (path.exists() and not overwrite):
         remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
         raise UsageError(f"{path} exists; {remedy}")
-    try:
-        with whole_file(path) as file:
-            file.write(text.encode())
-    except OSError as error:
-        raise DataError(f"{path} cannot be written: {error.strerror}; choose another place") from error
+    with writing(path, "choose another place"), whole_file(path) as file:
+        file.write(text.encode())
 
 
 def read_text(path: Path) -> str:

@@ -7,16 +7,14 @@ NAME/        what a camera of the scene's rig saw, likewise
 
 from __future__ import annotations
 
-import os
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
-from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, sync
+from vid2ev.errors import UsageError
+from vid2ev.recording.disk import whole, writing
 from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
 from vid2ev.scenes.source import SceneSource
 from vid2ev.toml_text import toml_text
@@ -44,9 +42,10 @@ def write_scene(
     text = f"{said}\n\n{toml_text(source.world.scene.tables())}"
     if _is_made(directory, text, overwrite, resume):
         return False
-    with _new_folder(directory) as partial:
-        (partial / "scene.toml").write_text(text, encoding="utf-8")
-        _write_all(partial, source, contents, report)
+    with writing(directory, "make room or access there, or use -o"), whole(directory) as made:
+        made.mkdir()
+        (made / "scene.toml").write_text(text, encoding="utf-8")
+        _write_all(made, source, contents, report)
     return True
 
 
@@ -63,36 +62,6 @@ def _is_made(directory: Path, text: str, overwrite: bool, resume: bool) -> bool:
     if made.read_text(encoding="utf-8") != text:
         raise UsageError(f"{directory} was made with other options; --overwrite replaces it, -o chooses another folder")
     return True
-
-
-@contextmanager
-def _new_folder(directory: Path) -> Iterator[Path]:
-    """A folder that takes its place when it is whole, and leaves nothing otherwise."""
-    partial, replaced = (directory.with_name(f"{directory.name}.{what}") for what in ("partial", "replaced"))
-    try:
-        partial.mkdir(parents=True, exist_ok=True)
-        handle = lock(partial)
-        try:
-            for path in partial.iterdir():
-                if path.name != "lock":
-                    shutil.rmtree(path) if path.is_dir() else path.unlink()
-            yield partial
-            (partial / "lock").unlink()
-            sync(partial)
-            if directory.exists():
-                directory.rename(replaced)
-            partial.rename(directory)
-            shutil.rmtree(replaced, ignore_errors=True)
-        except BaseException:
-            shutil.rmtree(partial, ignore_errors=True)
-            raise
-        finally:
-            os.close(handle)
-    except (DataError, UsageError):
-        raise
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise DataError(f"{directory} cannot be written: {reason}; make room or access there, or use -o") from error
 
 
 def _write_all(folder: Path, source: SceneSource, contents: Contents, report: Report | None) -> None:

@@ -16,10 +16,8 @@ All three are made in memory that does not grow with the recording.  The same re
 from __future__ import annotations
 
 import csv
-import shutil
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import TextIO
@@ -28,7 +26,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.formats.event_file import Recording
-from vid2ev.recording.disk import sync
+from vid2ev.recording.disk import whole
 from vid2ev.views.representation import Slice, represent, slices_of
 from vid2ev.views.requests import parse_representation, parse_slicing
 
@@ -121,46 +119,6 @@ def write_film(path: Path, pictures: Pictures, fps: Fraction | int) -> int:
     from vid2ev.pictures import film
 
     return film.write_film(path, (picture for _, picture in pictures), fps)
-
-
-@contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A path for a new file or folder, which takes the place of `path` at the end; what goes wrong changes nothing."""
-    aside = path.with_name(f"{path.name}.new")
-    made, replaced = aside / path.name, aside / "replaced"
-    aside.mkdir(exist_ok=True)
-    try:
-        _remove(made)
-        yield made
-        for file in [*made.iterdir(), made] if made.is_dir() else [made]:
-            sync(file)
-        _exchange(made, path, replaced)
-        sync(path.absolute().parent)
-    finally:
-        _remove(made)
-        _remove(replaced)
-        with suppress(OSError):
-            aside.rmdir()
-
-
-def _exchange(made: Path, path: Path, replaced: Path) -> None:
-    if not path.is_dir():
-        made.replace(path)
-        return
-    path.rename(replaced)
-    try:
-        made.rename(path)
-    except OSError:
-        replaced.rename(path)
-        raise
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
 
 
 def _write_npz(

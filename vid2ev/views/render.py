@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import UsageError
 from vid2ev.formats import open_events
 from vid2ev.formats.event_file import EventFile, Recording
+from vid2ev.recording.disk import whole, writing
 from vid2ev.views.canvas import Canvas
 from vid2ev.views.destination import check_free, kind_of
-from vid2ev.views.on_disk import FPS, whole, write_film, write_picture, write_pictures
+from vid2ev.views.on_disk import FPS, write_film, write_picture, write_pictures
 from vid2ev.views.representation import Kind, Slice, represent
 from vid2ev.views.requests import parse_representation, parse_slicing
 from vid2ev.views.slices import Duration, Slicing, Source
@@ -167,23 +168,14 @@ def _end(stop_s: float | None) -> str:
 
 def _write(output: Path, canvas: Canvas, arrays: Drawn, done: _Done, fps: Fraction) -> dict[str, Any]:
     """Draw the slices and put them where they go."""
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        with whole(output) as beside:
-            if kind_of(output) == "png":
-                part, picture = _densest(canvas, arrays, done)
-                write_picture(beside, picture)
-                return done.facts(1, part)
-            drawn = _drawn(canvas, arrays, done)
-            film = kind_of(output) == "mp4"
-            return done.facts(write_film(beside, drawn, fps) if film else write_pictures(beside, drawn))
-    except (DataError, UsageError):
-        raise
-    except OSError as error:
-        raise DataError(
-            f"{output} cannot be written: {error.strerror or error}; make room or access there, or choose another place"
-            " with -o"
-        ) from error
+    with writing(output, "make room or access there, or choose another place with -o"), whole(output) as beside:
+        if kind_of(output) == "png":
+            part, picture = _densest(canvas, arrays, done)
+            write_picture(beside, picture)
+            return done.facts(1, part)
+        drawn = _drawn(canvas, arrays, done)
+        film = kind_of(output) == "mp4"
+        return done.facts(write_film(beside, drawn, fps) if film else write_pictures(beside, drawn))
 
 
 def _drawn(canvas: Canvas, arrays: Drawn, done: _Done) -> Drawn:

@@ -18,7 +18,8 @@ from time import monotonic
 from types import TracebackType
 from typing import Self
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import UsageError
+from vid2ev.recording.disk import writing
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.blender.answer import openexr_module, read_answers
@@ -65,13 +66,8 @@ class Cycles:
 
         Raises UsageError for a lens with distortion, DataError if Blender fails or the folder cannot be written.
         """
-        try:
+        with writing(self._folder):
             request = self._made().request(snapshot, intrinsics, pose)
-        except (DataError, UsageError):
-            raise
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise DataError(f"{self._folder} cannot be written: {reason}; make room or access there") from error
         if not all(answer.exists() for answer in request.answers):
             blender, began_s = self._running(), monotonic()
             blender.ask(request.path)
