@@ -37,8 +37,9 @@ INTERVALS_AHEAD = 2  # whose motion is known in advance
 class Instant:
     """What the cameras see at one instant of the source's clock: a frame for each, on its own clock.
 
-    `original` and `cut` are those of the source's frame.  `limited` is the number of source intervals so far that hit
-    `max_subframes`; `truth` is that of each camera, where it is due.
+    `original` and `cut` are those of the source's frame, and `depth` [m], where it has some.  `limited` is the number
+    of source intervals so far that hit `max_subframes`, `shift_px` how far things move in the interval that the instant
+    is of, where that was looked at; `truth` is that of each camera, where it is due.
     """
 
     frames: tuple[Frame, ...]
@@ -47,6 +48,8 @@ class Instant:
     cut: bool = False
     limited: int = 0
     truth: tuple[Truth, ...] = ()
+    shift_px: float | None = None
+    depth: np.ndarray | None = None
 
 
 def instants(recipe: Recipe, start: int = 0) -> Generator[Instant]:
@@ -92,7 +95,7 @@ def _instants(recipe: Recipe, start: int) -> Generator[Instant]:
         return (yield from _rendered(recipe, start))
     wanted, before_ns = recipe.truth, None
     with closing(_light(recipe, start) if sight.free else ahead(_light(recipe, start), FRAMES_AHEAD)) as light:
-        for frame, limited in light:
+        for frame, limited, shift_px in light:
             views, truth = sight.views(frame), tuple[Truth, ...]()
             if wanted and frame.original:
                 if wanted.due(before_ns, frame.t_ns):
@@ -100,7 +103,7 @@ def _instants(recipe: Recipe, start: int) -> Generator[Instant]:
                     truth = wanted.of_views(frame, recipe.rig.source, recipe.plane_m, recipe.mounts, masks)
                 before_ns = frame.t_ns
             frames = arriving(frame, [view.light for view in views], recipe.mounts, recipe.bayer)
-            yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth)
+            yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth, shift_px, frame.depth)
 
 
 def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
@@ -115,14 +118,15 @@ def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
         yield Instant(arriving(Frame(lights[0], t_ns), lights, recipe.mounts, recipe.bayer), t_ns, truth=truth)
 
 
-def _light(recipe: Recipe, start: int) -> Generator[tuple[Frame, int]]:
-    """The frames of the source and those in between, each with the number of intervals so far that hit a limit."""
+def _light(recipe: Recipe, start: int) -> Generator[tuple[Frame, int, float | None]]:
+    """The frames of the source and those in between, each with the number of intervals so far that hit a limit, and how
+    far things move in its interval [px]."""
     limited = 0
     with closing(ahead(_intervals(recipe, start), INTERVALS_AHEAD)) as intervals:
         for interval in intervals:
             limited += interval.limited
             for frame in interval:
-                yield frame, limited
+                yield frame, limited, interval.shift_px
 
 
 def _intervals(recipe: Recipe, start: int) -> Generator[Interval]:

@@ -1,4 +1,4 @@
-"""`vid2ev plan`: which effects of a sensor a clip calls for."""
+"""`vid2ev plan`: which effects of its cameras a clip calls for."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from vid2ev.commands.source_options import source_options
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor.")
 @click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's.")
 @click.option("--depth", metavar="DEPTH", help="How far the scene is, for cameras that stand elsewhere.")
+@click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, as for convert.")
+@click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras, as for convert.")
 @click.option(
     "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
     help="Light between the frames: what is measured is what the sensor would see.",
@@ -28,14 +30,16 @@ from vid2ev.commands.source_options import source_options
 )
 @click.option(
     "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",
-    help="How far the events may be from those of all effects, as a distance.",
+    help="How far events and frames may be from those of all effects, as a distance.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: Any) -> None:
     """Measure SOURCE and say of each effect of the sensor what leaving it out would change, what that costs, and
-    whether `convert --effects auto` would keep it.
+    whether `convert --effects auto` would keep it; of a rig, for each camera, with the views and sub-frames.
 
-    The distance is van Rossum's at 1 ms: 0 for the same events, 1 for nothing in common.  Nothing is converted.
+    The distance of events is van Rossum's at 1 ms: 0 for the same, 1 for nothing in common.  That of frames is the
+    square of the greatest change of a level, as a share of what rounding to codes changes: 0.01 is 0.029 LSB.  Nothing
+    is converted.
     """
     from vid2ev.plan.recordings import described, plans_of
     from vid2ev.recipe import Recipe

@@ -9,6 +9,9 @@
 this is.  Seen in codes the shot noise has variance K x signal, with the gain K = 65535 / (white_e slope) [LSB per
 electron].  Every draw is that of (seed, camera, pixel, exposure).
 
+What leaving it out changes: levels by K (n - mu), Poisson's (Bernstein's inequality has its tails), by K times what
+the well does not hold, and by K read_noise_e z.
+
 Poisson numbers come from the inverse of their distribution: added up to a mean of 12, above it the expansion
 
     n = floor(mu + sqrt(mu) z + (2 + z^2)/6 - (z + z^3/2)/(36 sqrt(mu)))
@@ -22,12 +25,25 @@ expansion.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.adc import WHITE
 from vid2ev.physics.elementary import exp64
+from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.random import normal_pair
+from vid2ev.stream.exposed import (
+    Change,
+    Exposed,
+    LevelChange,
+    level_change,
+    normal_most,
+    poisson_most,
+    surely_square,
+)
 
 FEW = 12.0  # electrons up to which probabilities are added up
 MOST = 200.0  # of FEW on average: what rounding leaves of a probability must not be searched for ever
@@ -74,3 +90,55 @@ def shoot(electrons, high, low):
     for i in range(electrons.size):
         if electrons[i] <= 0.0:
             electrons[i] = poisson_few(-electrons[i], high[i], low[i])
+
+
+def lsb_per_electron(spec: Any) -> float:
+    """K, the codes of an electron."""
+    return WHITE / (spec.white_e * spec.slope)
+
+
+def omission_of_shot_noise(seen: Exposed, spec: Any) -> LevelChange:
+    """The shot noise: electrons are then their mean number."""
+    levels = _shot_e(seen, spec).times(lsb_per_electron(spec))
+    why = f"the brightest light is {_electrons(seen.light_max, spec):.3g} electrons"
+    return level_change(levels, "99.9 % bound", why)
+
+
+def omission_of_full_well(seen: Exposed, spec: Any) -> LevelChange:
+    """The full well w; `changes` has what of the light it does not hold.
+
+    With shot noise (n - w)+ <= (mu - w)+ + |n - mu|, and it is 0 but for the share of values that are near w.
+    """
+    beyond = seen.changes["full_well"].times(spec.white_e * spec.exposure_gain)
+    electrons = _electrons(seen.light_max, spec)
+    if spec.shot_noise and beyond.near > 0:
+        reach = poisson_most(electrons, seen.draws)
+        shot = surely_square(electrons * beyond.near, reach, seen.draws)
+        beyond = Change(max(electrons + reach - spec.full_well_e, 0.0), (beyond.rms + shot.rms) ** 2)
+    kind = "99.9 % bound" if spec.shot_noise else "bound"
+    why = f"the brightest light is {electrons:.3g} electrons, the well holds {spec.full_well_e:g}"
+    return level_change(beyond.times(lsb_per_electron(spec)), kind, why)
+
+
+def omission_of_read_noise(seen: Exposed, spec: Any) -> LevelChange:
+    """The read noise."""
+    sigma = spec.read_noise_e * lsb_per_electron(spec)
+    levels = surely_square(sigma**2, sigma * normal_most(seen.draws), seen.draws)
+    return level_change(levels, "99.9 % bound", f"{spec.read_noise_e:g} electrons, whatever the light")
+
+
+def near_full_well(spec: Any) -> float:
+    """The light from which shot noise may fill the well: in no more than one of 10^15 values that are darker."""
+    room = poisson_most(spec.full_well_e, 10**15) if spec.shot_noise else 0.0
+    return max(spec.full_well_e - room, 0.0) / (spec.white_e * spec.exposure_gain * greatest_gain(spec))
+
+
+def _electrons(light: float, spec: Any) -> float:
+    """The mean number of electrons of light in the most sensitive pixel."""
+    return light * spec.white_e * spec.exposure_gain * greatest_gain(spec)
+
+
+def _shot_e(seen: Exposed, spec: Any) -> Change:
+    """n - mu [electrons], 99.9 %; the variance of Poisson's is its mean."""
+    most = poisson_most(_electrons(seen.light_max, spec), seen.draws)
+    return surely_square(_electrons(seen.light_mean, spec), most, seen.draws)

@@ -7,16 +7,23 @@ non-uniformity `dsnu` a number of electrons (`electrons.py` has their scale).  z
 1 / prnu, so that no pixel answers light with its opposite and the mean stays.  Defective rows and columns are not
 simulated.
 
+What leaving it out changes: a level of mean light L by lsb L prnu z + K dsnu z' with the codes `lsb` of light 1.0
+and K of an electron; at most 4 standard deviations.
+
 Source: EMVA Standard 1288, release 4.0 (linear), section 4: PRNU and DSNU of a Gaussian sensor.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.adc import WHITE, lsb_per_light
 from vid2ev.physics.random import FIXED_PATTERN, normal_pair, philox
+from vid2ev.stream.exposed import Exposed, LevelChange, level_change, normal_most, surely_square
 
 LIMIT = 4.0  # standard deviations
 
@@ -39,3 +46,18 @@ def fixed_pattern(n, seed, camera, prnu, dsnu):
         gain[pixel] = np.float32(1.0 + prnu * min(max(z, -limit), limit))
         dark[pixel] = np.float32(dsnu * min(max(other, -LIMIT), LIMIT))
     return gain, dark
+
+
+def greatest_gain(spec: Any) -> float:
+    """The most that a pixel is more sensitive than the mean."""
+    return 1.0 + min(LIMIT * spec.prnu, 1.0)
+
+
+def omission(seen: Exposed, spec: Any) -> LevelChange:
+    """The fixed pattern: one draw for each value of an exposure."""
+    lsb, lsb_per_e = lsb_per_light(spec), WHITE / (spec.white_e * spec.slope)
+    reach = min(normal_most(2 * seen.values), LIMIT)
+    gain, dark = lsb * spec.prnu, lsb_per_e * spec.dsnu
+    square = gain**2 * seen.light_square + dark**2
+    levels = surely_square(square, reach * (gain * seen.light_max + dark), seen.values if seen.exposures else 0)
+    return level_change(levels, "99.9 % bound", f"{100 * spec.prnu:g} % of the light, {spec.dsnu:g} electrons")

@@ -6,6 +6,8 @@ What leaving it out changes: on ln(light + dark) nothing but
 
     h = ln((light + dark) / (gain light + dark)),   from its least to its greatest in the range of light of a pixel
 
+On a frame camera: light by (1 - gain), which is looked at in every value of every exposure.
+
 Source: the paper, section II.A: a polynomial of the distance from the centre relative to the frame's width.
 """
 
@@ -16,7 +18,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.comparator import echoes, obstacle
+from vid2ev.physics.fixed_pattern import greatest_gain
+from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 from vid2ev.stream.scene import Omission, Scene, off_by, surely
 
 
@@ -33,6 +38,12 @@ def shading_map(coefficients: tuple[float, ...], width: int, height: int) -> np.
     r = np.hypot(x[None, :], y[:, None]) / width
     gain = np.polynomial.polynomial.polyval(r, (1.0, *coefficients))
     return np.maximum(gain, 0.0).astype(np.float32)
+
+
+def omission_of_levels(seen: Exposed, spec: Any) -> LevelChange:
+    """The shading of a frame camera."""
+    levels = seen.changes["shading"].times(lsb_per_light(spec) * greatest_gain(spec))
+    return level_change(levels, "bound", "light is dimmer towards the corners")
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

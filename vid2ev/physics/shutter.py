@@ -19,6 +19,13 @@ stays at L_0 and steps to L_1 at t_1, so m = 0, and an instant at t_1 itself see
 It is the *mean* of the light, so a longer exposure blurs more but is no brighter: `exposure_gain` says how bright, as a
 photographer who halves the time opens the aperture.
 
+With `blur` off a row sees the light in the middle of its window instead of the mean, a_y + T/2: what is left of an
+exposure where nothing changes in it, or changes along a straight line.  A window with a bend of r per second at the
+distance d from its middle differs by r (T/2 - |d|)^2 / (2 T).
+
+What leaving it out changes, exposure and rows apart, is looked at in every value of every exposure, as it takes no more
+than the exposures themselves; without the rows apart all open with the first one.
+
 Sources: the paper, section II.A (exposure and line readout time apart); windows of rolling shutters as in Liang, Chang,
 Chen, "Analysis and compensation of rolling shutter effect", IEEE Trans. Image Processing 17(8), 2008.
 """
@@ -26,9 +33,14 @@ Chen, "Analysis and compensation of rolling shutter effect", IEEE Trans. Image P
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, Field
+
+from vid2ev.physics.adc import lsb_per_light
+from vid2ev.physics.fixed_pattern import greatest_gain
+from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 
 
 class Shutter(BaseModel, frozen=True, extra="forbid"):
@@ -36,6 +48,7 @@ class Shutter(BaseModel, frozen=True, extra="forbid"):
 
     frame_rate_hz: float = Field(30.0, gt=0, le=1e6, description="exposures per second [Hz]")
     exposure_us: float = Field(5000.0, ge=0, le=1e8, description="how long each row is open; 0: an instant [us]")
+    blur: bool = Field(True, description="true: the mean of the light while a row is open; false: that in the middle")
     line_us: float = Field(0.0, ge=0, le=1e6, description="how much later each row opens than the one above it [us]")
 
 
@@ -64,3 +77,19 @@ def interval_weights(
     else:
         middle = (np.maximum(open_ns, 0) + np.minimum(close_ns, length_ns)) / (2 * length_ns)
     return share * (1 - middle), share * middle, close_ns <= length_ns
+
+
+def omission_of_exposure(seen: Exposed, spec: Any) -> LevelChange:
+    """The mean over the time that a row is open; the light in its middle takes its place."""
+    levels = seen.changes["exposure"].times(lsb_per_light(spec) * greatest_gain(spec))
+    why = f"the light in the middle of {spec.exposure_us:g} us instead{seen.moved(spec.exposure_us)}"
+    return level_change(levels, "bound", why, (("blur", False),))
+
+
+def omission_of_rolling_shutter(seen: Exposed, spec: Any) -> LevelChange:
+    """The rows' own times; without them all are open with the first."""
+    levels = seen.changes["rolling_shutter"].times(lsb_per_light(spec) * greatest_gain(spec))
+    readout_us = spec.line_us * (seen.rows - 1)
+    return level_change(
+        levels, "bound", f"rows open {spec.line_us:g} us apart, all {readout_us:g} us{seen.moved(readout_us)}"
+    )

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
@@ -34,10 +34,13 @@ from vid2ev.physics import (
     shading,
     shot,
 )
+from vid2ev.sensors.cis_spec import EFFECTS as OF_FRAMES
+from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.scene import Omission, Scene, together
 
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
+AnySpec = TypeVar("AnySpec", DvsSpec, CisSpec)
 WORDS = ("auto", "all", "none")
 
 
@@ -66,6 +69,7 @@ EFFECTS = {
     "delay": Effect(lambda scene, spec: DELAY, {"delay_us": 0.0}, 0, 1),
     "fixed_rate": Effect(fixed_rate.omission, {"frame_rate_hz": 0.0}, 0, 100),
 }
+KNOWN = tuple(dict.fromkeys((*EFFECTS, *OF_FRAMES)))
 DELAY: Omission = Omission(None, "no bound yet", "", "all times are later; never left out")
 
 
@@ -104,7 +108,7 @@ class Plan:
     effects: str
     tolerance: float
     rows: tuple[Row, ...]
-    spec: DvsSpec
+    spec: Any  # DvsSpec, or CisSpec of a frame camera
     distance: float | None
     scene: dict[str, Any]
 
@@ -120,14 +124,19 @@ class Plan:
         table = [head, *(_cells(row) for row in self.rows)]
         widths = [max(len(line[k]) for line in table) for k in range(len(head) - 1)]
         lines = ["  ".join(map(str.ljust, line, [*widths, 0])) for line in table]
+        return "\n".join([*lines, self.in_all()])
+
+    def in_all(self) -> str:
+        """What all that is left out changes, in words."""
         what = "no bound" if self.distance is None else f"at most {self.distance:.2g}"
-        return "\n".join([*lines, f"all that is left out changes the distance by {what}, tolerance {self.tolerance:g}"])
+        return f"all that is left out changes the distance by {what}, tolerance {self.tolerance:g}"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
     said = row.omission
     distance = "-" if said.distance is None else f"{said.distance:.2g}"
-    cost = f"{row.ns_per_pixel:g} ns/px, {row.ns_per_event:g} ns/event" if _costs(row.effect) else "0"
+    costs = ((row.ns_per_pixel, "ns/px"), (row.ns_per_event, "ns/event"))
+    cost = ", ".join(f"{ns:g} {unit}" for ns, unit in costs if ns > 0) or "0"
     return row.effect, row.fate, distance, said.kind, said.figure, cost, said.why
 
 
@@ -154,7 +163,7 @@ def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: 
     fates = {name: _fate(name, gone, said, effects == "auto") for name, said in omissions.items()}
     rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
-    return Plan(shown, tolerance, rows, _without(spec, changes), distance, scene.describe())
+    return Plan(shown, tolerance, rows, without(spec, changes), distance, scene.describe())
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -166,11 +175,11 @@ def check_tolerance(tolerance: float) -> None:
 def names_of(effects: str | Sequence[str]) -> list[str]:
     """The effects to keep, of a word other than auto, a text with commas, or names; raises UsageError."""
     if effects == "all":
-        return list(EFFECTS)
+        return list(KNOWN)
     names = [] if effects == "none" else effects.split(",") if isinstance(effects, str) else list(effects)
     for name in names:
-        if name not in EFFECTS:
-            raise UsageError(f"effect '{name}': expected {', '.join([*WORDS, *EFFECTS])}{nearest(name, EFFECTS)}")
+        if name not in KNOWN:
+            raise UsageError(f"effect '{name}': expected {', '.join([*WORDS, *KNOWN])}{nearest(name, KNOWN)}")
     return names
 
 
@@ -202,8 +211,9 @@ def _fate(name: str, gone: Sequence[str], said: Omission, auto: bool) -> Literal
     return "replaced" if auto and said.replace else "dropped"
 
 
-def _without(spec: DvsSpec, changes: dict[str, Any]) -> DvsSpec:
+def without(spec: AnySpec, changes: dict[str, Any]) -> AnySpec:
+    """The specification with these changes; raises UsageError where it cannot be."""
     try:
-        return DvsSpec(**(spec.model_dump() | changes))
+        return type(spec)(**(spec.model_dump() | changes))
     except ValidationError as error:
         raise UsageError(f"effects left out by {', '.join(changes)}: {error.errors()[0]['msg']}") from error

@@ -1,4 +1,4 @@
-"""The plans of a recording: every event camera's own, from one look at what all of them see."""
+"""The plans of a recording: every camera's own, from one look at what all of them see."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.instants import instants
+from vid2ev.mounts import Mount
+from vid2ev.plan.expose import Expose
+from vid2ev.plan.frame_camera import frame_plan_of
 from vid2ev.plan.measure import Measure
 from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance, names_of, plan_of
+from vid2ev.plan.subframes import Subframes
+from vid2ev.plan.views import DepthRange, view_row
 from vid2ev.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 
@@ -18,25 +23,39 @@ Plans = Mapping[str, Plan]  # by the name of the camera, "" for the only one
 
 
 def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE) -> dict[str, Plan]:
-    """The plan of each event camera; the source is read once, and made denser in time as for a recording.
+    """The plan of each camera; the source is read once, and made denser in time as for a recording.
 
     Raises UsageError for a source that cannot be read again, and as `plan_of` does.
     """
     check_effects(recipe, effects, tolerance)
-    measures: list[Measure | None] = []
-    for mount in recipe.mounts:
-        spec = mount.sensor.spec
-        measures.append(Measure(spec, mount.size) if isinstance(spec, DvsSpec) else None)
+    cameras = [_measure(mount) for mount in recipe.mounts]
+    subframes, depth = Subframes(), DepthRange()
     with closing(instants(recipe)) as seen:
         for instant in seen:
-            for measure, frame in zip(measures, instant.frames, strict=True):
-                if measure is not None:
-                    measure.see(frame)
-    return {
-        mount.name: plan_of(measure.scene(), measure.spec, tolerance, effects)
-        for mount, measure in zip(recipe.mounts, measures, strict=True)
-        if measure is not None
-    }
+            subframes.see(instant)
+            depth.see(instant.depth if instant.original else None)
+            for camera, frame in zip(cameras, instant.frames, strict=True):
+                camera.see(frame)
+    shared = () if recipe.source.dense or recipe.upsample == "none" else (subframes.row(),)
+    plans: dict[str, Plan] = {}
+    for mount, camera in zip(recipe.mounts, cameras, strict=True):
+        plan = _plan(camera, effects, tolerance, subframes.speed_px_per_s)
+        view = () if recipe.alone else (view_row(mount, recipe, depth),)
+        plans[mount.name] = replace(plan, rows=(*view, *shared, *plan.rows))
+    return plans
+
+
+def _measure(mount: Mount) -> Measure | Expose:
+    spec = mount.sensor.spec
+    return Measure(spec, mount.size) if isinstance(spec, DvsSpec) else Expose(spec, mount.size)
+
+
+def _plan(
+    camera: Measure | Expose, effects: str | Sequence[str], tolerance: float, speed_px_per_s: float | None
+) -> Plan:
+    if isinstance(camera, Measure):
+        return plan_of(camera.scene(), camera.spec, tolerance, effects)
+    return frame_plan_of(camera.exposed(speed_px_per_s), camera.spec, tolerance, effects)
 
 
 def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE) -> tuple[Recipe, Plans]:

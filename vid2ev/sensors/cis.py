@@ -181,7 +181,7 @@ class Cis:
         """Give an exposure the light from `since_ns` until now; it comes out if its last row closes."""
         assert self._t_ns is not None
         row_ns = self._row_ns + (each.start_ns - since_ns)
-        before, after, closed = interval_weights(row_ns, 1e3 * self.spec.exposure_us, self._t_ns - since_ns, cut)
+        before, after, closed = self._weights(row_ns, self._t_ns - since_ns, cut)
         before += each.pending  # (a frame's two sides are added at once, when the next frame is there)
         each.pending, after = np.where(closed, 0.0, after), np.where(closed, after, 0.0)
         if before.any() or after.any():
@@ -192,6 +192,14 @@ class Cis:
             yield self._read(each)
         else:
             self._open.append(each)
+
+    def _weights(self, row_ns: np.ndarray, length_ns: int, cut: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`interval_weights` of rows that open at row_ns; without blur those of the middles of their windows."""
+        exposure_ns = 1e3 * self.spec.exposure_us
+        if self.spec.blur:
+            return interval_weights(row_ns, exposure_ns, length_ns, cut)
+        before, after, _ = interval_weights(row_ns + exposure_ns / 2, 0.0, length_ns, cut)
+        return before, after, row_ns + exposure_ns <= length_ns
 
     def _read(self, each: Open) -> Exposure:
         """Read out an exposure; its sums are free for another one."""

@@ -15,6 +15,9 @@ from vid2ev.physics.shading import Shading
 from vid2ev.physics.shutter import Shutter
 
 NOISELESS = {"noise_lsb": 0.0, "shot_noise": False, "read_noise_e": 0.0, "prnu": 0.0, "dsnu": 0.0}
+EFFECTS = (  # in the order of the path of light
+    "exposure", "rolling_shutter", "shading", "fixed_pattern", "shot_noise", "full_well", "read_noise", "noise",
+)  # fmt: skip
 INSTANT = {"exposure_us": 0.0, "line_us": 0.0}
 
 
@@ -60,7 +63,7 @@ class CisSpec(  # the order of the bases, last to first, is the order of the fie
     def effects(self) -> list[str]:
         """Names of the effects that these parameters switch on, in the order of the path of light."""
         on = {
-            "exposure": self.exposure_us > 0,
+            "exposure": self.exposure_us > 0 and self.blur,
             "rolling_shutter": self.line_us > 0,
             "shading": bool(self.shading),
             "fixed_pattern": self.prnu > 0 or self.dsnu > 0,

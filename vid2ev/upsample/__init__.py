@@ -24,6 +24,7 @@ class Interval:
 
     frames: Iterator[Frame]
     limited: bool = False  # it asked for more than max_subframes
+    shift_px: float | None = None  # how far things move in it, where that was looked at
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames

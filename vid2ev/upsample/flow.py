@@ -67,20 +67,24 @@ class FlowUpsampling:
         """The frames after a up to and including b."""
         if self.subframes == 1 or b.t_ns - a.t_ns <= 1:
             return Interval(iter([b]))
+        if self.subframes == "auto" and np.array_equal(a.light, b.light):
+            return Interval(iter([b]), shift_px=0.0)
         motion = self._motion(a.luminance, b.luminance)
         asked = steps_for(motion.shift_px, (b.t_ns - a.t_ns) * 1e-9)
         steps = min(asked, self.max_subframes) if self.subframes == "auto" else self.subframes
         limited = self.subframes == "auto" and asked > self.max_subframes
-        return Interval(carried(a, b, motion, steps) if steps > 1 else iter([b]), limited)
+        frames = carried(a, b, motion, steps) if steps > 1 else iter([b])
+        return Interval(frames, limited, motion.shift_px)
 
     def _motion(self, before: np.ndarray, after: np.ndarray) -> Motion:
         """Motion between two images of light [H, W]."""
         proxy_before, proxy_after, nat_per_code = proxies(before, after, SHRINK)
-        if min(proxy_before.shape) * SHRINK < SMALLEST:
+        changed = cv2.absdiff(proxy_before, proxy_after) * nat_per_code > self.threshold / 2
+        unasked = self.subframes == "auto" and np.count_nonzero(changed) < FEWEST  # (one step, whatever the flow)
+        if unasked or min(proxy_before.shape) * SHRINK < SMALLEST:
             return no_motion(proxy_before.shape)
         forward = self._dis.calc(proxy_before, proxy_after, None)
         backward = self._dis.calc(proxy_after, proxy_before, None)
-        changed = cv2.absdiff(proxy_before, proxy_after) * nat_per_code > self.threshold / 2
         least_codes = self.threshold / 8 / nat_per_code
         forward = convincing(forward, proxy_before, proxy_after, least_codes)
         backward = convincing(backward, proxy_after, proxy_before, least_codes)

@@ -1,0 +1,193 @@
+"""Plans of frame cameras: what is left out changes no more than its bound, on clips of all kinds; decisions, tables.
+
+Measured with an ADC of 16 bits and I16 as its codes, a 55th of an LSB of 10 bits: rounding then adds up to one code.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vid2ev.errors import UsageError
+from vid2ev.plan.expose import Expose
+from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of
+from vid2ev.plan.plan import KNOWN, names_of
+from vid2ev.sensors.cis import Cis
+from vid2ev.sensors.cis_spec import EFFECTS, CisSpec
+from vid2ev.sensors.presets import cis_names, load_cis
+from vid2ev.stream import Frame
+from vid2ev.stream.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
+
+from .clips import MADE, REAL, SCENES, VIDEOS, clip
+
+slow = pytest.mark.slow
+QUICK = ("edge", "sine", "karma")
+FINE = 55.0  # codes of this test to an LSB of 10 bits
+PLAIN = CisSpec(colour=False, bits=16, slope=1, min_illuminance=0, frame_rate_hz=60, exposure_us=0, noise_lsb=0)
+USES = {
+    "exposure": {"exposure_us": 9000},
+    "rolling_shutter": {"line_us": 60, "exposure_us": 2000},
+    "shading": {"shading": (-0.1, -0.3), "exposure_us": 2000},
+    "fixed_pattern": {"prnu": 0.01, "dsnu": 3},
+    "shot_noise": {"shot_noise": True, "white_e": 5000},
+    "full_well": {"full_well_e": 2500, "white_e": 5000},
+    "full_well of shots": {"full_well_e": 2500, "white_e": 5000, "shot_noise": True, "prnu": 0.01},
+    "read_noise": {"read_noise_e": 3, "white_e": 5000},
+    "noise": {"noise_lsb": 5.2 * FINE},
+}
+ratios: dict[str, list[float]] = defaultdict(list)
+
+
+@cache
+def frames(name: str) -> tuple[tuple[int, int], list[Frame]]:
+    if name in REAL and not VIDEOS.is_dir():
+        pytest.skip(f"{VIDEOS} is not there")
+    return clip(name)
+
+
+def exposed(spec: CisSpec, size: tuple[int, int], light: list[Frame]) -> Exposed:
+    measure = Expose(spec, size)
+    for frame in light:
+        measure.see(frame)
+    return measure.exposed()
+
+
+def codes(spec: CisSpec, size: tuple[int, int], light: list[Frame]) -> np.ndarray:
+    return np.array([each.codes for each in Cis(spec, size, seed=3).run(light)], np.float64)
+
+
+def changed(spec: CisSpec, effect: str, size: tuple[int, int], light: list[Frame]) -> tuple[float, float, LevelChange]:
+    """The greatest change of a code that leaving an effect out makes, the rms of all, and what is said of it."""
+    said = FRAME_EFFECTS[effect].omission(exposed(spec, size, light), spec)
+    one, other = codes(spec, size, light), codes(spec.model_copy(update=FRAME_EFFECTS[effect].off), size, light)
+    change = one - other[: len(one)]
+    assert said.sure and len(one) > 5
+    return float(np.abs(change).max()), float(np.sqrt(np.mean(change**2))), said
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else slow) for name in [*MADE, *REAL, *SCENES]]
+)
+def test_what_is_left_out_changes_less_than_its_bound(name: str) -> None:
+    size, light = frames(name)
+    for use, keys in USES.items():
+        effect = use.partition(" ")[0]
+        most, rms, said = changed(PLAIN.model_copy(update=keys), effect, size, light)
+        assert most <= said.levels.most + 1, use
+        assert rms <= said.levels.rms + 1, use
+        if most > FINE * math.sqrt(0.01 / 5 / 12):  # (where it matters: a fifth of the tolerance)
+            ratios[use].append(said.levels.most / most)
+            ratios[f"{use}, rms"].append(said.levels.rms / rms)
+
+
+def test_bounds_are_near_what_they_bound() -> None:
+    """Of the clips before: medians of bound / measured where the effect matters."""
+    if not ratios:
+        pytest.skip("the clips were not looked at")
+    medians = {use: float(np.median(found)) for use, found in ratios.items()}
+    print("\n" + "\n".join(f"{use:26} {median:6.3f} of {len(ratios[use])}" for use, median in medians.items()))
+    assert max(medians.values()) <= 10
+    assert all(medians[f"{use}{end}"] < 1.05 for use in ("exposure", "rolling_shutter") for end in ("", ", rms"))
+
+
+@pytest.mark.parametrize("name", cis_names())
+@pytest.mark.parametrize("tolerance", [0.0, 0.01, 1.0])
+def test_auto_keeps_within_the_tolerance(name: str, tolerance: float) -> None:
+    """What auto leaves out changes codes by what it says, and rounding; each effect has a row, and free ones stay."""
+    size, light = frames("edge")
+    spec = load_cis(name, ["cis.colour=false"])
+    plan = frame_plan_of(exposed(spec, size, light), spec, tolerance)
+    assert plan.distance is not None and plan.distance <= tolerance and plan.max_lsb is not None
+    change = codes(spec, size, light) - codes(plan.spec, size, light)
+    assert np.abs(change).max(initial=0) <= math.floor(plan.max_lsb) + 1
+    assert [row.effect for row in plan.rows] == [*spec.effects(), *ALWAYS]
+    assert plan.spec.line_us == spec.line_us
+    assert all(row.effect in str(plan) and row.omission.why for row in plan.rows)
+    assert json.loads(json.dumps(plan.describe(), allow_nan=False))["max_lsb"] == plan.max_lsb
+
+
+def test_a_still_clip_needs_no_exposure_and_keeps_its_times() -> None:
+    still = [Frame(np.full((6, 8), 0.3, np.float32), k * 4_000_000) for k in range(30)]
+    spec = CisSpec(colour=False, exposure_us=7000, line_us=30)
+    plan = frame_plan_of(exposed(spec, (8, 6), still), spec, 1e-5)
+    assert plan.spec == spec.model_copy(update={"blur": False})
+    fates = {row.effect: row.fate for row in plan.rows}
+    assert fates["exposure"] == "replaced" and fates["noise"] == fates["rolling_shutter"] == "kept"
+    times = [
+        [(each.index, each.start_ns, each.end_ns) for each in Cis(one, (8, 6)).run(still)] for one in (spec, plan.spec)
+    ]
+    assert times[0] == times[1] and len(times[0]) > 2
+
+
+@pytest.mark.parametrize("line_us", [0, 700])
+def test_without_blur_a_row_sees_the_middle_of_its_window(line_us: float) -> None:
+    """Light that is a straight line is as before; of any light, what an instant of the same delay sees."""
+    draws = np.random.default_rng(1)
+    t_ns = np.cumsum(draws.integers(1, 9_000_000, 60))
+    light = [Frame(frame, int(t)) for frame, t in zip(draws.random((60, 6, 8)).astype(np.float32), t_ns, strict=True)]
+    spec = PLAIN.model_copy(update={"exposure_us": 11_000, "line_us": line_us, "blur": False})
+    made = list(Cis(spec, (8, 6), linear=True).run(light))
+    for each in made:
+        for row in range(6):
+            middle_ns = each.start_ns + 1000 * (row * line_us + 5500)
+            seen = [np.interp(middle_ns, t_ns, [frame.light[row, x] for frame in light]) for x in range(8)]
+            assert each.light is not None and np.allclose(each.light[row], seen, atol=1e-6)
+    straight = [Frame(np.full((6, 8), 0.1 + 1e-9 * t, np.float32), int(t)) for t in range(0, 400_000_000, 7_000_000)]
+    assert exposed(spec.model_copy(update={"blur": True}), (8, 6), straight).changes["exposure"].most < 1e-6
+
+
+def test_what_is_seen_is_all_there_is() -> None:
+    """Extremes, means, what is clipped and what a well does not hold, from every value of every exposure."""
+    draws = np.random.default_rng(2)
+    light = [Frame(draws.random((6, 8, 3)).astype(np.float32) * 3, k * 10_000_000) for k in range(40)]
+    spec = CisSpec(frame_rate_hz=50, exposure_us=9000, full_well_e=9000, shading=(-0.5,))
+    seen = exposed(spec, (8, 6), light)
+    plain = CisSpec(frame_rate_hz=50, exposure_us=9000, shading=(-0.5,)).noiseless()
+    made = np.array([each.light for each in Cis(plain, (8, 6), linear=True).run(light)], np.float64)
+    assert (seen.exposures, seen.values, seen.rows) == (len(made), 6 * 8 * 3, 6)
+    found = seen.light_min, seen.light_max, seen.light_mean, seen.light_square
+    assert found == pytest.approx((made.min(), made.max(), made.mean(), (made**2).mean()), rel=1e-6)
+    levels = (made * 65535 - 4096) / 55
+    clipped = (np.abs(levels - np.clip(levels, 0, 1023))).max()
+    assert ALWAYS["clip"](seen, spec).levels.most == pytest.approx(clipped, rel=1e-5)
+    assert seen.changes["full_well"].most == pytest.approx(made.max() - 0.9, rel=1e-5)
+    within = exposed(spec, (8, 6), [Frame(frame.light / 6 + 0.1, frame.t_ns) for frame in light])
+    assert ALWAYS["clip"](within, spec).levels.most == 0 and ALWAYS["clip"](within, spec).kind == "exact"
+
+
+def test_effects_by_name() -> None:
+    size, light = frames("edge")
+    spec = load_cis("phone", ["cis.colour=false"])
+    seen = exposed(spec, size, light)
+    assert frame_plan_of(seen, spec, effects="all").spec == spec
+    assert frame_plan_of(seen, spec, effects="none").spec.effects() == []
+    assert frame_plan_of(seen, spec, effects="noise,exposure").spec.effects() == ["exposure", "noise"]
+    assert set(FRAME_EFFECTS) == set(EFFECTS) and names_of("all") == list(KNOWN)
+    with pytest.raises(UsageError, match="did you mean shot_noise"):
+        frame_plan_of(seen, spec, effects="shot_nois")
+
+
+def test_light_shorter_than_an_exposure_changes_nothing() -> None:
+    spec = load_cis("phone", ["cis.colour=false"])
+    plan = frame_plan_of(exposed(spec, (8, 6), [Frame(np.ones((6, 8), np.float32), 0)]), spec)
+    assert plan.distance == 0 and plan.scene["exposures"] == 0
+    assert frame_plan_of(Expose(spec, (8, 6)).exposed(), spec).scene["frames"] == 0
+
+
+def test_laws_of_random_changes() -> None:
+    """Of 1000 clips of noise at most a few exceed the 99.9 % bounds, and the bounds are not far."""
+    draws = np.random.default_rng(4)
+    for number, mean in ((50, 0.5), (2000, 30.0)):
+        noise = draws.normal(0, 2, (1000, number))
+        bound = surely_square(4.0, 2 * normal_most(number), number)
+        assert np.mean(np.abs(noise).max(axis=1) > bound.most) <= 0.003
+        assert np.mean((noise**2).mean(axis=1) > bound.square) <= 0.003
+        shots = draws.poisson(mean, (1000, number)) - mean
+        assert np.mean(np.abs(shots).max(axis=1) > poisson_most(mean, number)) <= 0.003
+        assert poisson_most(mean, number) < 4 * np.abs(shots).max()
+    assert surely_square(1.0, 1.0, 0) == (0, 0, 1)

@@ -1,0 +1,115 @@
+"""The plan of a frame camera: which of its effects a clip calls for.
+
+As for an event camera, `auto` leaves out what costs something and whose bounds together stay within the tolerance, here
+in the distance of `stream.exposed`: 0.01 lets no level of any exposure change by more than 0.029 LSB.  The exposure
+gives way to the light in the middle of it.  A rolling shutter costs nothing and stays, and so do the range and the
+rounding of the ADC, which make what the camera sends.
+
+Costs are nanoseconds per value of an exposure, of one thread; the exposure's is that of the frames of light in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
+from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, names_of, without
+from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.stream.exposed import ROUNDING, Exposed, LevelChange
+from vid2ev.stream.scene import together
+
+
+class FrameEffect(NamedTuple):
+    """An effect of a frame camera: its omission, the keys that switch it off, and its cost."""
+
+    omission: Callable[[Exposed, Any], LevelChange]
+    off: dict[str, Any]
+    ns: float
+
+
+FRAME_EFFECTS = {
+    "exposure": FrameEffect(shutter.omission_of_exposure, {"blur": False}, 0.35),
+    "rolling_shutter": FrameEffect(shutter.omission_of_rolling_shutter, {"line_us": 0.0}, 0),
+    "shading": FrameEffect(shading.omission_of_levels, {"shading": ()}, 1),
+    "fixed_pattern": FrameEffect(fixed_pattern.omission, {"prnu": 0.0, "dsnu": 0.0}, 2),
+    "shot_noise": FrameEffect(electrons.omission_of_shot_noise, {"shot_noise": False}, 10),
+    "full_well": FrameEffect(electrons.omission_of_full_well, {"full_well_e": 0.0}, 1),
+    "read_noise": FrameEffect(electrons.omission_of_read_noise, {"read_noise_e": 0.0}, 5),
+    "noise": FrameEffect(adc.omission_of_noise, {"noise_lsb": 0.0}, 5),
+}
+ALWAYS = {"clip": adc.clipped, "rounding": adc.rounding}
+
+
+@dataclass(frozen=True)
+class FrameRow(Row):
+    """An effect in the plan of a frame camera."""
+
+    omission: LevelChange
+
+    def describe(self) -> dict[str, Any]:
+        """The row, ready for JSON."""
+        levels = self.omission.levels
+        return super().describe() | {"max_lsb": levels.most, "rms_lsb": levels.rms}
+
+
+@dataclass(frozen=True)
+class FramePlan(Plan):
+    """What of a frame camera is simulated; `distance` is that of `stream.exposed`."""
+
+    @property
+    def max_lsb(self) -> float | None:
+        """Bound on the change of a level by all that is left out together [LSB]."""
+        return None if self.distance is None else (self.distance / ROUNDING) ** 0.5
+
+    def describe(self) -> dict[str, Any]:
+        """The plan, ready for JSON."""
+        return super().describe() | {"max_lsb": self.max_lsb}
+
+    def in_all(self) -> str:
+        """What all that is left out changes, in words."""
+        what = "no level that has a bound" if self.max_lsb is None else f"no level by more than {self.max_lsb:.2g} LSB"
+        most = (self.tolerance / ROUNDING) ** 0.5
+        return f"all that is left out changes {what}, tolerance {self.tolerance:g}: {most:.2g} LSB"
+
+
+def frame_plan_of(
+    seen: Exposed, spec: CisSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto"
+) -> FramePlan:
+    """The plan of a frame camera, for what it sees; `effects` and errors as for `plan_of`."""
+    check_tolerance(tolerance)
+    used = spec.effects()
+    omissions = {name: FRAME_EFFECTS[name].omission(seen, spec) for name in used}
+    if effects == "auto":
+        gone = _within(omissions, tolerance)
+    else:
+        kept = names_of(effects)
+        gone = [name for name in used if name not in kept]
+    changes = {key: value for name in gone for key, value in FRAME_EFFECTS[name].off.items()}
+    distance = together(*(omissions[name].distance or 0.0 for name in gone))
+    rows = [FrameRow(name, _fate(name, gone, said), said, _cost(name, seen), 0.0) for name, said in omissions.items()]
+    rows += [FrameRow(name, "kept", omission(seen, spec), 0.0, 0.0) for name, omission in ALWAYS.items()]
+    shown = effects if isinstance(effects, str) else ",".join(effects)
+    return FramePlan(shown, tolerance, tuple(rows), without(spec, changes), distance, seen.describe())
+
+
+def _within(omissions: dict[str, LevelChange], tolerance: float) -> list[str]:
+    """The effects to leave out, in order of their bounds."""
+    gone: list[str] = []
+    bounds = {name: said.distance or 0.0 for name, said in omissions.items() if FRAME_EFFECTS[name].ns > 0}
+    for name in sorted(bounds, key=bounds.__getitem__):
+        if together(*(bounds[each] for each in [*gone, name])) <= tolerance:
+            gone.append(name)
+    return gone
+
+
+def _cost(name: str, seen: Exposed) -> float:
+    each = FRAME_EFFECTS[name].ns
+    return round(each * max(seen.frames_each, 1.0), 2) if name == "exposure" else each
+
+
+def _fate(name: str, gone: Sequence[str], said: LevelChange) -> Any:
+    if name not in gone:
+        return "kept"
+    return "replaced" if said.replace else "dropped"
