@@ -121,9 +121,10 @@ def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> 
     if recipe.alone:
         return {"": job | recorder.outcome(0) | {"run": run}}
     outcomes = {mount: recorder.outcome(mount.number) for mount in recipe.mounts}
-    common = {"outputs": job["outputs"]}
+    common, plans = {"outputs": job["outputs"]}, job.get("plan", {})
+    own = {mount.name: {"plan": {mount.name: plans[mount.name]}} if plans else {} for mount in recipe.mounts}
     manifests = {
-        mount.within: recipe.describe_camera(mount) | common | outcome | {"run": run}
+        mount.within: recipe.describe_camera(mount) | common | own[mount.name] | outcome | {"run": run}
         for mount, outcome in outcomes.items()
     }
     results = {mount.name: outcome for mount, outcome in outcomes.items()}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 NAME = 10  # width of the names
+BEFORE_THE_SENSOR = ("view", "subframes")  # of a plan: what is made as it is needed, whatever is asked
 
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:
@@ -40,9 +41,12 @@ def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def plan_text(plan: Mapping[str, Any]) -> str:
     """A plan's description as one line."""
-    gone = [f"{row['effect']} {row['fate']}" for row in plan["rows"] if row["fate"] != "kept"]
+    rows = [row for row in plan["rows"] if row["effect"] not in BEFORE_THE_SENSOR]
+    gone = ", ".join(f"{row['effect']} {row['fate']}" for row in rows if row["fate"] != "kept") or "all effects kept"
+    if "max_lsb" in plan:
+        return f"{gone}; changes levels by at most {plan['max_lsb']:.2g} LSB"
     bound = "no bound" if plan["distance"] is None else f"at most {plan['distance']:.2g}"
-    return f"{', '.join(gone) or 'all effects kept'}; changes the distance by {bound}"
+    return f"{gone}; changes the distance by {bound}"
 
 
 def sensor_text(sensor: Mapping[str, Any]) -> str:

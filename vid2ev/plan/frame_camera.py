@@ -59,9 +59,9 @@ class FramePlan(Plan):
     """What of a frame camera is simulated; `distance` is that of `stream.exposed`."""
 
     @property
-    def max_lsb(self) -> float | None:
+    def max_lsb(self) -> float:
         """Bound on the change of a level by all that is left out together [LSB]."""
-        return None if self.distance is None else (self.distance / ROUNDING) ** 0.5
+        return ((self.distance or 0.0) / ROUNDING) ** 0.5
 
     def describe(self) -> dict[str, Any]:
         """The plan, ready for JSON."""
@@ -69,9 +69,8 @@ class FramePlan(Plan):
 
     def in_all(self) -> str:
         """What all that is left out changes, in words."""
-        what = "no level that has a bound" if self.max_lsb is None else f"no level by more than {self.max_lsb:.2g} LSB"
-        most = (self.tolerance / ROUNDING) ** 0.5
-        return f"all that is left out changes {what}, tolerance {self.tolerance:g}: {most:.2g} LSB"
+        allowed = f"tolerance {self.tolerance:g}: {(self.tolerance / ROUNDING) ** 0.5:.2g} LSB"
+        return f"all that is left out changes no level by more than {self.max_lsb:.2g} LSB, {allowed}"
 
 
 def frame_plan_of(

@@ -36,7 +36,7 @@ def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: f
             depth.see(instant.depth if instant.original else None)
             for camera, frame in zip(cameras, instant.frames, strict=True):
                 camera.see(frame)
-    shared = () if recipe.source.dense or recipe.upsample == "none" else (subframes.row(),)
+    shared = () if recipe.source.dense or recipe.upsample != "flow" else (subframes.row(),)
     plans: dict[str, Plan] = {}
     for mount, camera in zip(recipe.mounts, cameras, strict=True):
         plan = _plan(camera, effects, tolerance, subframes.speed_px_per_s)

@@ -27,7 +27,7 @@ class Subframes:
     def __init__(self) -> None:
         self.made = self.intervals = self.still = self.limited = 0
         self.speed_px_per_s: float | None = None  # the greatest, of the source's pixels, where it was looked at
-        self._worst_us = self._left_us = 0.0
+        self.worst_us = self.left_us = 0.0
         self._steps = 0
         self._before: tuple[int, tuple[Frame, ...]] | None = None
 
@@ -51,13 +51,13 @@ class Subframes:
         intervals, made = f"of {self.intervals} intervals {self.still} still", f"{self.made} made"
         if self.still == self.intervals:
             return Row("subframes", "dropped", Omission(0.0, "exact", made, intervals), 0.0, 0.0)
-        figure = f"{self._worst_us:.3g} us, {made}"
+        figure = f"{self.worst_us:.3g} us, {made}"
         limited = f", {self.limited} at the limit of sub-frames" if self.limited else ""
-        why = f"{intervals}; with those made crossings are up to {self._left_us:.3g} us off{limited}"
+        why = f"{intervals}; with those made crossings are up to {self.left_us:.3g} us off{limited}"
         return Row("subframes", "kept", Omission(None, "estimate", figure, why), NS_PER_PIXEL, 0.0)
 
     def _note(self, seconds: float, shift_px: float) -> None:
         off_us = 1e6 * KAPPA_PER_PX * shift_px * seconds / 8
-        self._worst_us = max(self._worst_us, off_us)
-        self._left_us = max(self._left_us, off_us / max(self._steps, 1) ** 2)
+        self.worst_us = max(self.worst_us, off_us)
+        self.left_us = max(self.left_us, off_us / max(self._steps, 1) ** 2)
         self.speed_px_per_s = max(self.speed_px_per_s or 0.0, shift_px / seconds)
