@@ -179,3 +179,13 @@ def test_rigs_camera_by_camera() -> None:
     with pytest.raises(UsageError, match="left"):
         compare("one", "two/left")
     assert compare("one/left", "two/left")["distance"] == found["left"]["distance"]
+
+
+def test_statistics_of_each_alone() -> None:
+    one, other = write(busy(3000, SIZE, seed=1), "a.h5"), write(isolated(20, size=SIZE), "b.h5", duration_us=30 * 10**6)
+    found = compare(one, other, "--statistics", "--align", "start")
+    assert "statistics" not in compare(one, other, "--align", "start")
+    assert found["statistics"]["events"] == found["events"]
+    assert found["reference_statistics"]["events"] == found["reference_events"]
+    said = CliRunner().invoke(command, [one, other, "--statistics", "--align", "start"], catch_exceptions=False)
+    assert "A alone" in said.stdout and "events/pixel/s" in said.stdout

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     metavar="US",
     help="Events that belong together are less than this apart [us].",
 )
+@click.option("--statistics", is_flag=True, help="And each alone: rates, share of ON, intervals, isolated events.")
 @click.option("--plot", type=Path, metavar="FILE.png", help="Draw it: per pixel, timing errors, over time.")
 @click.option("--overwrite", is_flag=True, help="Replace the picture that is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")

@@ -21,6 +21,7 @@ import numpy as np
 from vid2ev.compare.by_pixel import by_pixel
 from vid2ev.compare.comparison import Comparison, Tally
 from vid2ev.compare.matching import WINDOW_US
+from vid2ev.compare.statistics import Statistics, statistics_of
 from vid2ev.errors import UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import Recording
@@ -33,16 +34,19 @@ Report = Callable[[Recording, int], object]
 
 @dataclass(frozen=True)
 class Compared:
-    """A comparison of two recordings, how many events of each are outside of the time compared, and what to know."""
+    """A comparison of two recordings, how many events of each are outside of the time compared, and what to know;
+    the statistics of both, if they are asked for."""
 
     paths: tuple[str, str]
     comparison: Comparison
     left_out: tuple[int, int]
     shift_us: int
     warnings: list[str]
+    alone: tuple[Statistics, Statistics] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers, ready for JSON."""
+        names = ("statistics", "reference_statistics")
         return {
             "recording": self.paths[0],
             "reference": self.paths[1],
@@ -50,6 +54,7 @@ class Compared:
             "left_out": self.left_out[0],
             "reference_left_out": self.left_out[1],
             "reference_shifted_us": self.shift_us,
+            **{name: one.as_dict() for name, one in zip(names, self.alone or (), strict=False)},
             "warnings": self.warnings,
         }
 
@@ -63,6 +68,7 @@ class Compared:
             facts.append(
                 ("left out", f"{one:,} events, {other:,} of the reference: outside of the time that both have")
             )
+        facts += [(f"{name} alone", str(one)) for name, one in zip("AB", self.alone or (), strict=False)]
         return [*facts, *(("warning", text) for text in self.warnings)]
 
 
@@ -94,12 +100,14 @@ def compare_recordings(
     align: str = "clock",
     window_us: int = WINDOW_US,
     limit: int = LIMIT,
+    statistics: bool = False,
     report: Report | None = None,
 ) -> Compared:
     """Compare an event file or recording's folder with a reference; both are read, whatever their formats.
 
-    align   "clock": times are on one clock; "start": the beginnings are laid on one another
-    report  called with a recording of as many events as will be read, and how many were read
+    align       "clock": times are on one clock; "start": the beginnings are laid on one another
+    statistics  whether to gather those of each recording alone, too; the files are read once more
+    report      called with a recording of as many events as will be read, and how many were read
 
     Raises UsageError for sensors of different sizes and recordings that have no time in common, DataError for files
     that cannot be read.
@@ -113,17 +121,21 @@ def compare_recordings(
     tally = Tally(size, span_us, window_us=window_us)
     sides = one, other
     bands = _bands(sides, size, limit)
-    progress = _Progress(sides, len(bands), report)
+    progress = _Progress(sides, len(bands) + statistics, report)
     for rows in bands:
         a, b = (by_pixel(progress.noted(side.blocks(span_us)), size[0], rows) for side in sides)
         tally.add(a, b, rows)
+    alone = None
+    if statistics:
+        of_one, of_other = (statistics_of(progress.noted(side.blocks(span_us)), size) for side in sides)
+        alone = of_one, of_other
     comparison = tally.comparison()
     kept = comparison.events, comparison.reference_events
     left_out = one.recording.count - kept[0], other.recording.count - kept[1]
     warnings = [
         f"{side.path}: {text}" for side, file in zip(sides, files, strict=True) for text in dict.fromkeys(file.warnings)
     ]
-    return Compared((one.path, other.path), comparison, left_out, other.shift_us, warnings)
+    return Compared((one.path, other.path), comparison, left_out, other.shift_us, warnings, alone)
 
 
 class _Progress:
