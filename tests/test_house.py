@@ -53,9 +53,10 @@ FLOORS = {
     "recorder": 11,
     "plan": 12,
     "conversion": 13,
-    "": 14,  # vid2ev/__init__.py: the public names
-    "commands": 15,
-    "__main__": 16,
+    "cost": 14,
+    "": 15,  # vid2ev/__init__.py: the public names
+    "commands": 16,
+    "__main__": 17,
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.plan.recordings import described, planned
-from vid2ev.recipe import Recipe
+from vid2ev.recipe import Recipe, plain
 from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
@@ -44,6 +44,7 @@ def convert(
     piece: int = PIECE,
     effects: str | Sequence[str] = "all",
     tolerance: float = TOLERANCE,
+    notes: Mapping[str, Any] | None = None,
     **rest: Any,
 ) -> dict[str, Any]:
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
@@ -56,6 +57,7 @@ def convert(
     report     called at every source frame; if it returns True, the recording ends there
     piece      pixel-steps between two checkpoints
     effects    those to simulate: all, auto (what the clip calls for, by bounds within `tolerance`), none, or names
+    notes      what else the manifest is to say, ready for JSON
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
 
@@ -73,7 +75,7 @@ def convert(
     recipe, plans = planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
-    job = recipe.describe() | {"outputs": outputs.describe()} | described(plans)
+    job = recipe.describe() | {"outputs": outputs.describe()} | described(plans) | plain({**(notes or {})})
     beside = growing(recipe, outputs)
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:

@@ -115,6 +115,11 @@ class Auto(click.ParamType):
     "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",
     help="How far from all effects the events may be with auto, as a distance.",
 )  # fmt: skip
+@click.option(
+    "--budget", metavar="LIMIT[,LIMIT...]",
+    help="Try settings on a short stretch first and take the fastest within limits of error, such as vR=0.05 or us=50,"
+    " and of time, such as time=10x (`vid2ev cost` shows all). What is given explicitly stays as it is.",
+)  # fmt: skip
 @click.option("--labels", is_flag=True, help="Store the cause of each event (signal, shot, leak, hot).")
 @click.option(
     "--format", "formats", multiple=True, default=["hdf5"], show_default=True, metavar="NAME[,NAME...]",
@@ -201,6 +206,9 @@ def _one(
     from vid2ev.commands import summary
     from vid2ev.commands.progress import bar, heard, kept
 
+    budget = options.pop("budget")
+    if budget is not None and not dry_run:
+        options = _within(budget, video, directory, quiet, options)
     if dry_run or verbose:
         recipe, plan = _plan(video, directory, dict(options))
         if not quiet:
@@ -216,6 +224,28 @@ def _one(
     return manifest
 
 
+def _within(budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any]) -> dict[str, Any]:
+    """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on."""
+    from vid2ev.commands.progress import given, pass_bar
+    from vid2ev.cost.choice import chosen, taken_up
+    from vid2ev.outputs import Outputs
+    from vid2ev.recording.folder import begun_job, check_free
+
+    check_free(directory, options["overwrite"], options["resume"])
+    begun = begun_job(directory).get("budget", {}) if options["resume"] else {}
+    choice = taken_up(begun, budget)
+    if choice is None:
+        rest = dict(options)
+        Outputs.taken_from(rest)
+        for name in ("overwrite", "resume"):
+            rest.pop(name)
+        with pass_bar(quiet) as report:
+            choice = chosen(video, budget, rest, given=given(), threads=rest.pop("threads"), report=report)
+    if not quiet:
+        click.echo(choice.line)
+    return choice.rung.applied(options) | {"notes": {"budget": choice.note}}
+
+
 def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[str, Any], str]:
     """What a conversion would do, for programs and for people; raises what it would raise before its first frame."""
     from vid2ev import conversion
@@ -228,6 +258,7 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
     overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
     effects, tolerance = options.pop("effects"), options.pop("tolerance")
+    options.pop("notes", None)
     recipe = Recipe.of(video, seed=seed or 0, **options)
     check_effects(recipe, effects, tolerance)
     conversion.check_outputs(recipe, outputs)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from vid2ev.commands import INTERRUPTED
 from vid2ev.errors import DataError
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from vid2ev.conversion import Progress
+    from vid2ev.cost.measure import Report
     from vid2ev.formats.event_file import Recording
     from vid2ev.recipe import Recipe
 
 EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
+PASSES = "{percentage:3.0f}% {bar} pass {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left{postfix}"
 
 
@@ -115,6 +118,34 @@ def event_bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
         if shown is None:
             shown = tqdm(total=recording.count, bar_format=EVENTS, leave=False, disable=quiet or None, unit_scale=True)
         shown.update(events - shown.n)
+
+    try:
+        yield report
+    finally:
+        if shown is not None:
+            shown.close()
+
+
+def given() -> set[str]:
+    """The options of the command that runs which were given on its command line."""
+    context = click.get_current_context()
+    return {name for name in context.params if context.get_parameter_source(name) == ParameterSource.COMMANDLINE}
+
+
+@contextmanager
+def pass_bar(quiet: bool) -> Iterator[Report]:
+    """A progress bar on a terminal: passes."""
+    from tqdm import tqdm
+
+    shown: tqdm | None = None
+
+    def report(done: int, count: int, name: str) -> None:
+        nonlocal shown
+        if shown is None:
+            shown = tqdm(total=count, bar_format=PASSES, leave=False, disable=quiet or None)
+        shown.set_postfix_str(name, refresh=False)
+        shown.update(done - shown.n)
+        shown.refresh()
 
     try:
         yield report

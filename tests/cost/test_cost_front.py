@@ -1,0 +1,109 @@
+"""The front, budgets, and what is recommended."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vid2ev.cost.errors import Errors
+from vid2ev.cost.front import Budget, Row, front, recommended, refusal
+from vid2ev.cost.rung import Rung
+from vid2ev.errors import UsageError
+
+
+def row(
+    time: float, distance: float | None, us: int | None = 0, *, offered: bool = True, lsb: float | None = None
+) -> Row:
+    timing = None if us is None else (us, 2 * us)
+    return Row(
+        Rung(f"{time} {distance}", offered=offered), Errors(distance, 0.1, timing, 1.0, lsb), 7, (2 * time, time)
+    )
+
+
+LADDER = [row(1, 0.5, 900), row(2, 0.1, 60), row(2.5, 0.2, 70), row(4, 0.01, 20), row(9, 0.0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("budget", "time"),
+    [
+        ("vR=0.5", 1),
+        ("vR=0.1", 2),
+        ("vR=0.0999", 4),
+        ("vR=0", 9),
+        ("us=60", 2),
+        ("us=60,vR=0.05", 4),
+        ("time=3x", 2),
+        ("time=3", 2),
+        ("time=100x", 9),
+        (" vR = 0.3 , time = 3x ", 2),
+    ],
+)
+def test_the_fastest_within_errors_and_the_most_accurate_within_time(budget: str, time: float) -> None:
+    best = recommended(LADDER, Budget.parse(budget))
+    assert best is not None and best.time == time
+
+
+def test_what_is_not_offered_is_not_recommended() -> None:
+    best = recommended([row(0.1, 0.0, offered=False), *LADDER], Budget.parse("vR=0.05"))
+    assert best is LADDER[3]
+
+
+@pytest.mark.parametrize(("budget", "said"), [("time=0.5x", "time=1x"), ("vR=0.001,time=2x", "vR=0, time=1x each")])
+def test_a_budget_that_nothing_meets_says_how_near_one_can_come(budget: str, said: str) -> None:
+    assert recommended(LADDER, Budget.parse(budget)) is None
+    assert said in refusal(LADDER, Budget.parse(budget))
+
+
+def test_what_cannot_be_measured_is_within_no_limit() -> None:
+    asked = Budget.parse("lsb=100")
+    assert recommended(LADDER, asked) is None
+    assert "lsb cannot be measured here" in refusal(LADDER, asked)
+    assert not Budget.parse("us=1e9").holds(row(1, 0.5, None))
+    assert Budget.parse("us=0").holds(row(1, 0.0, None))  # there are no events that could be late
+
+
+@pytest.mark.parametrize(
+    "text", ["", "vR", "vR=", "vR=x", "vR=-1", "vR=nan", "us=inf", "distance=1", "vR=0.1;us=3", "time=x"]
+)
+def test_what_is_no_budget_is_refused_in_a_sentence(text: str) -> None:
+    with pytest.raises(UsageError, match=r"^budget '.*': expected .* such as "):
+        Budget.parse(text)
+
+
+Places = list[tuple[float, float]]
+points = st.lists(st.tuples(st.floats(0.01, 100), st.floats(0, 2)), min_size=1, max_size=30)
+
+
+@given(points)
+def test_nothing_is_better_than_the_front_and_the_rest_is_worse_than_some_of_it(
+    places: Places,
+) -> None:
+    rows = [row(time, distance) for time, distance in places]
+    ahead = front(rows)
+    values = [(each.time, each.errors.distance or 0.0) for each in ahead]
+    assert values == sorted(values) and len({error for _, error in values}) == len(values)
+    for time, error in places:
+        assert any(t <= time and e <= error for t, e in values)
+    for time, error in values:
+        assert not any((t < time and e <= error) or (t <= time and e < error) for t, e in places)
+
+
+@given(points, st.floats(0, 2))
+def test_the_recommended_is_on_the_front(places: Places, limit: float) -> None:
+    rows = [row(time, distance) for time, distance in places]
+    best = recommended(rows, Budget.parse(f"vR={limit!r}"))
+    within = [time for time, error in places if error <= limit]
+    assert (best is None) == (not within)
+    if best is not None:
+        assert best.time == min(within) and best in front(rows)
+
+
+def test_frames_alone_are_judged_by_their_own_error() -> None:
+    rows = [row(1, None, None, lsb=5.0), row(2, None, None, lsb=0.5), row(3, None, None, lsb=0.7)]
+    assert front(rows) == rows[:2]
+    assert recommended(rows, Budget.parse("lsb=1")) is rows[1]
+    assert recommended(rows, Budget.parse("time=9")) is rows[1]
+    assert math.isfinite(rows[0].time)

@@ -1,0 +1,125 @@
+"""Which settings are tried, and what they ask of a conversion."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vid2ev import DvsSpec
+from vid2ev.commands.convert import convert
+from vid2ev.cost.ladder import Given, Ladder, ladder_of
+from vid2ev.cost.rung import Rung
+from vid2ev.errors import UsageError
+from vid2ev.recipe import Recipe
+
+CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.1"
+
+
+def ladder(given: tuple[str, ...] = (), steps: int = 12, **options: Any) -> Ladder:
+    options = {"video": CLIP} | options
+    return ladder_of(Recipe.of(**options), Given(options, given), steps)
+
+
+def names(found: Ladder) -> set[str]:
+    return {rung.name for rung in found.all}
+
+
+def test_the_paper_s_sensor_has_everything_in_play() -> None:
+    found = ladder()
+    assert names(found) == {
+        "reference", "finest", "default", "at most 2 steps", "at most 4 steps", "at most 8 steps", "straight light",
+        "linear", "times on a line", "times of frames", "filter after log", "effects auto", "effects none",
+        "half the size", "light", "lighter", "least",
+    }  # fmt: skip
+    assert found.reference.float64 and not found.reference.offered
+    assert found.reference.options == {"subframes": 24}
+    least = next(rung for rung in found.rungs if rung.name == "least")
+    assert least.options == {"effects": "none", "upsample": "none"} and least.settings == {"timing": "frame"}
+
+
+def test_each_name_is_there_once() -> None:
+    found = ladder(steps=64, frame_camera=True).all
+    assert len({rung.name for rung in found}) == len(found)
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "gone"),
+    [
+        (("upsample",), {"upsample": "flow"}, {"straight light", "linear"}),
+        (("upsample",), {"upsample": "none"}, {"straight light", "linear", "at most 4 steps"}),
+        (("max_subframes",), {"max_subframes": 8}, {"at most 2 steps", "at most 4 steps"}),
+        (("effects",), {}, {"effects auto", "effects none", "least effects"}),
+        ((), {"overrides": ["timing=linear"]}, {"times on a line", "times of frames"}),
+        ((), {"overrides": ["dvs.filter=after"]}, {"filter after log"}),
+        (("size",), {"size": "24x16"}, {"half the size"}),
+        ((), {"sensor": "ideal"}, {"filter after log", "times on a line", "effects none", "finest"}),
+    ],
+)
+def test_what_is_given_or_not_there_is_left_as_it_is(given: tuple[str, ...], options: dict, gone: set[str]) -> None:
+    found = ladder(given, **options)
+    assert not names(found) & gone
+    held = {*given} | {text.partition("=")[0].removeprefix("dvs.") for text in options.get("overrides", ())}
+    for rung in found.all:
+        assert not held & {*rung.options, *rung.settings}, rung
+
+
+def test_the_reference_is_exact_whatever_the_sensor_says() -> None:
+    found = ladder(sensor=DvsSpec(timing="frame"))
+    assert found.reference.settings == {"timing": "response"}
+    assert "timing" not in ladder(sensor="v2e-clean").reference.settings  # (no filter: a line is the response)
+
+
+def test_where_nothing_moves_light_between_the_frames_is_no_question() -> None:
+    found = names(ladder(steps=1))
+    assert not found & {"straight light", "linear", "at most 2 steps"} and "finest" in found
+
+
+def test_scenes_need_nothing_between_their_instants() -> None:
+    found = ladder(video="scene:parallax,size=64x48,duration_s=0.1", steps=1)
+    assert not names(found) & {"straight light", "half the size"} and found.reference.options == {}
+
+
+def test_frame_cameras_have_their_own() -> None:
+    found = ladder(frame_camera=True, cis="phone")
+    rungs = {rung.name: rung for rung in found.rungs}
+    assert rungs["lines together"].settings == {"cis.line_us": 0.0}
+    assert rungs["frames without noise"].settings
+    assert "half the size" not in rungs
+    fixed = ladder(frame_camera=True, cis="phone", overrides=["cis.line_us=10"])
+    assert "lines together" not in names(fixed)
+
+
+def test_a_plane_stands_for_depth(tmp_path: Path) -> None:
+    depth = np.full((32, 48), 4.0, np.float32)
+    depth[8:20, 10:30] = 2.0
+    np.save(tmp_path / "depth.npy", depth)
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "dvs"\ntranslation_mm = [30, 0, 0]\n')
+    found = ladder(("rig", "depth"), rig=tmp_path / "rig.toml", depth=str(tmp_path / "depth.npy"))
+    plane = next(rung for rung in found.rungs if rung.group == "views")
+    assert plane.options == {"depth": "plane:4"} and not plane.offered
+    flat = ladder(("rig", "depth"), rig=tmp_path / "rig.toml", depth="plane:3")
+    assert all(rung.group != "views" for rung in flat.rungs)
+
+
+def test_convert_understands_what_is_recommended() -> None:
+    for rung in ladder(steps=64, frame_camera=True).rungs:
+        context = convert.make_context("convert", [CLIP, *shlex.split(rung.arguments())])
+        for name, value in rung.options.items():
+            assert context.params[name] == value, rung
+        texts = dict(text.split("=", 1) for text in context.params["overrides"])
+        assert {*texts} == {*rung.settings}
+        Recipe.of(**{key: value for key, value in rung.applied({"video": CLIP}).items() if key != "effects"})
+
+
+def test_a_specification_is_changed_as_a_preset_is() -> None:
+    rung = Rung("a", settings={"timing": "linear", "cis.line_us": 3.0})
+    options = {"video": CLIP, "sensor": DvsSpec(mismatch=0.1), "frame_camera": True}
+    recipe = Recipe.of(**rung.applied(options))
+    dvs, cis = (mount.sensor.spec for mount in recipe.mounts)
+    assert (dvs.timing, dvs.mismatch, cis.line_us) == ("linear", 0.1, 3.0)  # type: ignore[union-attr]
+    with pytest.raises(UsageError, match="timing=never"):
+        Rung("b", settings={"timing": "never"}).applied(options)

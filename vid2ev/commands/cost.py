@@ -1,0 +1,75 @@
+"""`vid2ev cost`: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vid2ev.commands.convert import Auto
+from vid2ev.commands.source_options import source_options
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command(short_help="Say what accuracy costs in time, on your clip and machine.")
+@click.argument("source")
+@click.option(
+    "--budget", default="vR=0.05", show_default=True, metavar="LIMIT[,LIMIT...]",
+    help="What a setting may cost: vR=0.05 (distance), count=0.01, us=50 (median timing error), lsb=1 (frames),"
+    " time=10x (multiples of real time).",
+)  # fmt: skip
+@click.option("--duration", "duration_s", type=click.FloatRange(0, min_open=True), metavar="S", help="How much of the"
+    " middle of the clip to take.  [default: 30 frames of 640x480, less of larger ones]")  # fmt: skip
+@click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="How often to time each setting.")
+@click.option("--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="As for convert.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor.")
+@click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's.")
+@click.option("--depth", metavar="DEPTH", help="How far the scene is, for cameras that stand elsewhere.")
+@click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, in the same place.")
+@click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames.")
+@click.option(
+    "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
+    help="Light between the frames: this in all settings.",
+)  # fmt: skip
+@click.option("--subframes", type=Auto("auto", 1, "subframes"), default="auto", help="Steps: this in all settings.")
+@click.option("--max-subframes", type=click.IntRange(1), default=64, metavar="N", help="This in all settings.")
+@click.option("--cuts", type=click.Choice(["restart", "keep"]), default="restart", help="As for convert.")
+@source_options
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="As for convert.")
+@click.option("--threads", type=click.IntRange(1), metavar="N", help="As for convert.  [default: all cores]")
+@click.option(
+    "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False), help="As for convert."
+)
+@click.option("--effects", default="all", metavar="all|auto|none|NAME[,NAME...]", help="This in all settings.")
+@click.option("--tolerance", type=click.FloatRange(0, 1), default=0.01, metavar="D", help="Of --effects auto.")
+@click.option("-o", "--output", metavar="NAME", help="Write NAME.json and NAME.png.  [default: SOURCE_cost here]")
+@click.option("--overwrite", is_flag=True, help="Replace them if they are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="Show no progress.")
+def cost(source: str, output: str | None, overwrite: bool, as_json: bool, quiet: bool, **options: Any) -> None:
+    """Convert a part of SOURCE with one setting after the other, and say how long each takes and how far its events are
+    from those of the finest: a table, a file for programs, and a plot of error against time.
+
+    What you give explicitly is the same in all settings; the rest is varied.  Nothing else is written.  Kernels are
+    compiled before anything is timed; the first time that takes some minutes.
+    """
+    from vid2ev.commands.progress import given, pass_bar
+    from vid2ev.cost.measure import measured
+    from vid2ev.cost.plot import plot
+    from vid2ev.cost.store import check, store
+    from vid2ev.cost.table import table
+
+    places = check(output, source, overwrite)
+    with pass_bar(quiet or as_json) as report:
+        found = measured(source, given=given(), report=report, **options)
+    store(found, places[0])
+    plot(found, places[1])
+    if as_json:
+        click.echo(json.dumps(found.describe(), indent=2))
+        return
+    click.echo(table(found))
+    if not quiet:
+        click.echo(f"\n{places[0]}, {places[1]}")

@@ -1,0 +1,1 @@
+"""What accuracy costs in time, on one's own clip and machine."""

@@ -1,0 +1,122 @@
+"""Which setting to take: the front of those than which none is both faster and more accurate, and the budget.
+
+A budget is a text such as `vR=0.05`, `us=50`, `time=10x`, or several with commas:
+
+    vR, count   distance, and count error, from the reference
+    us          median timing error of matched events
+    lsb         error of frames
+    time        how long it may take, in multiples of how long the clip is
+
+Recommended is the fastest setting within all limits; where time is the only one, the most accurate within it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vid2ev.cost.errors import Errors
+from vid2ev.cost.rung import Rung
+from vid2ev.errors import UsageError, nearest
+
+DEFAULT = "vR=0.05"
+LIMITS = ("vR", "count", "us", "lsb", "time")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A setting as measured: its errors, and how long each pass took, in multiples of how long the clip is."""
+
+    rung: Rung
+    errors: Errors
+    events: int
+    times: tuple[float, ...]
+
+    @property
+    def time(self) -> float:
+        """The shortest: what else a machine does only ever adds to it."""
+        return min(self.times)
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits by name; `text` as it was asked for."""
+
+    text: str
+    limits: tuple[tuple[str, float], ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Budget:
+        """Raises UsageError for what is no budget."""
+        limits: dict[str, float] = {}
+        for part in text.split(","):
+            name, found, number = (word.strip() for word in part.partition("="))
+            if name not in LIMITS or not found:
+                raise UsageError(
+                    f"budget '{part.strip()}': expected NAME=LIMIT with one of {', '.join(LIMITS)}, such as vR=0.05,"
+                    f" us=50 or time=10x{nearest(name, LIMITS)}"
+                )
+            limits[name] = _number(part.strip(), number.removesuffix("x") if name == "time" else number)
+        return cls(text, tuple(limits.items()))
+
+    def only_time(self) -> bool:
+        """Whether it says nothing of errors."""
+        return all(name == "time" for name, _ in self.limits)
+
+    def holds(self, row: Row) -> bool:
+        """Whether a setting is within all limits."""
+        return all(figure(row, name) <= limit for name, limit in self.limits)
+
+
+def figure(row: Row, name: str) -> float:
+    """What a limit is held against; infinite where it could not be measured."""
+    errors = row.errors
+    timing_us = None if errors.timing_us is None else float(errors.timing_us[0])
+    if errors.timing_us is None and errors.distance == 0:
+        timing_us = 0.0  # (no events at all)
+    found = {"vR": errors.distance, "count": errors.count_error, "us": timing_us, "lsb": errors.rms_lsb}.get(name)
+    return row.time if name == "time" else math.inf if found is None else found
+
+
+def recommended(rows: Sequence[Row], budget: Budget) -> Row | None:
+    """The setting to take, of those that may be recommended; None where none is within the budget."""
+    within = [row for row in rows if row.rung.offered and budget.holds(row)]
+    if budget.only_time():
+        return min(within, key=lambda row: (_error(row), row.time), default=None)
+    return min(within, key=lambda row: (row.time, _error(row)), default=None)
+
+
+def refusal(rows: Sequence[Row], budget: Budget) -> str:
+    """Why nothing is within a budget, and how near one can come, as a sentence."""
+    offered = [row for row in rows if row.rung.offered]
+    best = [(name, min(figure(row, name) for row in offered)) for name, _ in budget.limits]
+    unmeasured = [name for name, least in best if math.isinf(least)]
+    if unmeasured:
+        return f"budget '{budget.text}': {unmeasured[0]} cannot be measured here; leave it out"
+    each = ", ".join(f"{name}={least:.3g}{'x' * (name == 'time')}" for name, least in best)
+    together = " each for itself" if len(best) > 1 else ""
+    return f"budget '{budget.text}': the best settings come to {each}{together}; allow more"
+
+
+def front(rows: Sequence[Row]) -> list[Row]:
+    """The settings than which none is as fast and more accurate, nor as accurate and faster; from the fastest on."""
+    kept: list[Row] = []
+    for row in sorted(rows, key=lambda row: (row.time, _error(row))):
+        if not kept or _error(row) < _error(kept[-1]):
+            kept.append(row)
+    return kept
+
+
+def _error(row: Row) -> float:
+    return math.inf if row.errors.headline is None else row.errors.headline
+
+
+def _number(part: str, text: str) -> float:
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = math.nan
+    if not 0 <= limit < math.inf:
+        raise UsageError(f"budget '{part}': expected a limit of at least 0, such as vR=0.05, us=50 or time=10x")
+    return limit

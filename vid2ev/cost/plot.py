@@ -1,0 +1,126 @@
+"""Error against time as a picture: every setting, the front, and the one recommended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from vid2ev.cost.front import Row
+from vid2ev.cost.measure import Cost
+from vid2ev.errors import DataError
+from vid2ev.recording.disk import whole_file
+
+COLOURS = {
+    "light": "#1f77b4",
+    "timing": "#2ca02c",
+    "filter": "#9467bd",
+    "effects": "#d62728",
+    "frames": "#8c564b",
+    "views": "#17becf",
+    "size": "#7f7f7f",
+    "several": "#e08a00",
+    "": "black",
+}
+MEANINGS = {
+    "light": "light between the frames",
+    "timing": "times of events",
+    "filter": "filter and logarithm",
+    "effects": "effects of the sensor",
+    "frames": "frame cameras",
+    "views": "views",
+    "size": "fewer pixels",
+    "several": "several together",
+}
+LEAST = 1e-4  # less is drawn as nothing
+CLOSE_PX = 11  # labels nearer than this, up or down, would cover each other
+
+
+def plot(cost: Cost, picture: Path) -> None:
+    """Draw it into a PNG file, which is there as a whole or not at all; raises DataError."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.5, 6), layout="constrained")
+    axes = figure.add_subplot()
+    rows = [row for row in cost.rows if row.errors.headline is not None]
+    _scale(axes, cost, rows)
+    _draw_front(axes, cost)
+    for group in dict.fromkeys(row.rung.group for row in rows):
+        here = [row for row in rows if row.rung.group == group]
+        places = [row.time for row in here], [_error(row) for row in here]
+        axes.scatter(*places, color=COLOURS[group], s=36, zorder=3, label=MEANINGS.get(group))
+    _draw_recommended(axes, cost)
+    figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=8)
+    _label(axes, rows)
+    try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(picture) as file:
+            figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
+    except OSError as error:
+        picture.with_name(f"{picture.name}.new").unlink(missing_ok=True)
+        reason = error.strerror or str(error)
+        raise DataError(f"{picture} cannot be written: {reason}; make room or access there") from error
+
+
+def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    least = max(LEAST, min((_error(row) for row in rows if _error(row) > 0), default=LEAST))
+    axes.set_yscale("symlog", linthresh=least, linscale=0.4)
+    axes.set_ylim(bottom=-0.4 * least)
+    axes.set_xscale("log")
+    times = [row.time for row in (*rows, cost.reference)]
+    axes.set_xlim(0.8 * min(times), 1.6 * max(times))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+    events = any(row.errors.distance is not None for row in rows)
+    axes.set_ylabel("distance from the reference, vR" if events else "error of frames [LSB]")
+    axes.set_xlabel(f"time, in multiples of how long the clip is ({cost.threads} threads)")
+    axes.set_title(f"{Path(cost.clip).name}, {'x'.join(map(str, cost.size))}", loc="left")
+    axes.grid(alpha=0.25, which="major")
+    axes.axvline(cost.reference.time, color="#999999", linestyle=":", linewidth=1)
+    axes.annotate(
+        "reference", (cost.reference.time, 1), xycoords=("data", "axes fraction"), xytext=(3, -4), fontsize=8,
+        textcoords="offset points", rotation=90, va="top", color="#666666",
+    )  # fmt: skip
+
+
+def _draw_front(axes: Any, cost: Cost) -> None:
+    ahead = [row for row in cost.front if row.errors.headline is not None]
+    places = [row.time for row in ahead], [_error(row) for row in ahead]
+    axes.step(*places, where="post", color="#444444", linewidth=1, zorder=1)
+
+
+def _draw_recommended(axes: Any, cost: Cost) -> None:
+    for name, limit in cost.budget.limits:
+        if name == "time":
+            axes.axvline(limit, color="#e08a00", linewidth=1, linestyle="--", zorder=0)
+        if name == ("lsb" if cost.reference.errors.distance is None else "vR"):
+            axes.axhline(limit, color="#e08a00", linewidth=1, linestyle="--", zorder=0)
+    if (best := cost.recommended) is not None:
+        label = f"recommended within {cost.budget.text}"
+        axes.scatter(
+            [best.time], [_error(best)], s=190, facecolors="none", edgecolors="#e08a00", linewidths=2, zorder=4,
+            label=label,
+        )  # fmt: skip
+
+
+def _label(axes: Any, rows: list[Row]) -> None:
+    """Names beside the points, moved up where they would cover one another."""
+    axes.figure.draw_without_rendering()
+    taken: list[tuple[float, float, float]] = []
+    for row in sorted(rows, key=_error):
+        x, y = axes.transData.transform((row.time, _error(row)))
+        width, up = 6.0 * len(row.rung.name), 0.0
+        while any(abs(y + up - other) < CLOSE_PX and x < right and x + width > left for left, right, other in taken):
+            up += CLOSE_PX
+        taken.append((x, x + width, y + up))
+        axes.annotate(
+            row.rung.name, (row.time, _error(row)), xytext=(8, up * 0.72 - 3), textcoords="offset points", fontsize=8,
+            color=COLOURS[row.rung.group],
+        )  # fmt: skip
+
+
+def _error(row: Row) -> float:
+    return row.errors.headline or 0.0

@@ -1,0 +1,82 @@
+"""How good pictures are against true ones: PSNR and SSIM.
+
+    PSNR = 10 log10(255^2 / MSE), of each picture, in 8 bits of sRGB; then the mean over the pictures
+    SSIM = mean over the picture of the index of Wang et al., Gaussian window of sigma 1.5
+
+Views are compared with those of the reference.  Light between the frames is compared with frames that are left out: of
+three frames in a row the middle one is made from the other two, which are twice as far apart as they are for a
+recording, so the numbers are those of a harder task.
+
+Source: Z. Wang, A. Bovik, H. Sheikh, E. Simoncelli (2004), "Image quality assessment: from error visibility to
+structural similarity", IEEE Trans. Image Processing 13(4).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.sources import Source
+from vid2ev.stream.frames import Frame
+from vid2ev.upsample import make_upsampler
+from vid2ev.upsample.cuts import CutDetector
+
+TRIPLES = 12  # of frames, spread over the clip
+BEST_DB = 100.0  # of pictures that are the same
+SMALLEST = 11  # px: the window of SSIM
+
+
+class Quality(NamedTuple):
+    """Means over the pictures."""
+
+    psnr_db: float
+    ssim: float
+
+
+def quality(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Quality | None:
+    """Of pictures [H, W, uint8] against true ones; None of none, or of pictures smaller than the window."""
+    from skimage.metrics import structural_similarity
+
+    each = []
+    for made, true in pairs:
+        if min(true.shape[:2]) < SMALLEST:
+            continue
+        mean = float(np.mean(np.square(made.astype(np.float64) - true)))
+        psnr_db = BEST_DB if mean == 0 else min(BEST_DB, 10 * math.log10(255**2 / mean))
+        window: dict[str, Any] = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+        each.append((psnr_db, float(structural_similarity(made, true, data_range=255, **window))))
+    return Quality(*(float(mean) for mean in np.mean(each, axis=0))) if each else None
+
+
+def interpolated(triples: Iterable[tuple[Frame, Frame, Frame]], method: str, threshold: float) -> Quality | None:
+    """How well an upsampler makes the middle one of three frames; "none" is light that goes straight."""
+    upsampler = make_upsampler("linear" if method == "none" else method, subframes=2, threshold=threshold)
+    pairs = []
+    for before, middle, after in triples:
+        made = next(iter(upsampler.between(before, after)))
+        pairs.append((srgb_codes(made.luminance), srgb_codes(middle.luminance)))
+    return quality(pairs)
+
+
+def triples_of(source: Source, threshold: float) -> list[tuple[Frame, Frame, Frame]]:
+    """Frames in a row, three at a time, spread over a source; none across a cut, and the second in the middle in
+    time."""
+    every = max(3, (source.frames_expected or 3 * TRIPLES) // TRIPLES)
+    cuts, last = CutDetector(threshold), list[Frame]()
+    kept: list[tuple[Frame, Frame, Frame]] = []
+    for index, frame in enumerate(source.frames()):
+        if last and cuts.begins_shot(last[-1], frame):
+            last.clear()
+        last = [*last, frame][-3:]
+        if index % every == 2 and len(last) == 3 and len(kept) < TRIPLES and _even(last):
+            kept.append((last[0], last[1], last[2]))
+    return kept
+
+
+def _even(frames: Sequence[Frame]) -> bool:
+    one, other = frames[1].t_ns - frames[0].t_ns, frames[2].t_ns - frames[1].t_ns
+    return abs(one - other) < 0.1 * (one + other)

@@ -1,0 +1,37 @@
+"""What was measured as a file for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from vid2ev.cost.measure import Cost
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import whole_file
+
+
+def check(name: str | None, source: str, overwrite: bool) -> tuple[Path, Path]:
+    """The places of the JSON and the PNG file; raises UsageError where one is taken."""
+    stem = name or f"{_short(source)}_cost"
+    places = Path(f"{stem}.json"), Path(f"{stem}.png")
+    for place in places:
+        if place.exists() and not overwrite:
+            raise UsageError(f"{place} exists; --overwrite replaces it")
+    return places
+
+
+def store(cost: Cost, place: Path) -> None:
+    """Write the JSON file, which is there as a whole or not at all; raises DataError."""
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(place) as file:
+            file.write(f"{json.dumps(cost.describe(), indent=2, allow_nan=False)}\n".encode())
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DataError(f"{place} cannot be written: {reason}; make room or access there") from error
+
+
+def _short(source: str) -> str:
+    """The name of a source without folder, suffix or what was asked of it."""
+    path = Path(source.removeprefix("synthetic:").removeprefix("scene:").partition(",")[0])
+    return path.name if path.is_dir() else path.stem
