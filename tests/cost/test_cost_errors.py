@@ -7,9 +7,9 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
+from moving_texture import texture
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from vid2ev.compare.comparison import compare
@@ -110,18 +110,6 @@ def test_quality_is_that_of_scikit_image() -> None:
     assert found == pytest.approx((psnr, ssim), rel=1e-12)
     assert quality([(true[0], true[0])]) == (BEST_DB, 1.0)
     assert quality([]) is None and quality([(true[0][:5], true[0][:5])]) is None
-
-
-def texture(tmp_path: Any, shift_px: float, frames: int = 9) -> str:
-    draw = np.random.default_rng(3)
-    wide = cv2.GaussianBlur(draw.random((64, 160)).astype(np.float32), (0, 0), 1.5)
-    wide = (wide - wide.min()) / (wide.max() - wide.min())
-    moved = [
-        cv2.warpAffine(wide, np.array([[1, 0, -20 - shift_px * k], [0, 1, 0]], np.float32), (96, 64))
-        for k in range(frames)
-    ]
-    np.save(tmp_path / "texture.npy", np.stack(moved).astype(np.float32))
-    return str(tmp_path / "texture.npy")
 
 
 def test_flow_makes_frames_that_were_left_out_better_than_a_straight_line(tmp_path: Any) -> None:

@@ -1,0 +1,167 @@
+"""The ladder on a clip: what is timed, what is compared, and on which stretch."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from moving_texture import texture
+
+from vid2ev import events_of
+from vid2ev.compare.comparison import compare
+from vid2ev.cost.measure import Cost, measured, stretch_of
+from vid2ev.cost.plot import plot
+from vid2ev.cost.table import cells, recommendation, table
+from vid2ev.errors import UsageError
+from vid2ev.recipe import Recipe
+from vid2ev.stream import Events
+
+SIMPLE: dict[str, Any] = {"sensor": "ideal", "fps": 50, "threads": 1, "repeats": 1}
+
+
+def ticks() -> Any:
+    """A clock that goes on by one second whenever it is looked at."""
+    return itertools.count().__next__
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return texture(tmp_path_factory.mktemp("clip"))
+
+
+@pytest.fixture(scope="module")
+def cost(clip: str) -> Cost:
+    return measured(clip, clock=ticks(), **SIMPLE | {"repeats": 2})
+
+
+def test_times_are_those_of_the_clock_in_multiples_of_the_clip(cost: Cost) -> None:
+    assert cost.span_s == 0.16 and cost.size == (96, 64)
+    assert {row.times for row in (cost.reference, *cost.rows)} == {(6.25, 6.25)}
+
+
+def test_errors_are_those_of_the_events_that_convert_writes(clip: str, cost: Cost) -> None:
+    """Against `events_of` with the options that a setting is said to stand for."""
+    options = {"sensor": "ideal", "fps": 50}
+    reference = Events.concatenate(events_of(clip, subframes=2 * cost.steps, **options))
+    assert cost.reference.events == len(reference) > 1000
+    changes: dict[str, dict[str, Any]] = {
+        "default": {},
+        "straight light": {"upsample": "none"},
+        "times of frames": {"overrides": ["timing=frame"]},
+        "at most 2 steps": {"max_subframes": 2},
+    }
+    rows = {row.rung.name: row for row in cost.rows}
+    assert {*changes, "half the size"} <= {*rows}
+    for name, changed in changes.items():
+        made = Events.concatenate(events_of(clip, **options | changed))
+        said = compare(made, reference, (96, 64))
+        assert rows[name].events == len(made)
+        assert rows[name].errors.distance == pytest.approx(said.distance, rel=1e-9)
+        assert rows[name].errors.timing_us == said.absolute_timing_error_us
+        assert rows[name].errors.count_error == said.count_error
+
+
+def test_light_on_its_way_is_nearer_than_light_that_goes_straight(cost: Cost) -> None:
+    errors = {row.rung.name: row.errors.distance or 0.0 for row in cost.rows}
+    assert errors["default"] < errors["at most 2 steps"] < errors["straight light"]
+    assert errors["linear"] == errors["straight light"]
+    assert cost.between["flow"] and cost.between["none"]
+    assert cost.between["flow"].psnr_db > cost.between["none"].psnr_db
+
+
+def test_all_but_the_times_is_the_same_again(clip: str, cost: Cost) -> None:
+    again = measured(clip, clock=ticks(), **SIMPLE | {"threads": 2})
+    for one, other in zip((cost.reference, *cost.rows), (again.reference, *again.rows), strict=True):
+        assert (one.rung, one.errors, one.events) == (other.rung, other.errors, other.events)
+    assert cost.between == again.between
+
+
+def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: Path) -> None:
+    told = json.loads(json.dumps(cost.describe(), allow_nan=False))
+    lines = cells(cost)
+    assert [line[1] for line in lines[1:]] == [told["reference"]["name"], *(row["name"] for row in told["settings"])]
+    assert all(len(line) == len(lines[0]) for line in lines)
+    ahead = {row["name"] for row in told["settings"] if row["front"]}
+    assert {line[1] for line in lines[1:] if line[0]} == ahead
+    assert [line[1] for line in lines if line[0] == ">"] == [told["recommended"]]
+    assert recommendation(cost) == table(cost).splitlines()[-1]
+    assert told["recommended"] in recommendation(cost)
+    plot(cost, tmp_path / "cost.png")
+    assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_each_pass_is_told_of_in_advance(clip: str) -> None:
+    said: list[tuple[int, int, str]] = []
+    fixed = {"overrides": ["timing=frame"], "upsample": "none", "given": ("upsample", "size", "effects")}
+    found = measured(clip, clock=ticks(), report=lambda *each: said.append(each), **SIMPLE | fixed)
+    assert [row.rung.name for row in found.rows] == ["default"] and found.reference.rung.options == {}
+    assert said == [(0, 4, "reference"), (1, 4, "default"), (2, 4, "reference"), (3, 4, "default")]
+    assert found.rows[0].errors.distance == 0
+
+
+def test_frames_are_compared_in_codes_of_the_same_camera(clip: str) -> None:
+    fixed = {"upsample": "none", "given": ("upsample",), "overrides": ["cis.frame_rate_hz=40", "timing=linear"]}
+    found = measured(clip, clock=ticks(), frame_camera=True, **SIMPLE | fixed)
+    errors = {row.rung.name: row.errors for row in found.rows}
+    assert errors["default"].rms_lsb == 0
+    assert 4 < (errors["frames without noise"].rms_lsb or 0) < 6  # (5.2 codes, and none below 0)
+    assert (errors["frames of an instant"].rms_lsb or 0) > 1
+    assert "frames, LSB" in table(found)
+
+
+def test_views_by_a_plane_are_compared_with_those_by_depth(clip: str, tmp_path: Path) -> None:
+    depth = np.full((64, 96), 4.0, np.float32)
+    depth[16:48, 30:70] = 1.0
+    np.save(tmp_path / "depth.npy", depth)
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "dvs"\ntranslation_mm = [60, 0, 0]\n')
+    fixed = {"upsample": "none", "given": ("upsample", "rig", "depth"), "overrides": ["timing=linear"]}
+    rig = {"rig": tmp_path / "rig.toml", "depth": str(tmp_path / "depth.npy")}
+    found = measured(clip, clock=ticks(), **SIMPLE | fixed | rig)
+    plane = next(row for row in found.rows if row.rung.group == "views")
+    assert plane.errors.views and 5 < plane.errors.views.psnr_db < 40 and plane.errors.views.ssim < 0.99
+    assert (plane.errors.distance or 0) > 0.05 and found.recommended is not plane
+
+
+@pytest.mark.parametrize(
+    ("options", "frames", "stretch"),
+    [
+        ({}, 30, (4.25, 5.25)),
+        ({"start": 2.0}, 30, (5.25, 6.25)),
+        ({"stop": 4.0}, 30, (1.5, 2.5)),
+        ({"start": 1.0, "stop": 1.5}, 30, (1.0, 1.5)),
+        ({"slowdown": 4.0}, 30, (4.25, 5.25)),
+        ({}, 15, (4.5, 5.0)),
+    ],
+)
+def test_the_stretch_is_the_middle(options: dict, frames: int, stretch: tuple[float, float]) -> None:
+    recipe = Recipe.of("synthetic:sine,size=64x48,fps=30,duration_s=9.5", "ideal", **options)
+    assert stretch_of(recipe, options, frames=frames) == pytest.approx(stretch, abs=0.05)
+    begin, end = stretch_of(recipe, options, duration_s=0.2)
+    assert begin is not None and end == pytest.approx(begin + 0.2)
+
+
+def test_larger_pictures_are_given_less_time() -> None:
+    spans = []
+    for size in ("640x480", "1280x720", "1920x1440"):
+        begin, end = stretch_of(Recipe.of(f"synthetic:sine,size={size},fps=30,duration_s=9", "ideal"), {})
+        spans.append((end or 0) - (begin or 0))
+    assert spans == pytest.approx([1, 1 / 3, 8 / 30], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"budget": "vR"}, "budget"),
+        ({"repeats": 0}, "repeats 0"),
+        ({"duration_s": 0.0}, "duration"),
+        ({"duration_s": 0.01}, "a single frame|no frame"),
+        ({"sensor": "no-such"}, "no-such"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(clip: str, options: dict, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        measured(clip, clock=ticks(), **SIMPLE | options)
