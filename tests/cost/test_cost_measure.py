@@ -85,7 +85,7 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     lines = cells(cost)
     assert [line[1] for line in lines[1:]] == [told["reference"]["name"], *(row["name"] for row in told["settings"])]
     assert all(len(line) == len(lines[0]) for line in lines)
-    ahead = {row["name"] for row in told["settings"] if row["front"]}
+    ahead = {row["name"] for row in (told["reference"], *told["settings"]) if row["front"]}
     assert {line[1] for line in lines[1:] if line[0]} == ahead
     assert [line[1] for line in lines if line[0] == ">"] == [told["recommended"]]
     assert recommendation(cost) == table(cost).splitlines()[-1]

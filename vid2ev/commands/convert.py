@@ -207,12 +207,17 @@ def _one(
     from vid2ev.commands.progress import bar, heard, kept
 
     budget = options.pop("budget")
-    if budget is not None and not dry_run:
-        options = _within(budget, video, directory, quiet, options)
+    if budget is not None:
+        from vid2ev.cost.front import Budget
+
+        Budget.parse(budget)
+        options = options if dry_run else _within(budget, video, directory, quiet, options)
     if dry_run or verbose:
         recipe, plan = _plan(video, directory, dict(options))
         if not quiet:
             click.echo(plan)
+            if dry_run and budget is not None:
+                click.echo(f"then with the fastest setting within the budget {budget}, by `vid2ev cost`")
         if dry_run:
             return recipe
     live = video == "-" or video.startswith("camera:")

@@ -49,7 +49,7 @@ def chosen(
     )  # fmt: skip
     best = cost.recommended
     if best is None:
-        raise UsageError(refusal(cost.rows, cost.budget))
+        raise UsageError(refusal(cost.settings, cost.budget))
     rung = best.rung
     note = {
         "asked": budget,

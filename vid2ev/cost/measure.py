@@ -53,14 +53,19 @@ class Cost:
     budget: Budget
 
     @property
+    def settings(self) -> list[Row]:
+        """All that a conversion can be asked for; so can the reference, if it differs from the finest in nothing."""
+        return [row for row in (self.reference, *self.rows) if not row.rung.float64]
+
+    @property
     def front(self) -> list[Row]:
         """The settings than which none is both faster and more accurate, from the fastest on."""
-        return front(self.rows)
+        return front(self.settings)
 
     @property
     def recommended(self) -> Row | None:
         """The setting to take, if one is within the budget."""
-        return recommended(self.rows, self.budget)
+        return recommended(self.settings, self.budget)
 
     def describe(self) -> dict[str, Any]:
         """All of it, ready for JSON."""
@@ -75,7 +80,7 @@ class Cost:
             "threads": self.threads,
             "machine": machine(),
             "steps": self.steps,
-            "reference": _described(self.reference),
+            "reference": _described(self.reference) | {"front": self.reference in ahead},
             "settings": rows,
             "interpolation": {name: found and found._asdict() for name, found in self.between.items()},
             "budget": self.budget.text,
@@ -132,7 +137,7 @@ def measured(
         threads,
         steps,
         rows[0],
-        tuple(rows[1:]) if ladder.rungs else tuple(rows),
+        tuple(rows[1:]),
         _between(recipe, ladder),
         limits,
     )

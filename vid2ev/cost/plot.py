@@ -41,7 +41,7 @@ def plot(cost: Cost, picture: Path) -> None:
 
     figure = Figure(figsize=(9.5, 6), layout="constrained")
     axes = figure.add_subplot()
-    rows = [row for row in cost.rows if row.errors.headline is not None]
+    rows = [row for row in cost.settings if row.errors.headline is not None]
     _scale(axes, cost, rows)
     _draw_front(axes, cost)
     for group in dict.fromkeys(row.rung.group for row in rows):

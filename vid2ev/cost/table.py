@@ -22,7 +22,7 @@ def recommendation(cost: Cost) -> str:
     """The setting to take, in one line."""
     best = cost.recommended
     if best is None:
-        return refusal(cost.rows, cost.budget)
+        return refusal(cost.settings, cost.budget)
     asked = best.rung.arguments() or "nothing to set"
     return f"within {cost.budget.text}: {best.rung.name} ({asked}), {best.time:.2g} x real time{_errors(best)}"
 

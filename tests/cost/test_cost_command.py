@@ -1,0 +1,105 @@
+"""`vid2ev cost`, and `convert --budget`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import hdf5plugin  # noqa: F401
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from matplotlib.image import imread
+from moving_texture import texture
+
+from vid2ev.commands import Commands
+from vid2ev.commands.convert import convert
+from vid2ev.commands.cost import cost
+
+COMMON = ["--sensor", "ideal", "--fps", "50", "--threads", "1"]
+
+
+@pytest.fixture
+def clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    texture(tmp_path, frames=6)
+    return "texture.npy"
+
+
+def call(command: Any, *arguments: str) -> Result:
+    """A command within the group that turns errors into sentences."""
+    group = Commands("vid2ev")
+    group.get_command = lambda ctx, name: command  # type: ignore[method-assign]
+    group.list_commands = lambda ctx: [command.name]  # type: ignore[method-assign]
+    return CliRunner().invoke(group, [command.name, *arguments], catch_exceptions=False)
+
+
+def made(path: str) -> dict[str, np.ndarray]:
+    with h5py.File(f"{path}/events.h5") as file:
+        return {name: file[f"events/{name}"][:] for name in "txyp"}
+
+
+def same(one: str, other: str) -> bool:
+    return all(np.array_equal(a, made(other)[name]) for name, a in made(one).items())
+
+
+def test_table_file_and_picture(clip: str) -> None:
+    done = call(cost, clip, *COMMON, "--repeats", "1", "--budget", "vR=0.02")
+    assert done.exit_code == 0, done.output
+    told = json.loads(Path("texture_cost.json").read_text())
+    assert told["budget"] == "vR=0.02" and told["reference"]["distance"] == 0
+    shown = {row["name"] for row in told["settings"]}
+    assert all(name in done.output for name in shown) and {"default", "straight light", "half the size"} <= shown
+    assert imread("texture_cost.png").shape[:2] == (600, 950)
+    refused = call(cost, clip, *COMMON)
+    assert refused.exit_code == 2 and "texture_cost.json exists; --overwrite replaces it" in refused.output
+    again = call(cost, clip, *COMMON, "--repeats", "1", "--overwrite", "--json", "--upsample", "none")
+    assert again.exit_code == 0, again.output
+    assert "upsample" not in json.dumps(json.loads(again.stdout)["settings"])
+
+
+def test_a_budget_is_kept_and_noted(clip: str) -> None:
+    done = call(convert, clip, *COMMON, "--no-preview", "-o", "out", "--budget", "time=1000000x")
+    assert done.exit_code == 0, done.output
+    note = json.loads(Path("out/manifest.json").read_text())["budget"]
+    assert note["asked"] == "time=1000000x" and note["errors"]["distance"] == 0
+    assert note["setting"] in done.output
+    plain = call(convert, clip, *COMMON, "--no-preview", "-o", "plain", *note["arguments"].split())
+    assert plain.exit_code == 0 and same("out", "plain")
+
+
+def test_what_is_given_explicitly_stays(clip: str) -> None:
+    fixed = ["--upsample", "none", "--effects", "all", "--size", "48x32", "--set", "timing=frame"]
+    done = call(convert, clip, *COMMON, *fixed, "--no-preview", "-o", "out", "--budget", "vR=1")
+    assert done.exit_code == 0, done.output
+    note = json.loads(Path("out/manifest.json").read_text())["budget"]
+    assert (note["arguments"], note["setting"]) == ("", note["setting"]) and note["setting"] in ("default", "reference")
+    assert call(convert, clip, *COMMON, *fixed, "--no-preview", "-o", "plain").exit_code == 0
+    assert same("out", "plain")
+
+
+def test_a_conversion_that_goes_on_keeps_its_setting(clip: str) -> None:
+    asked = [clip, *COMMON, "--no-preview", "-o", "out", "--budget", "vR=0.3"]
+    assert call(convert, *asked).exit_code == 0
+    before = Path("out/manifest.json").read_bytes()
+    done = call(convert, *asked, "--resume")
+    assert done.exit_code == 0 and "as before" in done.output
+    assert Path("out/manifest.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("budget", "said"),
+    [("vR=x", "such as vR=0.05"), ("lsb=1", "lsb cannot be measured here"), ("time=0", "allow more")],
+)
+def test_a_budget_that_cannot_be_is_refused_before_anything_is_written(clip: str, budget: str, said: str) -> None:
+    done = call(convert, clip, *COMMON, "-o", "out", "--budget", budget)
+    assert done.exit_code == 2 and said in done.output and done.output.count("\n") == 1
+    assert not Path("out").exists() and not Path("out.partial").exists()
+
+
+def test_a_dry_run_tries_nothing(clip: str) -> None:
+    done = call(convert, clip, *COMMON, "-o", "out", "--budget", "vR=0.1", "--dry-run")
+    assert done.exit_code == 0 and "budget" in done.output
+    assert call(convert, clip, *COMMON, "-o", "out", "--budget", "wrong", "--dry-run").exit_code == 2
