@@ -74,15 +74,15 @@ class Drive:
         return moved * np.float32(math.exp(lamp))
 
 
-def load_scene(folder: Path, name: str) -> Scene:
-    """A recording of the DAVIS346; the pixels of `badminton` are those of the wall."""
+def load_scene(folder: Path, name: str, wall_only: bool = False) -> Scene:
+    """A recording of the DAVIS346; without what is before the wall of `badminton`, if only that is wanted."""
     import cv2
     from scipy.io import loadmat
 
     t, x, y, p = loadmat(folder / "hybrid" / f"{name}.mat")["events"].T
     frame = cv2.imread(str(folder / "hybrid" / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
     kept = np.ones(frame.shape, bool)
-    if name == "badminton":
+    if wall_only:
         kept[SHUTTLE] = False
     events = Events(t - t[0], x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8))
     return Scene(of(events, kept), frame.astype(np.float32) / 255, int(t[-1] - t[0]), kept)
@@ -143,7 +143,7 @@ def numbers(found: Statistics, kept: np.ndarray, cameras: int = 1) -> dict[str, 
     alone, gaps = sum(found.isolated), found.intervals.sum(axis=1)
     times = counts.size * found.seconds
     least = hot_from(counts)
-    percentiles = ", ".join(f"{found.interval_us(percent) or 0:,}" for percent in (5, 50, 95))
+    percentiles = ", ".join(f"{found.interval_us(percent):,}" for percent in (5, 50, 95)) if gaps.any() else "-"
     return {
         "events per pixel": f"{found.events / counts.size:.3g}",
         "events per pixel and second": f"{found.events / times:.3g}",
@@ -152,9 +152,9 @@ def numbers(found: Statistics, kept: np.ndarray, cameras: int = 1) -> dict[str, 
         "pixels with an event": f"{100 * np.mean(counts > 0):.3g} %",
         "of those, with two or more": f"{100 * np.mean(counts[counts > 0] > 1):.3g} %",
         "hot pixels": f"{100 * np.mean(counts >= least):.2g} %",
-        "shortest interval": f"{found.shortest_us} us",
-        "intervals, 5, 50, 95 % below": f"{percentiles} us",
-        "of opposite polarity": f"{100 * gaps[0] / max(gaps.sum(), 1):.3g} %",
+        "shortest interval [us]": str(found.shortest_us or "-"),
+        "5, 50, 95 % of the intervals below [us]": percentiles,
+        "intervals between opposite polarities": f"{100 * gaps[0] / gaps.sum():.3g} %" if gaps.any() else "-",
     }
 
 
@@ -204,7 +204,7 @@ def flicker(folder: Path) -> tuple[str, dict[str, Any]]:
 
 def wall(folder: Path) -> tuple[str, dict[str, Any]]:
     """The wall behind the shuttlecock, which does not move: noise against light."""
-    scene = load_scene(folder, "badminton")
+    scene = load_scene(folder, "badminton", wall_only=True)
     height, width = scene.light.shape
     found = {"real": (statistics_of([scene.events], (width, height), (0, scene.span_us)), 1)}
     for name, changes in ((PRESET, ()), (f"{PRESET}, changed", ASKED)):
@@ -230,7 +230,25 @@ def wall(folder: Path) -> tuple[str, dict[str, Any]]:
             for name, rows in rates.items()
         },
     )
-    return f"{first}\n\n{second}", {"found": {name: one for name, (one, _) in found.items()}, "rates": rates}
+    facts = {"found": {name: one for name, (one, _) in found.items()}, "rates": rates}
+    return "\n\n".join([first, second, *periods(folder, scene)]), facts
+
+
+def periods(folder: Path, scene: Scene) -> list[str]:
+    """What two periods of the lamp say: of the thresholds, for the light is where it was; and of the wall."""
+    polarities = load_scene(folder, "badminton").events.p
+    on, off = (int(np.count_nonzero(polarities == p)) for p in (1, 0))
+    ratio, error = off / on, off / on * math.sqrt(1 / on + 1 / off)
+    said = [f"threshold_on / threshold_off = OFF / ON = {ratio:.2f} +- {error:.2f}"]
+    events, light = scene.events, scene.light[scene.events.y, scene.events.x]
+    part = np.digitize(light, [WALL_LEVELS[2], WALL_LEVELS[4], WALL_LEVELS[5]])
+    for name, chosen in (("dark", part == 0), ("middle", part == 1), ("bright", part == 3)):
+        for polarity, chosen_p in (("OFF", events.p == 0), ("ON", events.p == 1)):
+            turns = np.exp(2j * np.pi * events.t[chosen & chosen_p] / MAINS_US)
+            mean, instant = turns.mean(), np.angle(turns.mean()) / (2 * np.pi) * MAINS_US % MAINS_US
+            strength = f"{abs(mean):.2f} +- {1 / math.sqrt(len(turns)):.2f}"
+            said.append(f"{name} wall, {polarity}: strength at 100 Hz {strength}, most at {instant / 1000:.1f} ms")
+    return said
 
 
 def stacked(cameras: list[Events], scene: Scene) -> Statistics:
@@ -278,9 +296,9 @@ def draw(lamp: dict[str, Any], noise: dict[str, Any], vga: dict[str, Any], pictu
     axes = figure.subplots(2, 3)
     draw_time(axes[0, 0], lamp)
     draw_classes(axes[0, 1:], lamp)
-    intervals(axes[1, 0], lamp["found"], "toy: intervals of a pixel")
+    intervals(axes[1, 0], lamp["found"], "toy: intervals")
     draw_rates(axes[1, 1], noise)
-    intervals(axes[1, 2], vga["found"], "quiet VGA pixels: intervals of a pixel")
+    intervals(axes[1, 2], vga["found"], "quiet VGA: intervals")
     figure.savefig(picture, dpi=80, metadata={"Software": None})
 
 

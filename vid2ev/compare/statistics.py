@@ -6,10 +6,10 @@
     ON share     ON events / events
 
 A Poisson process of rate r per pixel, seen for a time T, has r^2 (T - s) exp(-r s) ds intervals of s ... s + ds in
-each pixel (a long one does not fit in often: short recordings show short intervals), and off the border
-r exp(-2 (9 r) neighbour_us) isolated events per second.  A refractory period is a floor below which there is no
-interval.  Light that moves puts events beside each other, noise does not: isolated events are an estimate of noise from
-below, for noise amid moving light, or within `neighbour_us` of noise, is not isolated.
+each pixel (a long one does not fit in often: short recordings show short intervals), and r exp(-2 (9 r) neighbour_us)
+isolated events per second off the border.  A refractory period is a floor below which there is no interval.  Light
+that moves puts events beside each other, noise does not: isolated events are an estimate of noise from below, for
+noise amid moving light, or within `neighbour_us` of noise, is not isolated.
 
 Events are looked at once, in order of time; the memory is 25 bytes per pixel.
 
