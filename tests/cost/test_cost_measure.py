@@ -13,8 +13,9 @@ from moving_texture import texture
 
 from vid2ev import events_of
 from vid2ev.compare.comparison import compare
-from vid2ev.cost.measure import Cost, measured, stretch_of
+from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.plot import plot
+from vid2ev.cost.stretch import stretch_of
 from vid2ev.cost.table import cells, recommendation, table
 from vid2ev.errors import UsageError
 from vid2ev.recipe import Recipe

@@ -174,8 +174,8 @@ def _size(recipe: Recipe, given: Given) -> list[Rung]:
 def _several(singles: Mapping[str, Rung]) -> list[Rung]:
     """Some that change several things, from much to little; those of which only one part is there are left out."""
     ways = {
-        "light": ("times on a line", "effects auto"),
-        "lighter": ("times on a line", "effects auto", "at most 4 steps"),
+        "light": ("filter after log", "at most 8 steps"),
+        "lighter": ("times on a line", "at most 4 steps"),
         "least": ("times of frames", "effects none", "straight light"),
     }
     found = []

@@ -13,22 +13,21 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.conversion import usable_cores
-from vid2ev.cost.errors import Reference
+from vid2ev.cost.errors import Errors, Reference
 from vid2ev.cost.front import DEFAULT, Budget, Row, front, recommended
 from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
 from vid2ev.cost.passes import run
 from vid2ev.cost.quality import Quality, interpolated, triples_of
+from vid2ev.cost.rung import Rung
+from vid2ev.cost.stretch import FRAMES, Stretch, stretch_of
 from vid2ev.errors import UsageError
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import machine
 
-LONGEST_S, FRAMES = 2.0, 30  # of a clip of 640x480 pixels; less of larger ones, in proportion
-FEWEST, VGA = 8, 640 * 480
 REPEATS = 3
 
 Report = Callable[[int, int, str], object]  # how many passes are done, of how many, and what comes next
-Stretch = tuple[float | None, float | None]
 
 
 @dataclass(frozen=True)
@@ -143,31 +142,6 @@ def measured(
     )
 
 
-def stretch_of(
-    recipe: Recipe, options: Mapping[str, Any], duration_s: float | None = None, frames: int = FRAMES
-) -> Stretch:
-    """The start and stop [s on the source's own clock] of the middle of what is asked for; None for its ends."""
-    source, slowdown = recipe.source, float(options.get("slowdown") or 1)
-    start, stop, whole_s = options.get("start"), options.get("stop"), source.duration_expected_s
-    whole_s = None if whole_s is None else whole_s * slowdown
-    wanted_s = duration_s or _wanted_s(frames, source.size, source.frames_expected, whole_s)
-    if whole_s is not None and whole_s <= wanted_s:
-        return start, stop
-    begin_s = start
-    if begin_s is None:
-        begin_s = next(source.frames()).t_ns / 1e9 * slowdown
-    begin_s += 0 if whole_s is None else (whole_s - wanted_s) / 2
-    return round(float(begin_s), 6), round(float(begin_s) + wanted_s, 6)
-
-
-def _wanted_s(frames: int, size: tuple[int, int], of_all: int | None, whole_s: float | None) -> float:
-    share = min(1.0, VGA / (size[0] * size[1]))
-    if not of_all or not whole_s:
-        return LONGEST_S * share
-    frame_s = whole_s / of_all
-    return max(FEWEST * frame_s, share * min(LONGEST_S, frames * frame_s))
-
-
 class _Turns:
     """Counts the passes for a report."""
 
@@ -191,15 +165,10 @@ def _rows(
     if first.span_ns[0] >= first.span_ns[1]:
         raise UsageError(f"{options['video']}: a single frame in the stretch; lengthen --duration")
     reference = Reference(first.sent, (first.span_ns[0] // 1000, first.span_ns[1] // 1000))
-    found = []
-    for rung in ladder.all:
-        if rung is ladder.reference:
-            found.append((reference.errors_of_itself(), first.events))
-            continue
+    found = [(reference.errors_of_itself(), first.events)]
+    for rung in ladder.rungs:
         turns.next(rung.name)
-        here = views and rung.group == "views"
-        done = run(options, rung, threads, keep=True, views=here)
-        found.append((reference.errors(done.sent, rung.coarse, here), done.events))
+        found.append(_tried(options, rung, threads, reference))
     lasting_s = (first.span_ns[1] - first.span_ns[0]) / 1e9
     times = _timed(options, ladder, threads, turns, clock, lasting_s)
     rows = [
@@ -207,6 +176,13 @@ def _rows(
         for rung, (errors, events) in zip(ladder.all, found, strict=True)
     ]
     return rows, first.span_ns
+
+
+def _tried(options: Mapping[str, Any], rung: Rung, threads: int, reference: Reference) -> tuple[Errors, int]:
+    """The errors of a setting, and how many events it has."""
+    views = rung.group == "views"
+    done = run(options, rung, threads, keep=True, views=views)
+    return reference.errors(done.sent, rung.coarse, views), done.events
 
 
 def _timed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +65,10 @@ def plot(cost: Cost, picture: Path) -> None:
 def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    least = max(LEAST, min((_error(row) for row in rows if _error(row) > 0), default=LEAST))
+    seen = [_error(row) for row in rows if _error(row) >= LEAST] or [LEAST]
+    least = 10.0 ** math.floor(math.log10(min(seen)))
     axes.set_yscale("symlog", linthresh=least, linscale=0.4)
-    axes.set_ylim(bottom=-0.4 * least)
+    axes.set_ylim(-0.4 * least, 2 * max(seen))
     axes.set_xscale("log")
     times = [row.time for row in (*rows, cost.reference)]
     axes.set_xlim(0.8 * min(times), 1.6 * max(times))
@@ -118,7 +120,7 @@ def _label(axes: Any, rows: list[Row]) -> None:
         taken.append((x, x + width, y + up))
         axes.annotate(
             row.rung.name, (row.time, _error(row)), xytext=(8, up * 0.72 - 3), textcoords="offset points", fontsize=8,
-            color=COLOURS[row.rung.group],
+            color=COLOURS[row.rung.group], bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5},
         )  # fmt: skip
 
 
