@@ -5,15 +5,17 @@ from __future__ import annotations
 import itertools
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from moving_texture import texture
 
-from vid2ev import events_of
+from vid2ev import Dvs, Frame, events_of, load_sensor
 from vid2ev.compare.comparison import compare
 from vid2ev.cost.measure import Cost, measured
+from vid2ev.cost.passes import Float64Dvs
 from vid2ev.cost.plot import plot
 from vid2ev.cost.stretch import stretch_of
 from vid2ev.cost.table import cells, recommendation, table
@@ -166,3 +168,24 @@ def test_larger_pictures_are_given_less_time() -> None:
 def test_what_cannot_be_meant_is_refused(clip: str, options: dict, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         measured(clip, clock=ticks(), **SIMPLE | options)
+
+
+def test_what_passes_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    once = SimpleNamespace(source=SimpleNamespace(rewindable=False))
+    monkeypatch.setattr(Recipe, "of", lambda **_: once)
+    with pytest.raises(UsageError, match="passes once"):
+        measured("-")
+
+
+def test_the_reference_carries_all_lags_in_float64() -> None:
+    """What lags have beyond float32 is kept in every pixel that moves; otherwise only where they are steep."""
+    spec, draw = load_sensor("paper"), np.random.default_rng(0)
+    frames = [Frame((0.3 + 0.01 * k * draw.random((8, 16))).astype(np.float32), 100_000 * k) for k in range(9)]
+    rests, events = [], []
+    for kind in (Float64Dvs, Dvs):
+        sensor = kind(spec, (16, 8))
+        events.append(Events.concatenate(list(sensor.run(frames))))
+        rests.append(np.count_nonzero(sensor.state()["rest"].reshape(2, -1)[:, :128], axis=1).min())
+    assert rests[0] > 120 and rests[1] == 0
+    assert len(events[0]) == len(events[1]) > 10
+    assert np.abs(events[0].t - events[1].t).max() <= 1

@@ -242,10 +242,9 @@ def _within(budget: str, video: str, directory: Path, quiet: bool, options: dict
     if choice is None:
         rest = dict(options)
         Outputs.taken_from(rest)
-        for name in ("overwrite", "resume"):
-            rest.pop(name)
+        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume"))
         with pass_bar(quiet) as report:
-            choice = chosen(video, budget, rest, given=given(), threads=rest.pop("threads"), report=report)
+            choice = chosen(video, budget, rest, given=given(), threads=threads, report=report)
     if not quiet:
         click.echo(choice.line)
     return choice.rung.applied(options) | {"notes": {"budget": choice.note}}
