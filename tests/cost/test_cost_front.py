@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.cost.errors import Errors
-from vid2ev.cost.front import Budget, Row, front, recommended, refusal
+from vid2ev.cost.front import AS_FAST, Budget, Row, front, recommended, refusal
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError
 
@@ -95,10 +95,17 @@ def test_nothing_is_better_than_the_front_and_the_rest_is_worse_than_some_of_it(
 def test_the_recommended_is_on_the_front(places: Places, limit: float) -> None:
     rows = [row(time, distance) for time, distance in places]
     best = recommended(rows, Budget.parse(f"vR={limit!r}"))
-    within = [time for time, error in places if error <= limit]
+    within = [(time, error) for time, error in places if error <= limit]
     assert (best is None) == (not within)
     if best is not None:
-        assert best.time == min(within) and best in front(rows)
+        as_fast = [error for time, error in within if time <= AS_FAST * min(within)[0]]
+        assert best.time <= AS_FAST * min(within)[0] and best.errors.distance == min(as_fast)
+        assert best in front(rows)
+
+
+def test_what_is_as_fast_to_within_noise_is_judged_by_its_error() -> None:
+    rows = [row(1.0, 0.03), row(1.04, 0.02), row(1.06, 0.01)]
+    assert recommended(rows, Budget.parse("vR=0.05")) is rows[1]
 
 
 def test_frames_alone_are_judged_by_their_own_error() -> None:

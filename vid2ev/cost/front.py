@@ -7,7 +7,8 @@ A budget is a text such as `vR=0.05`, `us=50`, `time=10x`, or several with comma
     lsb         error of frames
     time        how long it may take, in multiples of how long the clip is
 
-Recommended is the fastest setting within all limits; where time is the only one, the most accurate within it.
+Recommended is the fastest setting within all limits, and of those that are as fast to within 5 %, which is what a
+machine's noise makes of them, the most accurate; where time is the only limit, the most accurate within it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError, nearest
 
 DEFAULT = "vR=0.05"
+AS_FAST = 1.05
 LIMITS = ("vR", "count", "us", "lsb", "time")
 
 
@@ -82,9 +84,9 @@ def figure(row: Row, name: str) -> float:
 def recommended(rows: Sequence[Row], budget: Budget) -> Row | None:
     """The setting to take, of those that may be recommended; None where none is within the budget."""
     within = [row for row in rows if row.rung.offered and budget.holds(row)]
-    if budget.only_time():
-        return min(within, key=lambda row: (_error(row), row.time), default=None)
-    return min(within, key=lambda row: (row.time, _error(row)), default=None)
+    slowest = math.inf if budget.only_time() else AS_FAST * min((row.time for row in within), default=0.0)
+    as_fast = [row for row in within if row.time <= slowest]
+    return min(as_fast, key=lambda row: (_error(row), row.time), default=None)
 
 
 def refusal(rows: Sequence[Row], budget: Budget) -> str:
