@@ -116,6 +116,17 @@ def test_frames_are_compared_in_codes_of_the_same_camera(clip: str) -> None:
     assert "frames, LSB" in table(found)
 
 
+def test_frame_cameras_alone_are_judged_in_codes(clip: str, tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "cis"\n')
+    found = measured(
+        clip, clock=ticks(), rig=tmp_path / "rig.toml", **SIMPLE | {"upsample": "none", "given": ("upsample",)}
+    )
+    assert found.budget.text == "lsb=1" and found.recommended in (found.reference, found.rows[0])
+    assert all(row.errors.distance is None and row.errors.rms_lsb is not None for row in found.rows)
+    assert "timing" not in table(found)
+    plot(found, tmp_path / "cost.png")
+
+
 def test_views_by_a_plane_are_compared_with_those_by_depth(clip: str, tmp_path: Path) -> None:
     depth = np.full((64, 96), 4.0, np.float32)
     depth[16:48, 30:70] = 1.0

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 @click.command(short_help="Say what accuracy costs in time, on your clip and machine.")
 @click.argument("source")
 @click.option(
-    "--budget", default="vR=0.05", show_default=True, metavar="LIMIT[,LIMIT...]",
+    "--budget", metavar="LIMIT[,LIMIT...]",
     help="What a setting may cost: vR=0.05 (distance), count=0.01, us=50 (median timing error), lsb=1 (frames),"
-    " time=10x (multiples of real time).",
+    " time=10x (multiples of real time).  [default: vR=0.05, of frame cameras alone lsb=1]",
 )  # fmt: skip
 @click.option("--duration", "duration_s", type=click.FloatRange(0, min_open=True), metavar="S", help="How much of the"
     " middle of the clip to take.  [default: 30 frames of 640x480, less of larger ones]")  # fmt: skip

@@ -21,7 +21,7 @@ from vid2ev.cost.errors import Errors
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError, nearest
 
-DEFAULT = "vR=0.05"
+DEFAULT, DEFAULT_OF_FRAMES = "vR=0.05", "lsb=1"
 AS_FAST = 1.05
 LIMITS = ("vR", "count", "us", "lsb", "time")
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from vid2ev.conversion import usable_cores
 from vid2ev.cost.errors import Errors, Reference
-from vid2ev.cost.front import DEFAULT, Budget, Row, front, recommended
+from vid2ev.cost.front import DEFAULT, DEFAULT_OF_FRAMES, Budget, Row, front, recommended
 from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
 from vid2ev.cost.passes import run
 from vid2ev.cost.quality import Quality, interpolated, triples_of
@@ -91,7 +91,7 @@ def measured(
     video: str | Path,
     *,
     given: Collection[str] = (),
-    budget: str = DEFAULT,
+    budget: str | None = None,
     duration_s: float | None = None,
     frames: int = FRAMES,
     repeats: int = REPEATS,
@@ -103,7 +103,7 @@ def measured(
     """Run the ladder on the middle of a clip.
 
     given       names of options that have been given explicitly: they are the same in all settings
-    budget      limits of error and time (`front`)
+    budget      limits of error and time (`front`); by default vR=0.05, or lsb=1 where there are frame cameras only
     duration_s  how much of the clip to take, on its own clock; by default as many `frames` of 640x480 pixels, less of
                 larger ones, and at most 2 s
     repeats     how often each setting is timed
@@ -112,7 +112,7 @@ def measured(
 
     Raises UsageError for a source that passes once and for what cannot be meant, DataError as the source does.
     """
-    limits = Budget.parse(budget)
+    limits = None if budget is None else Budget.parse(budget)
     if repeats < 1 or (duration_s is not None and not duration_s > 0):
         raise UsageError(f"repeats {repeats}, duration {duration_s}: expected at least 1, and more than 0 s")
     threads = threads or usable_cores()
@@ -138,7 +138,7 @@ def measured(
         rows[0],
         tuple(rows[1:]),
         _between(recipe, ladder),
-        limits,
+        limits or Budget.parse(DEFAULT if any(mount.kind == "dvs" for mount in recipe.mounts) else DEFAULT_OF_FRAMES),
     )
 
 
