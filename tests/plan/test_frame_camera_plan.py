@@ -165,7 +165,8 @@ def test_effects_by_name() -> None:
     spec = load_cis("phone", ["cis.colour=false"])
     seen = exposed(spec, size, light)
     assert frame_plan_of(seen, spec, effects="all").spec == spec
-    assert frame_plan_of(seen, spec, effects="none").spec.effects() == []
+    none = frame_plan_of(seen, spec, effects="none")
+    assert none.spec.effects() == [] and none.max_lsb is None and "no bound" in str(none)
     assert frame_plan_of(seen, spec, effects="noise,exposure").spec.effects() == ["exposure", "noise"]
     assert set(FRAME_EFFECTS) == set(EFFECTS) and names_of("all") == list(KNOWN)
     with pytest.raises(UsageError, match="did you mean shot_noise"):
@@ -191,3 +192,26 @@ def test_laws_of_random_changes() -> None:
         assert np.mean(np.abs(shots).max(axis=1) > poisson_most(mean, number)) <= 0.003
         assert poisson_most(mean, number) < 4 * np.abs(shots).max()
     assert surely_square(1.0, 1.0, 0) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("name", ["edge", "sine"])
+def test_bounds_add_up(name: str) -> None:
+    """Of everything that auto may leave out, at once."""
+    size, light = frames(name)
+    spec = PLAIN.model_copy(
+        update={
+            "exposure_us": 9000,
+            "shading": (0.4, -0.9),
+            "prnu": 0.05,
+            "dsnu": 2,
+            "full_well_e": 6000,
+            "noise_lsb": 9,
+        }
+    )
+    seen = exposed(spec, size, light)
+    gone = [effect for effect in spec.effects() if FRAME_EFFECTS[effect].ns > 0]
+    changes = {key: value for effect in gone for key, value in FRAME_EFFECTS[effect].off.items()}
+    change = codes(spec, size, light) - codes(spec.model_copy(update=changes), size, light)
+    bounds = [FRAME_EFFECTS[effect].omission(seen, spec).levels for effect in gone]
+    assert np.abs(change).max() <= sum(bound.most for bound in bounds) + 1
+    assert np.sqrt(np.mean(change**2)) <= sum(bound.rms for bound in bounds) + 1

@@ -105,6 +105,8 @@ def test_the_table_counts_what_a_recording_makes(tmp_path: Path) -> None:
     made = manifest["counts"]["subframes"]
     assert made > 10 and row.effect == "subframes" and f"{made} made" in row.omission.figure
     assert read_manifest(tmp_path / "out")["plan"][""]["rows"][0] == row.describe()
+    single = plans_of(Recipe.of(video, subframes=1, **options))[""].rows[0]
+    assert (single.fate, single.omission.kind, single.ns_per_pixel) == ("kept", "no bound yet", 0.0)
     for method in ("none", "linear"):
         rows = plans_of(Recipe.of(video, upsample=method, **options))[""].rows
         assert [row.effect for row in rows] == []

@@ -43,10 +43,11 @@ def plan_text(plan: Mapping[str, Any]) -> str:
     """A plan's description as one line."""
     rows = [row for row in plan["rows"] if row["effect"] not in BEFORE_THE_SENSOR]
     gone = ", ".join(f"{row['effect']} {row['fate']}" for row in rows if row["fate"] != "kept") or "all effects kept"
-    if "max_lsb" in plan:
-        return f"{gone}; changes levels by at most {plan['max_lsb']:.2g} LSB"
-    bound = "no bound" if plan["distance"] is None else f"at most {plan['distance']:.2g}"
-    return f"{gone}; changes the distance by {bound}"
+    what, most, unit = (
+        ("levels", plan["max_lsb"], " LSB") if "max_lsb" in plan else ("the distance", plan["distance"], "")
+    )
+    bound = "no bound" if most is None else f"at most {most:.2g}{unit}"
+    return f"{gone}; changes {what} by {bound}"
 
 
 def sensor_text(sensor: Mapping[str, Any]) -> str:

@@ -84,8 +84,8 @@ class Expose:
         self._sum, self._square = self._sum + float(light.sum()), self._square + float(np.vdot(light, light))
         self._least, self._most = min(self._least, float(light.min())), max(self._most, float(light.max()))
         for name, without in lights.items():
-            if name:
-                self._add(name, (whole - without) * self._shade)
+            if name:  # (a bound without the shading, too)
+                self._add(name, (whole - without) * np.maximum(self._shade, 1.0))
         if "shading" in self._changes:
             self._add("shading", light - whole)
         self._add("clip", light - np.clip(light, *self._range()))

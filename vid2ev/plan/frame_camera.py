@@ -5,6 +5,10 @@ in the distance of `stream.exposed`: 0.01 lets no level of any exposure change b
 gives way to the light in the middle of it.  A rolling shutter costs nothing and stays, and so do the range and the
 rounding of the ADC, which make what the camera sends.
 
+What is left out together changes levels by the sum of the bounds at most: each holds without those before it in the
+order noise, fixed pattern, well, shading, exposure.  There is none for exposure and rolling shutter at once, which only
+a person asks for.
+
 Costs are nanoseconds per value of an exposure, of one thread; the exposure's is that of the frames of light in it.
 """
 
@@ -59,9 +63,9 @@ class FramePlan(Plan):
     """What of a frame camera is simulated; `distance` is that of `stream.exposed`."""
 
     @property
-    def max_lsb(self) -> float:
-        """Bound on the change of a level by all that is left out together [LSB]."""
-        return ((self.distance or 0.0) / ROUNDING) ** 0.5
+    def max_lsb(self) -> float | None:
+        """Bound on the change of a level by all that is left out together [LSB]; None where there is none."""
+        return None if self.distance is None else (self.distance / ROUNDING) ** 0.5
 
     def describe(self) -> dict[str, Any]:
         """The plan, ready for JSON."""
@@ -70,6 +74,8 @@ class FramePlan(Plan):
     def in_all(self) -> str:
         """What all that is left out changes, in words."""
         allowed = f"tolerance {self.tolerance:g}: {(self.tolerance / ROUNDING) ** 0.5:.2g} LSB"
+        if self.max_lsb is None:
+            return f"what all that is left out changes has no bound, {allowed}"
         return f"all that is left out changes no level by more than {self.max_lsb:.2g} LSB, {allowed}"
 
 
@@ -86,7 +92,8 @@ def frame_plan_of(
         kept = names_of(effects)
         gone = [name for name in used if name not in kept]
     changes = {key: value for name in gone for key, value in FRAME_EFFECTS[name].off.items()}
-    distance = together(*(omissions[name].distance or 0.0 for name in gone))
+    bounds = [omissions[name].distance or 0.0 for name in gone]
+    distance = None if {"exposure", "rolling_shutter"} <= {*gone} else together(*bounds)
     rows = [FrameRow(name, _fate(name, gone, said), said, _cost(name, seen), 0.0) for name, said in omissions.items()]
     rows += [FrameRow(name, "kept", omission(seen, spec), 0.0, 0.0) for name, omission in ALWAYS.items()]
     shown = effects if isinstance(effects, str) else ",".join(effects)

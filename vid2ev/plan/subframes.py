@@ -51,10 +51,15 @@ class Subframes:
         intervals, made = f"of {self.intervals} intervals {self.still} still", f"{self.made} made"
         if self.still == self.intervals:
             return Row("subframes", "dropped", Omission(0.0, "exact", made, intervals), 0.0, 0.0)
+        if self.speed_px_per_s is None:
+            why = f"{intervals}; motion was not looked at"
+            return Row("subframes", "kept", Omission(None, "no bound yet", made, why), 0.0, 0.0)
         figure = f"{self.worst_us:.3g} us, {made}"
         limited = f", {self.limited} at the limit of sub-frames" if self.limited else ""
         why = f"{intervals}; with those made crossings are up to {self.left_us:.3g} us off{limited}"
-        return Row("subframes", "kept", Omission(None, "estimate", figure, why), NS_PER_PIXEL, 0.0)
+        return Row(
+            "subframes", "kept", Omission(None, "estimate", figure, why), NS_PER_PIXEL if self.made else 0.0, 0.0
+        )
 
     def _note(self, seconds: float, shift_px: float) -> None:
         off_us = 1e6 * KAPPA_PER_PX * shift_px * seconds / 8
