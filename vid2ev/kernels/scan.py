@@ -89,9 +89,7 @@ def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
                 scratch[i] = F(0.0)
             scratch[REFINED] = F(steep)
         if steep > 0:
-            refine(block, rest, scratch, n, flags, num, iv)
-            for i in range(n):
-                flagged[i] = np.uint8(reaches(block, scratch, i, flags, num, iv))
+            refine(block, rest, scratch, flagged, n, flags, num, iv)
     if len(flags.noise) and not iv.noise_resolved:
         flag_rice(block, scratch, flagged, p0, n, flags, num, iv)
 
@@ -266,10 +264,11 @@ def is_steep(light, e1, e2, num):
 
 
 @inner
-def refine(block, rest, scratch, n, flags, num, iv):
+def refine(block, rest, scratch, flagged, n, flags, num, iv):
     """Where lags are steep, step them in float64: `rest` holds what they have beyond float32.
 
     It counts for the pixels that are steep, and a pixel that is not is left as it is, whatever its neighbours are.
+    Whether a steep pixel reaches a level float32 cannot tell: it is flagged, unless it is bad.
     """
     x1, w1, x2, g, w2 = iv.x1, iv.w1, iv.x2, iv.g, iv.w2
     for i in range(n):
@@ -291,6 +290,10 @@ def refine(block, rest, scratch, n, flags, num, iv):
             scratch[NEW2 + i] = new2
             scratch[REST2 + i] = new2 - np.float64(scratch[NEW2 + i])
         rest[i], rest[PITCH + i] = scratch[REST1 + i], scratch[REST2 + i]
+        flagged[i] = np.uint8(block[HIGH * PITCH + i] < F(np.inf))
+        if len(flags.noise):
+            y = F(np.float64(scratch[NEW + i]) - new_lag(scratch, len(flags.poles), i, flags))
+            scratch[SEEN + i] = log_level_32(max(y, F(0.0)), num.curve) + F(iv.leak1)
 
 
 @inner

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, BLOCK_BITS, INPUT, LAG1, PITCH, Flags, Numbers, Planes, stride_of
+from vid2ev.kernels.scan import STEEP
 from vid2ev.physics.log_curve import log_level
 
 
@@ -33,13 +34,28 @@ def inside_of(pixels: np.ndarray, planes: Planes, flags: Flags, num: Numbers, le
     def plane(number: int) -> np.ndarray:
         return planes.fast[place + number * PITCH].astype(np.float64)
 
-    filtered = plane(INPUT) - (plane(LAG1 + poles - 1) if poles else 0.0)
+    filtered = plane(INPUT)
+    if poles:
+        filtered -= plane(LAG1 + poles - 1) + rest_of(pixels, filtered, plane, planes, flags, num)
     if not flags.log_input:
         filtered = np.array([log_level(max(light, 0.0), num.curve) for light in filtered])
     noise = plane(LAG1 + poles + 1) if flags.noise else 0.0
     on, off = thresholds_of(pixels, planes, flags, num)
     memory = planes.memory[pixels]
     return Inside(filtered, filtered + leak + noise, memory + on, memory - off)
+
+
+def rest_of(
+    pixels: np.ndarray, light: np.ndarray, plane: Any, planes: Planes, flags: Flags, num: Numbers
+) -> np.ndarray | float:
+    """What the last lag of pixels has beyond float32, which is kept apart where it counts (`scan.refine`)."""
+    if not planes.rest.size:
+        return 0.0
+    poles = len(flags.poles)
+    last = plane(LAG1 + poles - 1)
+    steep = np.maximum(np.abs(plane(LAG1)), np.abs(last)) > STEEP * ((light - last) + num.curve.floor)
+    place = (pixels >> BLOCK_BITS) * (2 * PITCH) + (pixels & (BLOCK - 1)) + (poles - 1) * PITCH
+    return np.where(steep, planes.rest[place], 0.0)
 
 
 def thresholds_of(pixels: np.ndarray, planes: Planes, flags: Flags, num: Numbers) -> tuple[np.ndarray, np.ndarray]:
