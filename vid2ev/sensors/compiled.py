@@ -56,8 +56,9 @@ def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
     """Numbers of the sensor in the units of the walk."""
     taus = spec.pole_taus_us
     tau1, tau2 = taus[0] * 1e3 if taus else 0.0, 0.0
-    if len(taus) == 2:
-        tau1, tau2 = separate(tau1, taus[1] * 1e3)
+    if len(taus) == 2:  # (a pole that depends on light is held apart from the other in each pixel: `separate_rates`)
+        tau2 = taus[1] * 1e3
+        tau1, tau2 = separate(tau1, tau2) if spec.bandwidth == "constant" else (tau1, tau2)
     return Numbers(
         seed=np.uint64(seed),
         camera=camera,
