@@ -43,8 +43,11 @@ def sensors(name: str | None, as_json: bool) -> None:
 def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, Any]]]:
     """A sensor, and of each key value, unit, meaning and source: those that the sensor states, then the defaults."""
     from vid2ev.sensors.presets import load, read_sensor
+    from vid2ev.sensors.spec import DvsSpec
 
-    sensor, values, explained = read_sensor(name, kind), load(kind, name).model_dump(mode="json"), {}
+    sensor, spec, explained = read_sensor(name, kind), load(kind, name), {}
+    values = spec.model_dump(mode="json")
+    reached = spec.reached_spreads() if isinstance(spec, DvsSpec) else {}
     for key in dict.fromkeys([*sensor.values, *kind.spec.model_fields]):
         meaning = kind.spec.model_fields[key].description or ""
         unit = re.search(r" \[(\w+)\]", meaning)
@@ -54,6 +57,8 @@ def _explained(name: str, kind: Kind) -> tuple[SensorFile, dict[str, dict[str, A
             "meaning": meaning.replace(unit[0], "") if unit else meaning,
             "source": sensor.sources.get(key) if key in sensor.values else "default",
         }
+        if key in reached:
+            explained[key]["reached"] = list(reached[key])
     return sensor, explained
 
 
@@ -74,6 +79,9 @@ def _page(sensor: SensorFile, keys: dict[str, dict[str, Any]], kind: Kind) -> st
     for key, entry in keys.items():
         unit = f" {entry['unit']}" if entry["unit"] else ""
         lines += [f"{key} = {json.dumps(entry['value'])}{unit}", *_wrapped(entry["meaning"])]
+        if "reached" in entry:
+            on, off = entry["reached"]
+            lines += _wrapped(f"reached: {on:.3g} nat ON, {off:.3g} nat OFF; no threshold is below a tenth of its mean")
         if entry["source"]:
             lines += _wrapped(f"[{entry['source']}]")
     if about.get("differences"):

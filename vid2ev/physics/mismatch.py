@@ -4,7 +4,9 @@
 
 z is clipped symmetrically at min(4, (mean - floor)/sigma) with floor = mean/10, so that no threshold reaches zero and
 the mean stays; up to sigma = 0.35 mean the spread stays within 1 % (a one-sided clamp would move the mean).  Beyond,
-the thresholds crowd against the clip, and the spread that is reached is below the one asked for.
+the thresholds crowd against the clip, and the spread that is reached is below the one asked for: with L the clip of z,
+
+    reached^2 = sigma^2 (1 - 2 Q - 2 L phi(L) + 2 L^2 Q),   phi the normal density,   Q its share beyond L
 
 Sources: the paper (time-invariant Gaussian noise on the threshold); Gaussian in Lichtsteiner et al. 2008, 2.1 %
 contrast.
@@ -12,6 +14,7 @@ contrast.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -37,6 +40,18 @@ def clipped(mean, sigma, z):
     """mean + sigma z, z clipped symmetrically so that the result is at least FLOOR of the mean; sigma > 0."""
     limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
     return mean + sigma * min(max(z, -limit), limit)
+
+
+def reached_spread(mean: float, sigma: float) -> float:
+    """Standard deviation [nat] of the thresholds that the clip leaves of sigma [nat, >= 0]."""
+    if sigma == 0.0:
+        return 0.0
+    limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
+    if limit < 0.01:  # all are at the clip, but for a share that cancels below
+        return sigma * limit * math.sqrt(1.0 - limit * math.sqrt(8.0 / (9.0 * math.pi)))
+    beyond = 0.5 * math.erfc(limit / math.sqrt(2.0))
+    density = math.exp(-0.5 * limit * limit) / math.sqrt(2.0 * math.pi)
+    return sigma * math.sqrt(1.0 - 2.0 * beyond - 2.0 * limit * density + 2.0 * limit * limit * beyond)
 
 
 @compiled

@@ -13,7 +13,7 @@ from vid2ev.physics.delay import Delay
 from vid2ev.physics.fixed_rate import FixedRate
 from vid2ev.physics.leak import Leak
 from vid2ev.physics.log_curve import LogCurve
-from vid2ev.physics.mismatch import Mismatch
+from vid2ev.physics.mismatch import Mismatch, reached_spread
 from vid2ev.physics.photoreceptor import Photoreceptor
 from vid2ev.physics.photoreceptor_noise import PhotoreceptorNoise
 from vid2ev.physics.refractory import Refractory
@@ -79,6 +79,16 @@ class DvsSpec(  # the order of the bases, last to first, is the order of the fie
             "fixed_rate": self.frame_rate_hz > 0,
         }
         return [name for name, used in on.items() if used]
+
+    def reached_spreads(self) -> dict[str, tuple[float, float]]:
+        """What the clip of the thresholds leaves of `mismatch` and `crossing_noise`, for ON and OFF [nat]: of those of
+        which it takes more than 1 % (of the noise, in a pixel of mean thresholds)."""
+        means, spreads = (self.threshold_on, self.threshold_off), {}
+        for key, sigma in (("mismatch", self.mismatch), ("crossing_noise", self.crossing_noise)):
+            on, off = (reached_spread(mean, sigma) for mean in means)
+            if min(on, off) < 0.99 * sigma:
+                spreads[key] = (on, off)
+        return spreads
 
     def refractory_ns(self) -> int:
         """The refractory period in whole nanoseconds."""

@@ -125,6 +125,11 @@ class DvsTrack:
                 f"{counts['not_finite']} values of light were negative, not finite or beyond 1e30; they count as 0 or"
                 " 1e30"
             )
+        for key, (on, off) in self.dvs.spec.reached_spreads().items():
+            remarks.append(
+                f"{key} = {getattr(self.dvs.spec, key):g} nat is more than the thresholds have room for; their spread"
+                f" is {on:.3g} nat (ON) and {off:.3g} nat (OFF)"
+            )
         return remarks
 
     def _append(self, events: Events) -> None:
