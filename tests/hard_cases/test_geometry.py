@@ -132,7 +132,7 @@ def test_a_spike_of_depth_stays_where_it_is(spike_m):
     seen = views.see(light, spiked)[0]
     assert np.isfinite(seen.light).all() and seen.light.min() >= 0 and seen.light.max() < 1.5
     near = np.zeros((36, 48), np.bool_)
-    for y, x in at:
+    for y, _ in at:
         near[max(y - 4, 0) : y + 5] = True  # (a spike may be seen, or hide what is behind it, anywhere in its row)
     np.testing.assert_allclose(seen.light[~near], plain[~near], atol=1e-5)
     known = spike_m >= 1e-6
