@@ -7,11 +7,14 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from against.clips import clean, start
+from against.clips import clean, sensor, start
+from against.judge import judge_clip
+from against.reference import Pixel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-SHAPE = (1, 6)
+from vid2ev.stream import Events
+
 NAT = 1e-6
 
 
@@ -117,3 +120,19 @@ def test_any_two_poles_over_many_steps(decade, ratio, seed, order):
         with mpmath.workdps(60):
             want = float(y if order == "after" else mpmath.log(y + mpmath.mpf(1e-3)))
         assert abs(got[x] - want) < NAT * math.sqrt(20)
+
+
+@pytest.mark.parametrize("dark_level", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize(("tau_us", "step_ns"), [(1e6, 300_000), (2e4, 5_000)])
+def test_a_jump_through_slow_poles_is_not_late(tau_us, step_ns, dark_level):
+    """Light from 0 to 1, and the signal still ten decades below: each event at its time, and not at a later frame's."""
+    pixel = Pixel(0.2, 0.2, tau_us, tau_us / 3, dark_level=dark_level)
+    t_ns = np.concatenate([[0], 10_000 + np.arange(40) * step_ns])
+    light = np.ones((41, 1, 1), np.float32)
+    light[0] = 0
+    dvs, parts = start(sensor(pixel), light), []
+    for t, frame in zip(t_ns.tolist(), light, strict=True):
+        parts.append(dvs.step(frame, t))
+        _, signal, on, off = dvs.inside(np.arange(1))
+        assert off[0] - NAT < signal[0] < on[0] + NAT
+    judge_clip(pixel, t_ns, light, Events.concatenate(parts))
