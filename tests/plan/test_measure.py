@@ -9,6 +9,7 @@ from against.clips import clean
 from vid2ev.errors import UsageError
 from vid2ev.plan.measure import Measure, scene_of
 from vid2ev.stream import Frame
+from vid2ev.stream.scene import QUARTER_EDGES
 
 from .clips import clip, sent
 
@@ -56,14 +57,34 @@ def test_before_the_log_slopes_are_bounds() -> None:
     assert before.events == pytest.approx(after.events)
 
 
-def test_a_clip_in_two_parts_is_the_clip() -> None:
-    spec, frames = clean(), walk(4)
-    whole = scene_of(spec, SIZE, frames)
-    parts = scene_of(spec, SIZE, frames[:20]).merged(scene_of(spec, SIZE, frames[19:]))
-    assert np.array_equal(parts.light_min, whole.light_min) and np.array_equal(parts.slope_max, whole.slope_max)
-    assert parts.seconds == pytest.approx(whole.seconds)
-    assert parts.events == pytest.approx(whole.events, rel=0.1)  # (the play starts again)
-    assert parts.busiest >= whole.busiest * 0.9
+@pytest.mark.parametrize("way", ["before", "after"])
+def test_travel_is_spread_over_slopes_lights_and_pixels_and_none_is_lost(way: str) -> None:
+    spec = clean(filter=way, photoreceptor_tau_us=300, follower_tau_us=100)
+    scene = scene_of(spec, SIZE, walk(4))
+    for spread in (scene.by_slope[0], scene.by_light[0], scene.by_pixel):
+        assert spread.sum() == pytest.approx(scene.travel.sum(), rel=1e-4)
+    assert len(scene.by_pixel) == int(scene.busiest / scene.threshold) + 1
+    assert 0 < scene.by_turns[0].sum() < scene.travel.sum()  # (what counts of it)
+    seen = np.flatnonzero(scene.by_light[0])
+    assert QUARTER_EDGES[seen[0] + 1] >= scene.light_min.min() and QUARTER_EDGES[seen[-1]] <= scene.light_max.max()
+    steep = np.flatnonzero(scene.by_slope[0])
+    assert QUARTER_EDGES[steep[-1]] <= scene.slope_max.max()
+
+
+def test_smoothed_slopes_are_those_of_the_low_pass() -> None:
+    """A ramp of the log from rest: after one time constant, 1 - 1/e of the ramp's slope is reached."""
+    frames = [Frame(np.full(SIZE[::-1], np.exp(20e-9 * t), np.float32), t) for t in range(0, 40_000_000, 1_000_000)]
+    spec = clean(filter="after", photoreceptor_tau_us=10_000, dark_level=1e-12, threshold_on=0.01, threshold_off=0.01)
+    travel = scene_of(spec, SIZE, frames).by_slope[0]
+    slow = travel[QUARTER_EDGES[1:] <= 20 * (1 - np.exp(-1))].sum() / travel.sum()
+    assert 0.15 < slow < 0.26 and QUARTER_EDGES[np.flatnonzero(travel)[-1]] <= 20
+
+
+def test_dense_events_are_counted() -> None:
+    """On a ramp each event has 2 tau slope / theta others around it, as they weigh."""
+    frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 40_000_000, 1_000_000)]
+    scene = scene_of(clean(filter="after", dark_level=1e-12, threshold_on=0.02, threshold_off=0.02), SIZE, frames)
+    assert scene.bunched == pytest.approx(1 + 2 * 1e-3 * 30 / 0.02, rel=0.02)
 
 
 def test_nothing_is_carried_across_a_cut() -> None:

@@ -15,21 +15,12 @@ from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import Scene, added, at_most, delayed, off_by, surely, together
+from vid2ev.stream.scene import Scene, added, at_least, at_most, delayed, off_by, surely, together
 
-from .clips import MADE, REAL, SCENES, VIDEOS, clip, distance, sent
+from .clips import clip, distance, sent, without
 
 QUIET = {"mismatch": 0.0, "crossing_noise": 0.0}
 POLES = DvsSpec(**QUIET, refractory_us=0)
-NOISES = {
-    "shading": {"shading": (0.0, -0.5), "dark_level": 0.01},
-    "leak": {"leak_rate_hz": 0.02},
-    "shot": {"shot_rate_hz": 0.02},
-    "hot": {"hot_probability": 0.002, "hot_rate_hz": 50},
-    "cold": {"cold_probability": 0.003},
-    "refractory": {"refractory_us": 3000},
-}
-slow = pytest.mark.slow
 
 
 @cache
@@ -43,37 +34,14 @@ def changed(name: str, spec: DvsSpec, effect: str) -> tuple[float, float]:
     size, frames = clip(name)
     said = EFFECTS[effect].omission(scene(name, spec), spec)
     assert said.sure, said.why
-    without = DvsSpec(**(spec.model_dump() | (dict(said.replace) or EFFECTS[effect].off)))
-    return distance(sent(spec, size, frames), sent(without, size, frames)), said.distance
+    left = without(spec, effect, said)
+    return distance(sent(spec, size, frames), sent(left, size, frames), size), said.distance
 
 
 @pytest.mark.parametrize("effect", ["follower", "photoreceptor"])
 def test_a_pole_that_gives_way_to_a_delay_changes_less_than_its_bound(effect: str) -> None:
     measured, bound = changed("edge", POLES, effect)
     assert 0 < measured <= bound <= 10 * measured
-
-
-@slow
-@pytest.mark.parametrize("noise", ["quiet", "paper"])
-@pytest.mark.parametrize("name", [*MADE, *REAL, *SCENES])
-def test_the_paper_s_effects_stay_within_their_bounds(name: str, noise: str) -> None:
-    if name in REAL and not VIDEOS.is_dir():
-        pytest.skip(f"{VIDEOS} is not there")
-    spec = DvsSpec(**(QUIET if noise == "quiet" else {}))
-    for effect in ("follower", "photoreceptor", "refractory"):
-        measured, bound = changed(name, spec, effect)
-        assert measured <= bound, effect
-
-
-@slow
-@pytest.mark.parametrize("effect", NOISES)
-@pytest.mark.parametrize("name", ["edge", "juggle", "karma"])
-def test_other_effects_stay_within_their_bounds(name: str, effect: str) -> None:
-    if name in REAL and not VIDEOS.is_dir():
-        pytest.skip(f"{VIDEOS} is not there")
-    for noise in ({}, {"crossing_noise": 0.035}):
-        measured, bound = changed(name, clean(random_phase=True, **noise, **NOISES[effect]), effect)
-        assert measured <= bound, noise
 
 
 def test_auto_keeps_within_the_tolerance() -> None:
@@ -83,7 +51,7 @@ def test_auto_keeps_within_the_tolerance() -> None:
     for tolerance in (0.0, 0.005, 0.05):
         plan = plan_of(scene("edge"), spec, tolerance)
         assert plan.distance is not None and plan.distance <= tolerance
-        assert distance(sent(spec, size, frames), sent(plan.spec, size, frames)) <= plan.distance
+        assert distance(sent(spec, size, frames), sent(plan.spec, size, frames), size) <= plan.distance
     assert plan.spec.pole_taus_us == () and plan.spec.delay_us == 400
     assert [row.fate for row in plan.rows] == ["replaced", "replaced"]
 
@@ -133,17 +101,17 @@ def test_noise_without_its_poles_is_refused() -> None:
     assert plan_of(scene("edge", spec), spec, 1.0).spec.pole_taus_us == (300.0, 100.0)
 
 
-def test_pixels_in_step_have_no_bounds() -> None:
+def test_of_pixels_in_step_nothing_is_known() -> None:
     spec = clean(photoreceptor_tau_us=300, follower_tau_us=100, random_phase=False)
     plan = plan_of(scene("edge", spec), spec, 1.0)
-    assert {row.omission.kind for row in plan.rows} == {"no bound yet"} and plan.spec == spec
+    assert all((row.omission.distance or 0.0) > 1.0 for row in plan.rows) and plan.spec == spec
 
 
 def test_a_still_scene_needs_no_poles() -> None:
     frames = [Frame(np.full((8, 8), 0.3, np.float32), k * 1_000_000) for k in range(5)]
     spec = DvsSpec(shot_rate_hz=10)
     plan = plan_of(scene_of(spec, (8, 8), frames), spec, 0.0)
-    assert plan.spec.pole_taus_us == () and plan.spec.shot_rate_hz == 10
+    assert plan.spec.pole_taus_us == () and plan.spec.delay_us == 0 and plan.spec.shot_rate_hz == 10
     assert isinstance(plan, Plan) and plan.distance == 0.0
 
 
@@ -151,10 +119,12 @@ def test_laws_of_the_bounds() -> None:
     seen = scene("edge")
     error = np.full(len(seen.travel), 1e-3)
     assert 0 < off_by(seen, error, echoes=False) < off_by(seen, 2 * error, echoes=False)
-    assert delayed(seen, 0.0, 0.0, echoes=True) == 0
-    assert delayed(seen, 1e-8, 1e-5, echoes=True) >= delayed(seen, 1e-8, 1e-5, echoes=False)
+    assert delayed(seen, 0 * error, 0 * error, echoes=True) == 0
+    few, some = 1e-5 * error, 1e-2 * error
+    assert delayed(seen, few, some, echoes=True) >= delayed(seen, few, some, echoes=False)
     assert surely(seen, 1e-3) > 1e-3 and surely(seen, 0.0) == 0
     assert together(0.01, 0.04) == pytest.approx(0.09)
-    assert added(seen, 0.0, 0.0) == 0 and added(seen, 2 * seen.events, 0.0) == pytest.approx(0.5)
-    draws = np.random.default_rng(1).poisson(3.0, 100_000)
-    assert np.mean(draws > at_most(3.0)) < 1e-3
+    assert added(10.0, 0.0, 0.0) == 0 and added(10.0, 20.0, 0.0) == pytest.approx(0.5)
+    for mean in (3.0, 40.0):
+        draws = np.random.default_rng(1).poisson(mean, 100_000)
+        assert np.mean(draws > at_most(mean)) < 1e-3 and np.mean(draws < at_least(mean)) < 1e-3

@@ -40,12 +40,18 @@ def test_all_effects_leave_no_trace(tmp_path: Path) -> None:
     assert "plan" not in convert(CLIP, tmp_path / "a", sensor="ideal", preview=False)
 
 
-def test_what_passes_once_is_refused() -> None:
+def test_of_what_passes_once_all_is_kept_unless_it_is_named() -> None:
     class Once:
         def __getattr__(self, name: str) -> object:
             return {"rewindable": False}.get(name)
 
     from dataclasses import replace
 
-    with pytest.raises(UsageError, match="passes once"):
-        plans_of(replace(Recipe.of(CLIP), source=Once()))  # type: ignore[arg-type]
+    once = replace(Recipe.of(CLIP), source=Once())  # type: ignore[arg-type]
+    plan = plans_of(once)[""]
+    assert {row.fate for row in plan.rows} == {"kept"} and plan.spec == once.mounts[0].sensor.spec
+    assert "passes once" in str(plan) and plan.distance == 0.0
+    named = plans_of(once, "mismatch")[""]
+    assert named.spec.effects() == ["mismatch"] and named.distance is None
+    with pytest.raises(UsageError, match="expected auto"):
+        plans_of(once, "mismach")

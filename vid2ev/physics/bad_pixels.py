@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.omission import light_events
 from vid2ev.physics.random import HOT_MAP, philox, unit
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
 
@@ -50,8 +51,7 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
     """The hot pixels."""
     extra = at_most(at_most(spec.hot_probability * scene.pixels) * spec.hot_rate_hz * scene.seconds)
     bunched = 1.0 + 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S
-    events = 2.0 * scene.events + extra
-    distance = added(scene, extra, surely(scene, spec.hot_probability)) + extra * (bunched - 1.0) / max(events, 1.0)
+    distance = added(light_events(scene, spec), extra, surely(scene, spec.hot_probability)) * bunched
     figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
     return Omission(distance, "99.9 % bound", figure, f"{extra:.0f} events at most")
 
@@ -59,6 +59,5 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
 def omission_of_cold(scene: Scene, spec: Any) -> Omission:
     """The cold pixels."""
     share = min(surely(scene, spec.cold_probability), 1.0)
-    bunched = 1.0 + 2.0 * DISTANCE_TAU_S * float(scene.slope_max.max()) / scene.threshold
-    distance = 0.0 if scene.still else share / (2.0 - share) * bunched
+    distance = 0.0 if scene.still else share / (2.0 - share) * scene.bunched
     return Omission(distance, "99.9 % bound", f"{spec.cold_probability:.3g} of the events", "silent pixels")

@@ -13,7 +13,7 @@ ESIM (Rebecq, Gehrig, Scaramuzza, CoRL 2018).
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, Field
 
@@ -44,18 +44,3 @@ def initial_phase(seed, camera, pixel):
     """Fraction of the ON threshold that lies between the first signal and the first ON level, in (0, 1)."""
     word, _, _, _ = philox(seed, PHASE + 256 * camera, pixel, 0)
     return unit(word)
-
-
-def echoes(spec: Any) -> bool:
-    """Whether two recordings of a pixel that disagree about one event go on with other levels: thresholds are not all
-    the same."""
-    return bool(spec.mismatch > 0 or spec.crossing_noise > 0 or spec.threshold_on != spec.threshold_off)
-
-
-def obstacle(spec: Any) -> str:
-    """Why the bounds of `vid2ev.stream.scene` do not hold for a sensor; "" where they do."""
-    if not spec.random_phase:
-        return "all pixels start in step, so nothing is known of how far their levels are"
-    if spec.refractory_us > 0 and spec.refractory == "track":
-        return "the memory jumps to the signal after each event, so errors add up"
-    return ""

@@ -14,12 +14,14 @@ import math
 from statistics import NormalDist
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.mismatch import FLOOR, clipped
+from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import CROSSING, normal_pair, philox
-from vid2ev.stream.scene import Omission, Scene, off_by
+from vid2ev.stream.scene import Omission, Scene
 
 
 class CrossingNoise(BaseModel, frozen=True, extra="forbid"):
@@ -38,24 +40,27 @@ def noisy_thresholds(on, off, sigma, seed, camera, pixel, count):
     return clipped(on, sigma, z_on), clipped(off, sigma, z_off)
 
 
-def chance_below(level: float, mean: float, spec: Any) -> float:
-    """The share of thresholds of this mean [nat], with mismatch and noise, that are at or below a level [nat]."""
+def chances_below(level: float, mean: float, spec: Any) -> np.ndarray:
+    """The share of the thresholds of a pixel, of this mean [nat], that are at or below a level [nat]: of 256 pixels
+    that stand for all, as often as their thresholds ask for."""
 
     def clip(mean: float, sigma: float, z: float) -> float:
         limit = min(4.0, (1.0 - FLOOR) * mean / sigma) if sigma > 0 else 0.0
         return mean + sigma * min(max(z, -limit), limit)
 
-    normal, total, steps = NormalDist(), 0.0, 256
+    normal, steps = NormalDist(), 256
+    chances = np.zeros(steps)
     for k in range(steps):
         pixel = clip(mean, spec.mismatch, normal.inv_cdf((k + 0.5) / steps) if k else -math.inf)
         least = clip(pixel, spec.crossing_noise, -math.inf)
         if level >= least:
-            total += normal.cdf((level - pixel) / spec.crossing_noise) if spec.crossing_noise > 0 else 1.0
-    return total / steps
+            chances[k] = normal.cdf((level - pixel) / spec.crossing_noise) if spec.crossing_noise > 0 else 1.0
+            chances[k] = min(chances[k] * max(mean / pixel, 1.0), 1.0)
+    return chances
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The noise at crossings: never left out by a bound, as every event moves."""
-    distance = min(off_by(scene, 0.5 * spec.crossing_noise + 0.0 * scene.travel, echoes=False), 1.0)
+    """The noise at crossings: the level that a pixel reaches after k events is off by a walk of k steps."""
     figure = f"{spec.crossing_noise / scene.threshold:.2g} of the threshold at each event"
-    return Omission(distance, "estimate", figure, "every event moves")
+    walk_nat = math.sqrt(scene.most_events) * spec.crossing_noise
+    return omitted(scene, spec, displaced(scene, walk_nat), figure, "every event moves")

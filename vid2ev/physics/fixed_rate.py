@@ -12,11 +12,13 @@ Source: the paper, algorithm step 3, "rounded to the closest event frame timesta
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.physics.omission import omitted
 from vid2ev.stream.events import Events
 from vid2ev.stream.scene import Omission, Scene
 
@@ -98,8 +100,8 @@ class EventFrames:
         self.held = Events(*held, label if len(label) else None)
 
 
-def omission(scene: Scene, spec: FixedRate) -> Omission:
+def omission(scene: Scene, spec: Any) -> Omission:
     """The readout's clock."""
     late_us = 1e6 / spec.frame_rate_hz * (0.5 if spec.rounding == "nearest" else 1.0)
     why = "all times are those of the readout; never left out"
-    return Omission(min(late_us / 1000.0, 1.0), "estimate", f"at most {late_us:.3g} us", why)
+    return omitted(scene, spec, math.inf, f"at most {late_us:.3g} us", why)

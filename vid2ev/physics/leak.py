@@ -12,13 +12,15 @@ Source: junction and parasitic photocurrent leakage of the reset switch, about 0
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.comparator import echoes, obstacle
-from vid2ev.stream.scene import Omission, Scene, added, off_by, surely, together
+from vid2ev.physics.omission import echoes, light_events, omitted
+from vid2ev.stream.scene import Omission, Scene, added, off_by, together
 
 
 class Leak(BaseModel, frozen=True, extra="forbid"):
@@ -31,10 +33,9 @@ def omission(scene: Scene, spec: Any) -> Omission:
     """The leak."""
     per_pixel = spec.leak_rate_hz * scene.seconds
     figure = f"{spec.leak_rate_hz:.3g} events/pixel/s"
-    if reason := obstacle(spec):
-        return Omission(None, "no bound yet", figure, reason)
     error = np.full(len(scene.travel), per_pixel * spec.threshold_on)
-    moved = off_by(scene, error, echoes=echoes(spec))
-    extra = added(scene, per_pixel * scene.pixels, min(per_pixel, 1.0) if echoes(spec) else 0.0)
+    moved = omitted(scene, spec, off_by(scene, error, echoes=echoes(spec)), figure, "")
+    extra = added(light_events(scene, spec), per_pixel * scene.pixels, min(per_pixel, 1.0) if echoes(spec) else 0.0)
     why = f"{per_pixel:.2g} events more per pixel, and levels off by as many thresholds"
-    return Omission(surely(scene, together(moved, extra)), "99.9 % bound", figure, why)
+    anyway = omitted(scene, spec, math.inf, figure, "", beside=per_pixel * scene.pixels).distance
+    return replace(moved, distance=min(together(moved.distance or 0.0, extra), anyway or math.inf), why=why)

@@ -21,8 +21,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
-from vid2ev.stream.scene import Omission, Scene, off_by
+from vid2ev.stream.scene import Omission, Scene
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean
 
@@ -65,7 +66,6 @@ def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The mismatch: never left out by a bound, as every event moves."""
-    distance = min(off_by(scene, 0.5 * spec.mismatch + 0.0 * scene.travel, echoes=False), 1.0)
+    """The mismatch: the level that a pixel reaches after k events is off by up to k draws."""
     figure = f"{spec.mismatch / scene.threshold:.2g} of the threshold in each pixel"
-    return Omission(distance, "estimate", figure, "every pixel is another")
+    return omitted(scene, spec, displaced(scene, scene.most_events * spec.mismatch), figure, "every pixel is another")

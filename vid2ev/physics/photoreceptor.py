@@ -34,19 +34,22 @@ first pole (Hu, Liu, Delbruck 2021): tau1(light) = tau1 (1 + dark)/(light + dark
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.comparator import echoes, obstacle
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
-from vid2ev.stream.scene import Omission, Scene, delayed, surely
+from vid2ev.physics.omission import echoes, late_noise, omitted, tau_at, taus_of
+from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene, delayed
 
 F = np.float32
 _APART = 1e-4
 _APART_RATES = 2e-7
+FOLLOWER_OFF: dict[str, Any] = {"follower_tau_us": 0.0}
+BOTH_OFF: dict[str, Any] = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0, "bandwidth": "constant"}
 
 
 class Photoreceptor(BaseModel, frozen=True, extra="forbid"):
@@ -214,50 +217,72 @@ def steepest(scene: Scene, spec: Any) -> np.ndarray:
 
 
 def slopes_of(scene: Scene, spec: Any) -> np.ndarray:
-    """Bound on the slope of the comparator's input in each octave of `Scene.by_slope` [nat/s]."""
+    """Bound on the slope of the comparator's input in each quarter of an octave of `Scene.by_slope` [nat/s]."""
     faster = float((steepest(scene, spec) / np.maximum(scene.slope_max, 1e-30)).max())
-    octaves = np.exp2(np.arange(scene.by_slope.shape[1]) - 23.0)
-    return np.minimum(octaves, float(scene.slope_max.max())) * max(faster, 1.0)
+    steepest_of_all = float(scene.slope_max.max())
+    slopes = np.minimum(QUARTER_EDGES[1:], steepest_of_all)
+    slopes[-1] = steepest_of_all
+    return slopes * max(faster, 1.0)
 
 
 def omission_of_follower(scene: Scene, spec: Any) -> Omission:
     """The second pole alone, replaced by its mean delay."""
-    tau1_s, tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
-    reach_s = min(tau2_s / math.e, 0.5 * tau2_s**2 / tau1_s if tau1_s else math.inf)
-    return _delay_instead(scene, spec, spec.follower_tau_us, tau2_s**2, reach_s, {"follower_tau_us": 0.0})
+    fastest_s, _ = (each * 1e-6 for each in taus_of(scene, spec))
+    tau2_s = spec.follower_tau_us * 1e-6
+    reach_s = np.full(len(scene.travel), tau2_s / math.e)
+    np.minimum(reach_s, 0.5 * tau2_s**2 / np.maximum(fastest_s, 1e-30), out=reach_s)
+    return _delay_instead(scene, spec, spec.follower_tau_us, tau2_s**2 + 0.0 * reach_s, reach_s, 0.0, FOLLOWER_OFF)
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """Both poles, replaced by their mean delay."""
-    tau1_s, tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
-    variance_s2 = tau1_s**2 + tau2_s**2
-    reach_s = 0.5 * math.sqrt(variance_s2) if tau2_s else tau1_s / math.e
-    off = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0}
-    return _delay_instead(scene, spec, sum(spec.pole_taus_us), variance_s2, reach_s, off)
+    """Both poles, replaced by their mean delay at the light where the events are."""
+    _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
+    tau2_s = spec.follower_tau_us * 1e-6
+    variance_s2 = slowest_s**2 + tau2_s**2
+    reach_s = 0.5 * np.sqrt(variance_s2) if tau2_s else slowest_s / math.e
+    usual_us, late_us = delay_at_events(scene, spec)
+    return _delay_instead(scene, spec, usual_us + spec.follower_tau_us, variance_s2, reach_s, late_us, BOTH_OFF)
 
 
 def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
-    """The first pole's dependence on light, at the median of the pixels: a figure, not a bound."""
-    share = (1.0 + spec.bandwidth_dark) / (scene.percentile(0.5) + spec.bandwidth_dark) - 1.0
-    late_us = spec.photoreceptor_tau_us * abs(share)
-    why = "the first pole is slower in the dark; no bound is known yet"
-    return Omission(min(late_us / 1000.0, 1.0), "estimate", f"{late_us:.3g} us at the median light", why)
+    """The first pole's dependence on light: events are late by what its time constant differs by."""
+    _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
+    _, late_us = delay_at_events(scene, spec, spec.photoreceptor_tau_us)
+    mean = delayed(scene, 0.0 * slowest_s, slowest_s / math.e, echoes=echoes(spec)) + 2e-6 * late_us / DISTANCE_TAU_S
+    figure = f"{late_us:.3g} us on average"
+    return omitted(scene, spec, mean, figure, "the first pole is slower in the dark")
+
+
+def delay_at_events(scene: Scene, spec: Any, chosen_us: float | None = None) -> tuple[float, float]:
+    """A time constant of the first pole [us], by default that of the median event, and by how much those of all events
+    differ from it, on average."""
+    taus, travel = tau_at(QUARTER_EDGES[:-1], spec), scene.by_light[0]
+    if chosen_us is None:
+        chosen_us = float(taus[np.searchsorted(np.cumsum(travel), 0.5 * travel.sum())])
+    return chosen_us, float(np.dot(np.abs(taus - chosen_us), travel)) / max(float(travel.sum()), 1e-300)
 
 
 def _delay_instead(
-    scene: Scene, spec: Any, poles_us: float, variance_s2: float, reach_s: float, off: dict[str, float]
+    scene: Scene,
+    spec: Any,
+    poles_us: float,
+    variance_s2: np.ndarray,
+    reach_s: np.ndarray,
+    late_us: float,
+    off: dict[str, Any],
 ) -> Omission:
-    spread = f"{math.sqrt(variance_s2) * 1e6:.3g} us of spread"
+    spread = f"{math.sqrt(variance_s2.max()) * 1e6:.3g} us of spread"
     if spec.photoreceptor_noise > 0:
         return Omission(None, "no bound yet", spread, "photoreceptor noise needs both poles")
-    if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
-        return Omission(None, "no bound yet", spread, "the delay differs with the light")
-    if spec.timing != "response" or (reason := obstacle(spec)):
-        why = reason if spec.timing == "response" else f"timing {spec.timing} takes the signal at the frames"
-        return Omission(None, "no bound yet", spread, why)
-    delay_us = spec.delay_us + poles_us
-    whole_us = math.floor(delay_us + 0.5)
-    rounded = abs(delay_us - whole_us) / 1000.0
-    mean = delayed(scene, variance_s2, reach_s, echoes=echoes(spec)) + (0.0 if scene.still else rounded)
+    if scene.still:
+        return Omission(0.0, "99.9 % bound", spread, "nothing moves")
+    delay_us = float(f"{spec.delay_us + poles_us:.6g}")
+    rounded_us = abs(delay_us - math.floor(delay_us + 0.5)) + 2.0 * late_us
+    mean = delayed(scene, variance_s2, reach_s, echoes=echoes(spec)) + 1e-6 * rounded_us / DISTANCE_TAU_S
     why = f"a delay of {delay_us:g} us instead; what is left are rounded bends"
-    return Omission(surely(scene, mean), "99.9 % bound", spread, why, (*off.items(), ("delay_us", delay_us)))
+    if late_us > 0.0:
+        why += f", and {late_us:.3g} us by the light"
+    if spec.timing != "response":
+        mean, why = math.inf, f"timing {spec.timing} takes the signal at the frames"
+    said = omitted(scene, spec, mean, spread, why, (*off.items(), ("delay_us", delay_us)))
+    return replace(said, distance=(said.distance or 0.0) + late_noise(scene, spec, poles_us))

@@ -25,9 +25,10 @@ from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.elementary import exp64, log64
+from vid2ev.physics.omission import light_events
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
-from vid2ev.stream.scene import Omission, Scene, added
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely, unlike
 
 RESOLVED = 8.0
 
@@ -96,10 +97,14 @@ def rice_gap(pixel, k, num, iv):
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The noise, by Rice's rate at one threshold's distance: a figure, not a bound."""
-    far = min(spec.threshold_on, spec.threshold_off) / spec.photoreceptor_noise
-    period_s = 2.0 * math.pi * math.sqrt(spec.photoreceptor_tau_us * spec.follower_tau_us) * 1e-6
-    rate_hz = 2.0 * math.exp(-0.5 * far * far) / period_s
-    distance = added(scene, rate_hz * scene.pixels * scene.seconds, 0.0)
-    why = "every event moves by noise over slope; no bound is known yet"
-    return Omission(distance, "estimate", f"{rate_hz:.3g} events/pixel/s", why)
+    """The noise: events come where it spans a threshold, by Rice's rate at half of one to either side of its middle,
+    and once more for each threshold that its greatest excursion reaches over; all others move."""
+    rms, threshold = spec.photoreceptor_noise, min(spec.threshold_on, spec.threshold_off)
+    per_s = 1e6 / (2.0 * math.pi * math.sqrt(spec.photoreceptor_tau_us * spec.follower_tau_us))
+    rate_hz = 2.0 * per_s * math.exp(-0.125 * (threshold / rms) ** 2)
+    reach_nat = rms * math.sqrt(2.0 * math.log(2.0 + per_s * scene.seconds))
+    extra = at_most(scene.pixels * (rate_hz * scene.seconds + 2.0 * reach_nat / threshold))
+    bunched = 1.0 + 2.0 * rate_hz * DISTANCE_TAU_S
+    distance = surely(scene, unlike(scene)) + added(light_events(scene, spec), extra, 0.0) * bunched
+    why = f"{extra:.0f} events at most, and all others move by noise over slope"
+    return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)

@@ -14,14 +14,15 @@ Sources: the paper, algorithm step 2e; `track` as the reset of the differencing 
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.crossing_noise import chance_below
+from vid2ev.physics.crossing_noise import chances_below
+from vid2ev.physics.omission import light_events, omitted
 from vid2ev.physics.photoreceptor import slopes_of, steepest
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, surely
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, at_most, surely, unlike
 
 
 class Refractory(BaseModel, frozen=True, extra="forbid"):
@@ -42,25 +43,31 @@ def omission(scene: Scene, spec: Any) -> Omission:
     way = slope * spec.refractory_us * 1e-6
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
     if spec.refractory == "track":
-        return Omission(None, "no bound yet", figure, "the memory jumps to the signal when the period ends")
+        return omitted(scene, spec, math.inf, figure, "the memory jumps to the signal when the period ends")
     if spec.photoreceptor_noise > 0 or spec.shot_rate_hz > 0 or spec.hot_probability > 0:
-        return Omission(None, "no bound yet", figure, "events of noise may come at any time")
-    most = slopes_of(scene, spec)
-    travel, total = scene.by_slope[0], max(float(scene.by_slope[0].sum()), 1e-300)
+        return omitted(scene, spec, math.inf, figure, "events of noise may come at any time")
     leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
-    chances = [
-        _swallowed(slope * spec.refractory_us * 1e-6 + leaked, spec) if some else 0.0
-        for slope, some in zip(most, travel, strict=True)
-    ]
-    share = float(np.dot(chances, travel)) / total
-    if share == 0.0:
+    most = 4.0 * (scene.bunched - 1.0) + 2.0  # others within tau
+    swallowed, cost = 0.0, 0.0  # travel [nat], and what it costs in units of an event that is missing
+    for slope, travel in zip(slopes_of(scene, spec), scene.by_slope[0], strict=True):
+        if travel > 0.0:
+            chance, chance_again = _swallowed(slope * spec.refractory_us * 1e-6 + leaked, spec)
+            swallowed += chance * travel
+            cost += chance * travel * (1.0 + min(2.0 * DISTANCE_TAU_S * slope / scene.threshold, most) * chance_again)
+    if swallowed == 0.0:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
-    bunched = [1.0 + 2.0 * DISTANCE_TAU_S * slope / scene.threshold for slope in most]
-    mean = min(float(np.dot(np.multiply(chances, bunched), travel)) / total, 2.0)
-    why = f"a share of {share:.2g} of the crossings may be swallowed"
-    return Omission(surely(scene, mean), "99.9 % bound", figure, why)
+    total = float(scene.travel.sum())
+    why = f"a share of {swallowed / total:.2g} of the crossings may be swallowed"
+    together = cost / swallowed
+    lost = together * at_most(swallowed / scene.threshold / together)
+    distance = lost * together / max(2.0 * light_events(scene, spec) - lost, 1e-9)
+    return Omission(min(distance, surely(scene, unlike(scene))), "99.9 % bound", figure, why)
 
 
-def _swallowed(way_nat: float, spec: Any) -> float:
-    """Bound on the chance that a crossing comes within the period, in which the signal goes so far."""
-    return min(sum(chance_below(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off)), 1.0)
+def _swallowed(way_nat: float, spec: Any) -> tuple[float, float]:
+    """Bound on the chance that a crossing comes within the period, in which the signal goes so far, and on that of
+    another in its pixel."""
+    ways = (chances_below(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
+    chances = max(ways, key=lambda each: float(each.sum()))
+    once = float(chances.mean())
+    return once, float((chances**2).mean()) / once if once > 0.0 else 0.0

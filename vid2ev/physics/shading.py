@@ -13,16 +13,17 @@ Source: the paper, section II.A: a polynomial of the distance from the centre re
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.physics.adc import lsb_per_light
-from vid2ev.physics.comparator import echoes, obstacle
 from vid2ev.physics.fixed_pattern import greatest_gain
+from vid2ev.physics.omission import echoes, omitted
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
-from vid2ev.stream.scene import Omission, Scene, off_by, surely
+from vid2ev.stream.scene import Omission, Scene, off_by
 
 
 class Shading(BaseModel, frozen=True, extra="forbid"):
@@ -49,7 +50,7 @@ def omission_of_levels(seen: Exposed, spec: Any) -> LevelChange:
 def omission(scene: Scene, spec: Any) -> Omission:
     """The shading; the scene's light is what arrives behind it."""
     gains = [float(np.polynomial.polynomial.polyval(r, (1.0, *spec.shading))) for r in np.linspace(0.0, 1.0, 65)]
-    reason = obstacle(spec)
+    reason = ""
     if spec.log_curve != "offset":
         reason = f"of the curve {spec.log_curve} the contrast changes with light"
     elif (spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0) or spec.shot_rate_hz > 0:
@@ -57,10 +58,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     gain = min(gains)
     figure = f"light x {max(gain, 0.0):.2g} at a distance of one width"
     if reason or gain <= 0.0 or max(gains) > 1.0:
-        return Omission(None, "no bound yet", figure, reason or "the gain is not between 0 and 1")
+        return omitted(scene, spec, math.inf, figure, reason or "the gain is not between 0 and 1")
     dark, least, most = spec.dark_level, scene.light_min, scene.light_max
     error = np.log((most / gain + dark) / (most + dark)) - np.log((least / gain + dark) / (least + dark))
-    distance = surely(scene, off_by(scene, np.abs(error), echoes=echoes(spec)))
-    return Omission(
-        distance, "99.9 % bound", f"{np.abs(error).max():.2g} nat", "a constant gain does not change the log"
-    )
+    mean, figure = off_by(scene, np.abs(error), echoes=echoes(spec)), f"{np.abs(error).max():.2g} nat"
+    return omitted(scene, spec, mean, figure, "a constant gain does not change the log")

@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.physics.omission import light_events
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
 
 CELL_NS = 1_000_000
@@ -45,6 +46,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     rate_hz = spec.shot_rate_hz * float(np.mean(1.0 - (1.0 - spec.shot_light_factor) * least))
     extra = at_most(rate_hz * scene.pixels * scene.seconds)
     touched = surely(scene, -math.expm1(-spec.shot_rate_hz * scene.seconds))
-    distance = added(scene, extra * (1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S), touched)
+    bunched = 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S
+    distance = added(light_events(scene, spec), extra, touched) * bunched
     why = f"{extra:.0f} events at most, and their pixels' levels"
     return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)

@@ -13,10 +13,12 @@ from vid2ev.kernels.measure import (
     FIGURES,
     LEAST,
     LIGHT,
-    OCTAVES,
     PLANES,
+    QUARTERS,
     SCRATCH,
+    STEPS,
     TRAVEL,
+    Pace,
     measure_frame,
     settle_measure,
 )
@@ -24,7 +26,7 @@ from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.scene import OF_TILES, SPREAD, Scene
+from vid2ev.stream.scene import DISTANCE_TAU_S, OF_TILES, SPREAD, Scene
 
 BRIGHTNESS_EVERY = 8  # frames
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
@@ -33,7 +35,7 @@ LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 44 bytes a pixel.
+    The light that is measured is that behind the sensor's lens shading.  Memory is 40 bytes a pixel.
     """
 
     def __init__(self, spec: DvsSpec, size: tuple[int, int]):
@@ -45,7 +47,7 @@ class Measure:
         self._tiles = np.zeros((-(-width * height // BLOCK), FIGURES))
         self._state = np.zeros(len(self._tiles) * PLANES * PITCH, np.float32)
         self._tiles[:, LEAST] = np.inf
-        self._spread = np.zeros((3, 2, OCTAVES))
+        self._spread = np.zeros((len(SPREAD), 2, QUARTERS))
         self._work = (np.empty(SCRATCH, np.float32), np.zeros(BLOCK, np.uint8), np.zeros(BLOCK + 1, np.int32))
         self._brightness = np.zeros(LIGHTS)
         self._taus_s = [tau * 1e-6 for tau in spec.pole_taus_us]
@@ -80,7 +82,7 @@ class Measure:
             seconds=self._ns * 1e-9,
             threshold=2 * self._half,
             busiest=float(travel.max()),
-            travel_squared=float(np.square(travel, dtype=np.float64).sum()),
+            by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
             **dict(zip(SPREAD, self._spread.copy(), strict=True)),
             brightness=self._brightness.copy(),
             **dict(zip(OF_TILES, self._tiles.T.copy(), strict=True)),
@@ -88,13 +90,20 @@ class Measure:
 
     def _advance(self, light: np.ndarray, dt_s: float) -> None:
         delay, slowest = sum(self._taus_s), max(self._taus_s, default=0.0)
-        keep = math.exp(-self._dt_s / slowest) if slowest else 0.0
-        recent = 1.0 if self._dt_s <= self.spec.refractory_us * 1e-6 else keep
-        measure_frame(
-            light, self._shade, self._curve, self._half, self.spec.filter == "before", dt_s,
-            min(delay, self._dt_s), min(4 * delay, dt_s), keep, recent,
-            self._state, self._tiles, self._spread, self._work,
-        )  # fmt: skip
+        smooth_s = slowest if self.spec.bandwidth == "constant" else 0.0
+        steps = np.arange(STEPS + 1) * (dt_s / STEPS)
+        pace = Pace(
+            half=self._half,
+            before_log=self.spec.filter == "before",
+            dt_s=dt_s,
+            back_s=min(delay, self._dt_s),
+            ahead_s=min(4 * delay, dt_s),
+            keep=math.exp(-self._dt_s / slowest) if slowest else 0.0,
+            smooth_s=smooth_s,
+            decays=np.exp(-steps / smooth_s).astype(np.float32) if smooth_s else np.zeros(STEPS + 1, np.float32),
+            tau_s=DISTANCE_TAU_S,
+        )
+        measure_frame(light, self._shade, self._curve, pace, self._state, self._tiles, self._spread, self._work)
         self._dt_s = dt_s
 
     def _plane(self, plane: int) -> np.ndarray:

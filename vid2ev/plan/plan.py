@@ -25,6 +25,7 @@ from vid2ev.errors import UsageError, nearest
 from vid2ev.physics import (
     bad_pixels,
     crossing_noise,
+    delay,
     fixed_rate,
     leak,
     mismatch,
@@ -66,11 +67,11 @@ EFFECTS = {
     "shot": Effect(shot.omission, {"shot_rate_hz": 0.0}, 0.03, 0),
     "hot": Effect(bad_pixels.omission_of_hot, {"hot_probability": 0.0}, 0, 0),
     "cold": Effect(bad_pixels.omission_of_cold, {"cold_probability": 0.0}, 0, 0),
-    "delay": Effect(lambda scene, spec: DELAY, {"delay_us": 0.0}, 0, 1),
+    "delay": Effect(delay.omission, {"delay_us": 0.0}, 0, 1),
     "fixed_rate": Effect(fixed_rate.omission, {"frame_rate_hz": 0.0}, 0, 100),
 }
 KNOWN = tuple(dict.fromkeys((*EFFECTS, *OF_FRAMES)))
-DELAY: Omission = Omission(None, "no bound yet", "", "all times are later; never left out")
+ASKED_FOR = ("delay", "fixed_rate")  # what events are to be, not what makes them so: never left out by itself
 
 
 @dataclass(frozen=True)
@@ -147,8 +148,25 @@ def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: 
     Raises UsageError for an effect that there is not, or a specification that cannot be without what is left out.
     """
     check_tolerance(tolerance)
-    used = spec.effects()
-    omissions = {name: EFFECTS[name].omission(scene, spec) for name in used}
+    omissions = {name: EFFECTS[name].omission(scene, spec) for name in spec.effects()}
+    return _planned(omissions, spec, tolerance, effects, scene.describe())
+
+
+def plan_unseen(spec: DvsSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
+    """The plan for what passes once, and so cannot be measured before: "auto" keeps all.
+
+    An effect that carries state from frame to frame must be there from the first, and what is to come is not known; the
+    one that carries none, the refractory period, costs less than measuring does.  Raises UsageError as `plan_of` does.
+    """
+    check_tolerance(tolerance)
+    unseen = Omission(None, "no bound yet", "-", "the source passes once: what is to come is not known")
+    return _planned(dict.fromkeys(spec.effects(), unseen), spec, tolerance, effects, {})
+
+
+def _planned(
+    omissions: dict[str, Omission], spec: DvsSpec, tolerance: float, effects: str | Sequence[str], seen: dict[str, Any]
+) -> Plan:
+    used = list(omissions)
     if effects == "auto":
         gone = _within(omissions, tolerance)
         changes = dict(change for name in gone for change in omissions[name].replace or EFFECTS[name].off.items())
@@ -163,7 +181,7 @@ def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: 
     fates = {name: _fate(name, gone, said, effects == "auto") for name, said in omissions.items()}
     rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
-    return Plan(shown, tolerance, rows, without(spec, changes), distance, scene.describe())
+    return Plan(shown, tolerance, rows, without(spec, changes), distance, seen)
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -186,7 +204,8 @@ def names_of(effects: str | Sequence[str]) -> list[str]:
 def _within(omissions: dict[str, Omission], tolerance: float) -> list[str]:
     """The effects to leave out, in order of their bounds."""
     gone: list[str] = []
-    sure = {name: said.distance or 0.0 for name, said in omissions.items() if said.sure and _costs(name)}
+    able = [name for name in omissions if _costs(name) and name not in ASKED_FOR]
+    sure = {name: omissions[name].distance or 0.0 for name in able if omissions[name].sure}
     for name in sorted(sure, key=lambda name: (sure[name], name != "follower")):
         asked = [*gone, name]
         if name == "photoreceptor" and "follower" in omissions and "follower" not in gone:

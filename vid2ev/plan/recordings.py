@@ -7,13 +7,12 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from vid2ev.errors import UsageError
 from vid2ev.instants import instants
 from vid2ev.mounts import Mount
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.frame_camera import frame_plan_of
 from vid2ev.plan.measure import Measure
-from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance, names_of, plan_of
+from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance, names_of, plan_of, plan_unseen
 from vid2ev.plan.subframes import Subframes
 from vid2ev.plan.views import DepthRange, view_row
 from vid2ev.recipe import Recipe
@@ -25,9 +24,14 @@ Plans = Mapping[str, Plan]  # by the name of the camera, "" for the only one
 def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE) -> dict[str, Plan]:
     """The plan of each camera; the source is read once, and made denser in time as for a recording.
 
-    Raises UsageError for a source that cannot be read again, and as `plan_of` does.
+    A source that passes once is not read: all that auto keeps of it is all.  Raises UsageError as `plan_of` does.
     """
     check_effects(recipe, effects, tolerance)
+    if not recipe.source.rewindable:
+        specs = {mount.name: mount.sensor.spec for mount in recipe.mounts}
+        return {
+            name: plan_unseen(spec, tolerance, effects) for name, spec in specs.items() if isinstance(spec, DvsSpec)
+        }
     cameras = [_measure(mount) for mount in recipe.mounts]
     subframes, depth = Subframes(), DepthRange()
     with closing(instants(recipe)) as seen:
@@ -71,12 +75,10 @@ def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOL
 
 
 def check_effects(recipe: Recipe, effects: str | Sequence[str], tolerance: float) -> None:
-    """Raise UsageError for effects that cannot be meant, or cannot be planned for this source."""
+    """Raise UsageError for effects that cannot be meant."""
     check_tolerance(tolerance)
     if effects != "auto":
         names_of(effects)
-    if effects != "all" and not recipe.source.rewindable:
-        raise UsageError(f"{recipe.video} passes once and cannot be measured before; leave --effects out")
 
 
 def described(plans: Plans) -> dict[str, Any]:

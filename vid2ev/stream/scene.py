@@ -18,7 +18,10 @@ With n events that are pushed for the time A and turn C times, and signals that 
     distance <= 2 (e A / tau + e C) / (n theta)
 
 Where thresholds differ from pixel to pixel or crossing to crossing, two recordings of a pixel that disagree at a turn
-go on with other levels: up to one more for each event after it (`echo`).
+go on with other levels: each event after it is up to theta / |dy/dt| early or late (`echo`).
+
+Of recordings that need have nothing in common D is at most that of either by itself, twice (`unlike`): the events that
+are within tau of another in its pixel add up (`dense`), as many as |dy| there / theta.
 
 Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001; M. Krasnoselskii and A. Pokrovskii,
 *Systems with Hysteresis*, Springer 1989, for play and relays; the bounds are ours.
@@ -27,7 +30,7 @@ Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -36,9 +39,10 @@ DISTANCE_TAU_S = 1e-3
 RARE = math.log(1000)  # a chance of 1 in 1000: what a 99.9 % bound leaves
 
 Kind = Literal["exact", "bound", "99.9 % bound", "estimate", "no bound yet"]
-OF_TILES = ("light_min", "light_max", "slope_max", "travel", "pushed_s", "turns", "bend", "bend_at_turns")
-SPREAD = ("by_slope", "by_turns", "by_bends")
-LEAST, MOST = ("light_min",), ("light_max", "slope_max")  # of parts of a clip; all else is their sum
+OF_TILES = ("light_min", "light_max", "slope_max", "travel", "pushed_s", "turns", "bend", "bend_at_turns", "dense")
+SPREAD = ("by_slope", "by_turns", "by_bends", "by_light")
+QUARTER_EDGES = np.arange(103 << 2, (143 << 2) + 1, dtype=np.int32)
+QUARTER_EDGES = np.left_shift(QUARTER_EDGES, 21).view(np.float32).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,13 @@ class Scene:
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
-    by_slope                  [2, octaves] travel, and travel x slope, by the greatest slope around it [nat/s]
-    by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these
-    busiest, travel_squared   the travel of the pixel that has most [nat], and the sum of squares of all pixels'
+    dense                     [tiles] travel x travel of the same pixel within tau [nat^2]
+    by_slope                  [2, quarters of octaves] travel, and travel x slope, by the slope there [nat/s]
+    by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these; of travel
+                              that which counts if levels are no longer the same
+    by_light                  the same by the light there
+    busiest                   the travel of the pixel that has most [nat]
+    by_pixel                  travel of the pixels that have 0, 1, ... whole events
     brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel, now and then
     """
 
@@ -94,17 +102,30 @@ class Scene:
     turns: np.ndarray
     bend: np.ndarray
     bend_at_turns: np.ndarray
+    dense: np.ndarray
     by_slope: np.ndarray
     by_turns: np.ndarray
     by_bends: np.ndarray
+    by_light: np.ndarray
     busiest: float
-    travel_squared: float
+    by_pixel: np.ndarray
     brightness: np.ndarray
 
     @property
     def events(self) -> float:
         """Events expected, without noise and low-pass."""
         return float(self.travel.sum()) / self.threshold
+
+    @property
+    def most_events(self) -> float:
+        """Events expected of the busiest pixel, and those at its ends."""
+        return self.busiest / self.threshold + 2.0
+
+    @property
+    def bunched(self) -> float:
+        """D of a recording by itself, for each half of an event: 1, and more where events follow each other within
+        tau."""
+        return 1.0 + float(self.dense.sum()) / max(float(self.travel.sum()), 1e-300) / self.threshold
 
     @property
     def still(self) -> bool:
@@ -115,19 +136,6 @@ class Scene:
         """The light that a share of the pixels is below, to an octave."""
         counts = np.cumsum(self.brightness)
         return float(2.0 ** (np.searchsorted(counts, share * counts[-1]) - 20))
-
-    def merged(self, later: Scene) -> Scene:
-        """Both parts of a clip as one; a turn in the one has no echo in the other."""
-        both: dict[str, Any] = {}
-        for each in fields(self):
-            a, b = getattr(self, each.name), getattr(later, each.name)
-            if each.name in LEAST:
-                both[each.name] = np.minimum(a, b)
-            elif each.name in MOST:
-                both[each.name] = np.maximum(a, b)
-            elif each.name not in ("pixels", "threshold"):
-                both[each.name] = a + b
-        return replace(self, **both)
 
     def describe(self) -> dict[str, Any]:
         """The scene in a few numbers, ready for JSON."""
@@ -158,18 +166,22 @@ def off_by(scene: Scene, error_nat: np.ndarray, *, echoes: bool) -> float:
     return float(change.sum() / scene.travel.sum())
 
 
-def delayed(scene: Scene, variance_s2: float, reach_s: float, *, echoes: bool) -> float:
+def delayed(scene: Scene, variance_s2: np.ndarray, reach_s: np.ndarray, *, echoes: bool) -> float:
     """Bound on the mean distance where a low-pass gives way to its mean delay.
 
     A bend of the slope by r is rounded off: the area between the two signals is r variance / 2, and their greatest
-    difference r reach, reach = E (D - E D)+ for a delay D that is distributed as the low-pass responds.
+    difference r reach, reach = E (D - E D)+ for a delay D that is distributed as the low-pass responds; of each tile.
     """
     if scene.still:
         return 0.0
     change = 2.0 * (0.5 * variance_s2 * scene.bend / DISTANCE_TAU_S + reach_s * scene.bend_at_turns)
-    lost = 2.0 * reach_s * scene.bend_at_turns.sum()
-    mean = float(change.sum() / max(scene.travel.sum() - lost, 1e-300))
-    return mean + _echo(scene, scene.by_bends, reach_s) if echoes else mean
+    mean = float(change.sum() / scene.travel.sum())
+    return mean + _echo(scene, scene.by_bends, float(reach_s.max())) if echoes else mean
+
+
+def unlike(scene: Scene) -> float:
+    """Bound on the mean distance whatever becomes of the levels and the times."""
+    return 0.0 if scene.still else 2.0 * scene.bunched
 
 
 def _echo(scene: Scene, spread: np.ndarray, per_number_nat: float) -> float:
@@ -178,27 +190,36 @@ def _echo(scene: Scene, spread: np.ndarray, per_number_nat: float) -> float:
 
 
 def surely(scene: Scene, mean: float) -> float:
-    """The 99.9 % bound on a distance of this mean (Bernstein): pixels are independent, none can change more than the
-    busiest, and the mean square of a change is that of an event's pixel."""
+    """The 99.9 % bound on a distance of this mean (Chernoff): pixels are independent, each event of light is as likely
+    to be the first that changes as any other, and what follows in its pixel changes with it.
+
+    For independent X_i, even on [0, m_i] with the chance 2 mu_i / m_i and else 0, and all l > 0,
+
+        P(sum X > t) <= exp(sum 2 mu_i ((exp(l m_i) - 1) / (l m_i) - 1) / m_i - l t)
+    """
     if scene.still or mean == 0.0:
         return mean
-    most = (scene.busiest / scene.threshold + 1.0) / scene.events
-    usual = (scene.travel_squared / scene.travel.sum() / scene.threshold + 1.0) / scene.events
-    return mean + math.sqrt(2.0 * RARE * usual * mean) + most * RARE / 3.0
+    most = np.arange(len(scene.by_pixel)) + 2.0  # events
+    means = mean * scene.by_pixel / scene.threshold  # [events]
+    tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
+    sums = (2.0 * means * (np.expm1(tries * most) / (tries * most) - 1.0) / most).sum(axis=1)
+    return float(((sums + RARE) / tries[:, 0]).min()) / scene.events
 
 
-def added(scene: Scene, extra: float, touched: float) -> float:
-    """Bound on the distance where up to `extra` events of noise [number] come or go, and up to a share `touched` of
-    the others comes after one of them in its pixel, and so from other levels."""
-    events = scene.events
-    if extra == 0.0:
-        return 0.0
-    return min(touched + extra / (2.0 * events + extra), 2.0) if events else 1.0
+def added(events: float, extra: float, touched: float) -> float:
+    """Bound on the distance where up to `extra` events of noise [number] come or go beside at least so many others, and
+    up to a share `touched` of these comes after one of them in its pixel, and so from other levels."""
+    return touched + extra / (2.0 * events + extra) if extra > 0.0 else 0.0
 
 
 def at_most(mean: float) -> float:
     """A number that one of Poisson's exceeds in less than 1 of 1000 cases."""
     return mean + math.sqrt(2.0 * RARE * mean) + RARE / 1.5 if mean > 0 else 0.0
+
+
+def at_least(mean: float) -> float:
+    """A number that one of Poisson's falls short of in less than 1 of 1000 cases."""
+    return max(mean - math.sqrt(2.0 * RARE * mean), 0.0)
 
 
 def together(*distances: float) -> float:
