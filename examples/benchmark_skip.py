@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""What it is worth to let still blocks of pixels sleep: `Dvs(skip=True)` against `skip=False`.
+"""What it is worth to let still strips of pixels sleep: `Dvs(skip=True)` against `skip=False`.
 
-    python examples/benchmark_skip.py                       a still mosaic in which a part of a strip moves
+    python examples/benchmark_skip.py                       a still mosaic in which a band moves
     python examples/benchmark_skip.py --moving 0.2 --size 640x480
     python examples/benchmark_skip.py --clip FILE           frames of a clip, as `vid2ev convert` sees them
 
-A block is 2048 pixels in row-major order: at 1280x720, one row and three fifths.  The strip is as high as makes the
-share `--moving` of them change in every frame; in `--width` of it photographs move by half a pixel a frame, 1 ms apart.
+A strip is 256 pixels of a row: at 1280x720 a fifth of it.  The band is as high as makes the share `--moving` of them
+change in every frame; in `--width` of it photographs move by half a pixel a frame, 1 ms apart.
 
 Timed is `Dvs.step`, in CPU time of one thread, float32 frames in, arrays of events out.  Both ways see ten
 frames in turn, so that a slow minute of the machine hits both alike and neither empties the caches of the other; the
@@ -24,7 +24,7 @@ import click
 import numpy as np
 from benchmark import mosaic
 
-from vid2ev.kernels.layout import BLOCK
+from vid2ev.kernels.layout import STRIP
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
@@ -35,7 +35,7 @@ FRAME_NS = 1_000_000
 TURN = 10  # frames; the first ones warm up
 
 
-def moving_strip(count: int, width: int, height: int, moving: float, part: float) -> tuple[np.ndarray, np.ndarray]:
+def moving_band(count: int, width: int, height: int, moving: float, part: float) -> tuple[np.ndarray, np.ndarray]:
     """Light float32 [N, height, width], and the times [ns]."""
     import cv2
 
@@ -57,9 +57,9 @@ def clip_frames(clip: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def share_changed(frames: np.ndarray) -> float:
-    """The share of blocks that are not what they were in the frame before, to the bit."""
+    """The share of strips that are not what they were in the frame before, to the bit."""
     flat = frames.reshape(len(frames), -1).view(np.uint32)
-    starts = np.arange(0, flat.shape[1], BLOCK)
+    starts = np.arange(0, flat.shape[1], STRIP)
     changed = [np.logical_or.reduceat(after != before, starts).mean() for before, after in itertools.pairwise(flat)]
     return float(np.mean(changed))
 
@@ -91,17 +91,17 @@ def measure(preset: str, frames: np.ndarray, t_ns: np.ndarray, settings: tuple[s
 @click.command(help=__doc__.split("\n\n")[0] if __doc__ else None)
 @click.option("--preset", "presets", multiple=True, default=PRESETS, show_default=True)
 @click.option("--size", default="1280x720", show_default=True, metavar="WIDTHxHEIGHT")
-@click.option("--moving", type=click.FloatRange(0, 1), default=0.05, show_default=True, help="Share of blocks.")
-@click.option("--width", "part", type=click.FloatRange(0, 1), default=0.33, show_default=True, help="Of the strip.")
+@click.option("--moving", type=click.FloatRange(0, 1), default=0.05, show_default=True, help="Share of strips.")
+@click.option("--width", "part", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of the band.")
 @click.option("--count", type=click.IntRange(10), default=80, show_default=True, help="Frames.")
 @click.option("--clip", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Take its first frames.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the sensors.")
 def main(presets, size, moving, part, count, clip, settings) -> None:
     width, height = (int(word) for word in size.split("x"))
-    frames, t_ns = clip_frames(clip, count) if clip else moving_strip(count, width, height, moving, part)
+    frames, t_ns = clip_frames(clip, count) if clip else moving_band(count, width, height, moving, part)
     changed = share_changed(frames)
     click.echo(
-        f"{frames.shape[2]}x{frames.shape[1]}, {len(frames)} frames, {100 * changed:.1f} % of the blocks change\n"
+        f"{frames.shape[2]}x{frames.shape[1]}, {len(frames)} frames, {100 * changed:.1f} % of the strips change\n"
     )
     click.echo("| sensor | skip, ns / pixel | --no-skip, ns / pixel | ratio | slept | events / pixel / frame |")
     click.echo("| --- | --: | --: | --: | --: | --: |")

@@ -51,7 +51,7 @@ def convert(
 
     seed       of the sensor; None draws one
     threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
-    skip       let blocks of pixels sleep in which nothing can happen; changes nothing but the time it takes
+    skip       let strips of pixels sleep in which nothing can happen; changes nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
@@ -163,6 +163,6 @@ def _run(video: str | Path, threads: int, recorder: Recorder) -> dict[str, Any]:
         "video": str(video),
         "seconds": round(recorder.done.seconds, 3),
         "threads": threads,
-        "blocks_slept": recorder.slept(),
+        "strips_slept": recorder.slept(),
         "machine": machine(),
     }

@@ -137,7 +137,7 @@ class Recorder:
             track.add(truth)
 
     def slept(self) -> dict[str, Any]:
-        """Of each event camera, by name ("" if it is the only one): how many of its blocks' intervals were slept
+        """Of each event camera, by name ("" if it is the only one): how many of its strips' intervals were slept
         through in this run, of how many."""
         tracks = zip(self.recipe.mounts, self.tracks, strict=True)
         return {mount.name: list(track.dvs.slept) for mount, track in tracks if isinstance(track, DvsTrack)}

@@ -95,12 +95,14 @@ def _duration(result: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Time taken, from a manifest."""
+    """Time taken, and the share of the event sensors that slept through still light, from a manifest."""
     result = next(iter(manifest["results"].values())) if "results" in manifest else manifest
     seconds, video_s = manifest["run"]["seconds"], result["duration_us"] / 1e6
     ratio = f", {video_s / seconds:.2g} x real time" if seconds and video_s else ""
     threads = manifest["run"]["threads"]
-    return [("took", f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}")]
+    took = f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}"
+    slept, of = map(sum, zip((0, 0), *manifest["run"].get("strips_slept", {}).values(), strict=True))
+    return [("took", took), *([("slept", f"{100 * slept / of:.0f} % of the pixels' intervals")] if slept else [])]
 
 
 def file_facts(directory: Path) -> list[tuple[str, str]]:

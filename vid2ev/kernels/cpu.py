@@ -15,15 +15,16 @@ from vid2ev.kernels.layout import (
     LAG1,
     LANE_COUNT,
     LOW,
-    NOT_FINITE,
     PITCH,
+    STRIP,
     last_light,
     place_of,
     stride_of,
 )
-from vid2ev.kernels.scan import NEW, commit, read_light, scan
+from vid2ev.kernels.naps import give_back
+from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
 from vid2ev.kernels.shots import aim
-from vid2ev.kernels.sleep import keeps_light, may_sleep, sleep, sleeps_on, stir
+from vid2ev.kernels.sleep import doze, next_run, stir
 from vid2ev.kernels.slow import climb, load
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
@@ -70,35 +71,26 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
-        same, sleeps = naps.wanted and keeps_light(naps, index, p0, size), False
-        if len(flags.forced):
-            keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
-        if same and forced == 0 and sleeps_on(naps, index, iv):
-            sleep(naps, index)
-            continue
         block = planes.fast[index * stride : (index + 1) * stride]
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
+        if len(flags.forced):
+            keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+        asleep = 0
         if naps.wanted and len(flags.noise) == 0:
-            sleeps = may_sleep(block, scratch, index, size, same, naps, flags, num, iv)
-        if sleeps:
-            if forced > 0:
-                stir(block, scratch, flagged, index, size, keys, forced, naps, flags, num, iv)
-            sleep(naps, index)
-            if forced == 0:
+            asleep = doze(block, scratch, light, lut, planes.shade, p0, size, naps, flags, num, iv)
+            if asleep * STRIP >= size and forced == 0:
                 continue
-        else:
-            mended = tally[NOT_FINITE]
-            read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
-            if naps.wanted:
-                naps.mended[index] = np.uint8(tally[NOT_FINITE] > mended)
-            scan(block, rest, scratch, flagged, p0, size, flags, num, iv)
+        if asleep > 0 or size < BLOCK:
+            flagged[:] = 0
+        look(block, rest, work, light, lut, p0, size, naps, planes, flags, num, iv, tally)
+        borrowed = np.int64(0)
+        if asleep > 0 and forced > 0:
+            borrowed = stir(block, scratch, work.lent, p0, keys, forced, naps, flags, num, iv)
         if len(flags.forced):
             if shots > LANE_COUNT // 2:
                 out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
                 shots = np.int64(0)
             forced, shots = take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv)
-        for i in range(size, BLOCK):
-            flagged[i] = 0
         count = hits_of(flagged, hits)
         if len(flags.forced) + len(flags.noise) + len(flags.no_closed_form):
             count, out, n = take_general(
@@ -112,12 +104,35 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
             some = min(count - first, LANE_COUNT - used)
             load(block, scratch, work.lanes[used:], work.pixels[used:], hits[first:], some, p0, flags)
             first, used = first + some, used + some
-        if not sleeps:
-            commit(block, scratch, size, flags)
+        keep(block, scratch, p0, size, naps, flags)
+        give_back(block, scratch, work.lent, borrowed, flags)
     out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
     if len(flags.forced):
         out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
     return out, n
+
+
+@inner
+def look(block, rest, work, light, lut, p0, size, naps, planes, flags, num, iv, tally):
+    """Scan what is awake of a block."""
+    scratch, flagged = work.scratch, work.flagged
+    forget_rests(scratch)
+    first, last, steep = 0, 0, np.int32(0)
+    while last < size:
+        first, last = next_run(last, p0, size, naps.wanted, naps.state)
+        own, part, n = block[first:], scratch[first:], last - first
+        read_light(part, light, lut, planes.shade, p0 + first, n, flags, tally)
+        steep += scan(own, rest[first:], part, flagged[first:], p0 + first, n, flags, num, iv)
+    note_rests(scratch, steep)
+
+
+@inner
+def keep(block, scratch, p0, size, naps, flags):
+    """Commit what is awake of a block."""
+    first, last = 0, 0
+    while last < size:
+        first, last = next_run(last, p0, size, naps.wanted, naps.state)
+        commit(block[first:], scratch[first:], last - first, flags)
 
 
 @inner

@@ -74,24 +74,36 @@ def _take_light(scratch, light, lut, tally):
 
 @inner
 def scan(block, rest, scratch, flagged, p0, n, flags, num, iv):
-    """Find the state of a block after one interval, and flag the pixels that may cross a level in it.
+    """Find the state of n pixels after one interval, and flag those that may cross a level in it; returns how many are
+    too steep for float32.
 
-    `block` is the float32 state of the block, planes of PITCH, and stays as it is: the new input and lags go to
-    `scratch`, and into the block with `commit` when the slow path no longer needs the old ones.
+    `block` is the float32 state of their block, planes of PITCH, from the first of them on, as are `rest`, `scratch`
+    and `flagged`.  It stays as it is: the new input and lags go to `scratch`, and into the block with `commit` when the
+    slow path no longer needs the old ones.
     """
     poles = len(flags.poles)
     if len(flags.noise):
         advance_noise(block, scratch, p0, n, poles, num, iv)
     steep = advance(block, scratch, flagged, n, flags, num, iv)
-    if (poles > 0) & (len(flags.log_input) == 0):
-        if steep > 0 or scratch[REFINED] > F(0.0):
-            for i in range(OLD_REST1, REFINED):
-                scratch[i] = F(0.0)
-            scratch[REFINED] = F(steep)
-        if steep > 0:
-            refine(block, rest, scratch, flagged, n, flags, num, iv)
+    if (poles > 0) & (len(flags.log_input) == 0) and steep > 0:
+        refine(block, rest, scratch, flagged, n, flags, num, iv)
     if len(flags.noise) and not iv.noise_resolved:
         flag_rice(block, scratch, flagged, p0, n, flags, num, iv)
+    return steep
+
+
+@inner
+def forget_rests(scratch):
+    """Of another block no lag has anything beyond its float32 yet."""
+    if scratch[REFINED] > F(0.0):
+        for i in range(OLD_REST1, REFINED + 1):
+            scratch[i] = F(0.0)
+
+
+@inner
+def note_rests(scratch, steep):
+    """Some lags have, if any are `steep`."""
+    scratch[REFINED] = F(steep)
 
 
 @inner

@@ -1,147 +1,135 @@
-"""Sleep: blocks in which nothing can happen are not walked, and nothing shows it.
+"""Sleep: strips of pixels in which nothing can happen are not walked, and nothing shows it.
 
-A block whose light has the same bits as in the frame before
+A strip is 256 pixels of a row, or what follows them in the next.  If it sees light of the same bits as in the frame
+before, it
 
     sleeps   if its lags are 0: then an interval changes nothing in it, whatever its length;
     naps     if the hull of its inputs and lags lies between the levels of every pixel: then an interval does no more
-             than step the lags, which is made up for, step by step with each interval's weights, before they are used;
+             than step the lags, which is made up for, step by step with each interval's weights, before they are used
+             (`naps`).
 
-Events that are forced in such a block go the usual way, their pixels alone: a shot takes the signal as the new memory,
+Events that are forced in such a strip go the usual way, their pixels alone: a shot takes the signal as the new memory,
 and a threshold is never so small that what is left of the hull or some leak would reach it (`stir`).
+
+The light of the frame before is in the state, as the walk takes it: with shading, or as a level.  Light that has to be
+mended is other light.
 
 The hull contains the signal at all times (`physics.photoreceptor`: the weights of a step are positive and their sum is
 at most 1).  In float32 a lag of the first pole never grows in steady light, rounding included, and one of the second by
 less than 2e-7 of the larger lag in a step, of which a nap has HISTORY at most: that is what SLACK is for.
 
 A pixel at, or within rounding of, a level is flagged by every scan, and the slow path finds nothing, because the end of
-the interval before was at the same signal: such a pixel does not keep its block awake once its lags are too small for
+the interval before was at the same signal: such a pixel does not keep its strip awake once its lags are too small for
 the signal to have them in float64.
 
-Leak lifts all signals alike; a block sleeps until it would lift the first one to its level.  Photoreceptor noise moves
+Leak lifts all signals alike; a strip sleeps until it would lift the first one to its level.  Photoreceptor noise moves
 every pixel in every interval: with it nothing sleeps.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+from numba import types
+from numba.core.extending import overload
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.kernel_compiler import INNER_OPTIONS, inner
 from vid2ev.kernels.forced import place_of_candidate
-from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, last_light, stride_of
-from vid2ev.kernels.scan import (
-    CLOCK,
-    NEW,
-    NEW1,
-    NEW2,
-    NOISE0,
-    NOISE1,
-    OLD_REST1,
-    REFINED,
-    SEEN,
-    STEEP,
-    light_weights,
-)
+from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
+from vid2ev.kernels.naps import AWAKE, HISTORY, NAPS, SLEEPS, borrow, catch_up
+from vid2ev.kernels.scan import BRIGHTEST, NEW, STEEP
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.log_curve import log_level_32
 from vid2ev.physics.mismatch import FLOOR as MISMATCH_FLOOR
 
 F = np.float32
-AWAKE, NAPS, SLEEPS = range(3)
-HISTORY = 64  # intervals that can be made up for
-WEIGHTS = 5  # of an interval: x1, x2, g, a, b
-GLANCE = 67  # every so many pixels are compared first: light that changes mostly does so there
-PATIENCE = 3  # light that keeps changing is noted now, in the next frame, and then in every fourth
 SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
-X1, X2, G = NOISE0, NOISE1, SEEN  # planes of the scratch that nothing else uses where there is no noise
-
-
-class Naps(NamedTuple):
-    """What is known of the sleep of the blocks; arrays of blocks, but for the light and the history."""
-
-    wanted: bool
-    now: np.ndarray  # unsigned integers: the bits of the light [n]
-    before: np.ndarray  # the bits of the light that each block saw last
-    known: np.ndarray  # uint8: whether `before` has them
-    changes: np.ndarray  # uint8: how many times in a row the light was another
-    wait: np.ndarray  # uint8: frames until it is noted
-    mended: np.ndarray  # uint8: whether there is something in them to be mended, and counted, each time
-    state: np.ndarray  # uint8: AWAKE, NAPS or SLEEPS
-    behind: np.ndarray  # int64: intervals that the lags have still to be stepped
-    until: np.ndarray  # float64: leak since its reference [nat] up to which the block may sleep
-    calm: np.ndarray  # uint8: whether no signal has further to go than a share of the smallest threshold
-    slept: np.ndarray  # int64: intervals slept so far
-    history: np.ndarray  # float64 [HISTORY, WEIGHTS]: interval k is in row k % HISTORY
-    tick: int  # number of this interval
 
 
 @inner
-def sleeps_on(naps, index, iv):
-    """Whether a block that keeps its light sleeps, and may go on."""
-    return naps.state[index] != AWAKE and naps.until[index] > iv.leak1 and naps.behind[index] < HISTORY - 1
-
-
-@inner
-def may_sleep(block, scratch, index, n, same, naps, flags, num, iv):
-    """Whether nothing but what is forced happens in a block in this interval; if not, its lags are made up for.
-
-    `same`: it keeps its light.
+def doze(block, scratch, light, lut, shade, p0, size, naps, flags, num, iv):
+    """Let those strips of a block sleep in which nothing but what is forced happens in this interval; returns how many
+    of them do.  The lags of the others are made up for.
     """
-    if same and sleeps_on(naps, index, iv):
-        return True
-    naps.state[index] = AWAKE
-    catch_up(block, scratch, index, n, naps, flags, num)
-    if same and naps.mended[index] == 0:
-        naps.state[index], naps.until[index], wide = sleep_of(block, scratch, n, flags, num, iv)
-        naps.calm[index] = np.uint8(wide == 0)
-    return naps.state[index] != AWAKE
+    asleep, at = 0, last_light(flags) if len(flags.light_bandwidth) else np.int64(INPUT * PITCH)
+    for first in range(0, size, STRIP):
+        strip, n = (p0 + first) // STRIP, min(STRIP, size - first)
+        same = is_seen(block, at + first, light, lut, shade, p0 + first, n, flags, num)
+        if same:
+            if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
+                settle_down(block[first:], scratch[first:], strip, n, naps, flags, num, iv)
+        else:
+            naps.state[strip] = AWAKE
+            if naps.since[strip] >= 0:
+                catch_up(block[first:], scratch[first:], strip, n, naps, flags, num)
+        asleep += np.int64(naps.state[strip] != AWAKE)
+    naps.slept[p0 // BLOCK] += asleep
+    return asleep
 
 
 @inner
-def sleep(naps, index):
-    """A block sleeps through this interval."""
-    naps.slept[index] += 1
-    naps.behind[index] += np.int64(naps.state[index] == NAPS)
+def next_run(first, p0, size, wanted, state):
+    """The next pixels of a block that are awake, from `first` on: (the first of them, the one after the last)."""
+    if not wanted:
+        return first, size
+    while first < size and state[(p0 + first) // STRIP] != AWAKE:
+        first += STRIP
+    last = first
+    while last < size and state[(p0 + last) // STRIP] == AWAKE:
+        last += STRIP
+    return first, min(last, size)
 
 
 @inner
-def keeps_light(naps, index, p0, n):
-    """Whether a block sees the bits that it is known to have seen last; if not, they are noted now or some time later.
-
-    Where light changes again and again it is looked at less and less often.
-    """
-    now, before = naps.now[p0 : p0 + n], naps.before[p0 : p0 + n]
-    same = naps.known[index] != 0
-    if same:
-        for i in range(0, n, GLANCE):
-            same = same and now[i] == before[i]
-        same = same and are_equal(now, before)
-        naps.changes[index] = np.uint8(0 if same else min(naps.changes[index] + 1, PATIENCE))
-        naps.wait[index] = np.uint8((1 << naps.changes[index]) >> 1)
-    if not same:
-        naps.wait[index] -= np.uint8(naps.wait[index] > 0)
-        naps.known[index] = np.uint8(naps.wait[index] == 0)
-        if naps.wait[index] == 0:
-            for i in range(n):
-                before[i] = now[i]
-    return same
+def sleeps_on(state, until, since, tick, leak):
+    """Whether a strip that keeps its light sleeps, and may go on."""
+    # (of numbers: a call with a whole record takes longer than what it asks)
+    return (state != AWAKE) & (until > leak) & ((since < 0) | (tick - since < HISTORY - 1))
 
 
 @inner
-def are_equal(some, others):
-    """Whether all integers are the same."""
-    differ = np.uint8(0)
-    for i in range(some.size):
-        differ = np.uint8(differ | np.uint8(some[i] != others[i]))
+def settle_down(block, scratch, strip, n, naps, flags, num, iv):
+    """Whether a strip that keeps its light falls asleep; `block` and `scratch` begin at it."""
+    if naps.since[strip] >= 0:
+        catch_up(block, scratch, strip, n, naps, flags, num)
+    naps.state[strip], naps.until[strip], wide = sleep_of(block, scratch, n, flags, num, iv)
+    naps.calm[strip] = np.uint8(wide == 0)
+    naps.since[strip] = naps.tick if naps.state[strip] == NAPS else -1
+
+
+@inner
+def is_seen(block, at, light, lut, shade, p0, n, flags, num):
+    """Whether the light of n pixels from p0 on is what the state has, from `at` on."""
+    differ = np.uint32(0)
+    for i in range(n):
+        pixel = np.uintp(p0) + np.uintp(i)  # (unsigned: otherwise it may be negative, and does not vectorise)
+        value = light_of(light[pixel], lut)
+        if len(flags.shading) + len(flags.log_input):
+            mended = ((value >= F(0.0)) & (value <= BRIGHTEST)) == False  # noqa: E712 (vectorises)
+            differ = np.uint32(differ | np.uint32(mended))
+        if len(flags.shading):
+            value = value * shade[pixel]
+        if (len(flags.log_input) > 0) & (len(flags.light_bandwidth) == 0):
+            value = log_level_32(value, num.curve)
+        differ = np.uint32(differ | np.uint32(value != block[np.uintp(at) + np.uintp(i)]))
     return differ == 0
+
+
+def light_of(value, lut):
+    """Light of a code, or light."""
+
+
+@overload(light_of, jit_options=INNER_OPTIONS)
+def _light_of(value, lut):
+    if isinstance(value, types.Integer):
+        return lambda value, lut: F(value) * lut[0] if lut.size == 1 else lut[value]
+    return lambda value, lut: F(value)
 
 
 @inner
 def sleep_of(block, scratch, n, flags, num, iv):
-    """(NAPS, SLEEPS or AWAKE; the leak up to which it holds; pixels that are not calm) of a block in its light."""
+    """(NAPS, SLEEPS or AWAKE; the leak up to which it holds; pixels that are not calm) of a strip in its light."""
     poles = len(flags.poles)
     if poles + len(flags.leak) + len(flags.track) == 0:
         return SLEEPS, np.inf, 0
@@ -213,102 +201,24 @@ def least_room(scratch, n, flags):
 
 
 @inner
-def catch_up(block, scratch, index, n, naps, flags, num):
-    """Make up for the intervals that a block is behind: its lags, to the bit that each step would have left."""
-    behind = naps.behind[index]
-    naps.behind[index] = 0
-    if len(flags.poles) > 0:
-        moved = True
-        for tick in range(naps.tick - behind, naps.tick):
-            weights = naps.history[tick % HISTORY]
-            again = tick > naps.tick - behind and have_same(weights, naps.history[(tick - 1) % HISTORY])
-            if moved or not again:
-                moved = step_lags(block, scratch, n, weights, again, flags, num) > 0
-                for i in range(n):
-                    block[LAG1 * PITCH + i] = scratch[NEW1 + i]
-                    if len(flags.poles) > 1:
-                        block[LAG2 * PITCH + i] = scratch[NEW2 + i]
+def stir(block, scratch, lent, p0, keys, forced, naps, flags, num, iv):
+    """What a scan would leave of the sleeping pixels in which events are forced; returns how many lags are borrowed.
 
-
-@inner
-def have_same(weights, others):
-    """Whether two intervals have the same weights."""
-    differ = 0
-    for k in range(WEIGHTS):
-        differ += np.int64(weights[k] != others[k])
-    return differ == 0
-
-
-@inner
-def step_lags(block, scratch, n, weights, again, flags, num):
-    """The lags of a block after an interval of steady light into scratch; returns how many are others than before.
-
-    `again`: it is the same block as last time, and these are the same weights.
+    What is forced leaves a signal no farther than half the smallest threshold from where its memory then is.
     """
-    moved = np.int32(0)
-    if len(flags.light_bandwidth) and not again:
-        for i in range(n):
-            weigh(block, scratch, i, F(weights[3]), F(weights[4]), flags, num)
-    x1, x2, g = F(weights[0]), F(weights[1]), F(weights[2])
-    for i in range(n):
-        moved = np.int32(moved + np.int32(step(block, scratch, i, x1, x2, g, flags)))
-    return moved
-
-
-@inner
-def weigh(block, scratch, i, a, b, flags, num):
-    """Weights of pixel i's step, and its clock, where the first pole depends on the light (`scan.advance`)."""
-    light, dark = block[last_light(flags) + i], F(num.bandwidth_dark)
-    mean = F(0.5) * (light + light)
-    scratch[CLOCK + i] = max((a / (F(1.0) + dark)) * (mean + dark), F(1e-9))
-    x1, _, x2, g, _ = light_weights(scratch[CLOCK + i], b, flags)
-    scratch[X1 + i], scratch[X2 + i], scratch[G + i] = x1, x2, g
-
-
-@inner
-def step(block, scratch, i, x1, x2, g, flags):
-    """The lags of pixel i after an interval of steady light into scratch (`scan.advance`); whether they are others."""
-    if len(flags.light_bandwidth):
-        x1, x2, g = scratch[X1 + i], scratch[X2 + i], scratch[G + i]
-    e1 = block[LAG1 * PITCH + i]
-    new1 = (e1 - x1 * e1) + F(0.0)
-    scratch[NEW1 + i] = new1
-    if len(flags.poles) == 1:
-        return new1 != e1
-    e2 = block[LAG2 * PITCH + i]
-    new2 = (e2 - x2 * e2) + (g * e1 + F(0.0))
-    scratch[NEW2 + i] = new2
-    return (new1 != e1) | (new2 != e2)
-
-
-@inner
-def stir(block, scratch, flagged, index, n, keys, forced, naps, flags, num, iv):
-    """What a scan would leave of the pixels of a sleeping block in which events are forced."""
-    catch_up(block, scratch, index, n, naps, flags, num)
-    for i in range(BLOCK):
-        flagged[i] = 0
-    if scratch[REFINED] > F(0.0):
-        for i in range(OLD_REST1, REFINED + 1):
-            scratch[i] = F(0.0)
-    weights = naps.history[naps.tick % HISTORY]
+    count, last, room = 0, np.int64(-1), 0.5 * smallest_threshold(num) - 4.0 * NATS
     for j in range(forced):
         i = place_of_candidate(keys[j], iv)[0]
+        strip = (p0 + i) // STRIP
+        if naps.state[strip] == AWAKE or i == last:
+            continue
         scratch[NEW + i] = block[INPUT * PITCH + i]
         if len(flags.poles) > 0:
-            if len(flags.light_bandwidth):
-                weigh(block, scratch, i, F(weights[3]), F(weights[4]), flags, num)
-            step(block, scratch, i, F(weights[0]), F(weights[1]), F(weights[2]), flags)
-    # What is forced leaves a signal no farther than half the smallest threshold from where its memory now is.
-    room = 0.5 * smallest_threshold(num) - 4.0 * NATS
-    naps.until[index] = min(naps.until[index], iv.leak0 + room)
-    if len(flags.track) > 0 or naps.calm[index] == 0 or room < 4.0 * NATS:
-        naps.until[index] = -np.inf
-
-
-@compiled
-def rouse(blocks, pixels, planes, naps, flags, num, work):
-    """Make up for what these blocks have slept; they may sleep on."""
-    stride = stride_of(flags)
-    for index in blocks:
-        size = min(BLOCK, pixels - index * BLOCK)
-        catch_up(planes.fast[index * stride : (index + 1) * stride], work.scratch, index, size, naps, flags, num)
+            borrow(block, scratch, i, strip, naps, flags, num)
+            lent[count] = i
+            count += 1
+        last = i
+        naps.until[strip] = min(naps.until[strip], iv.leak0 + room)
+        if len(flags.track) > 0 or naps.calm[strip] == 0 or room < 4.0 * NATS:
+            naps.until[strip] = -np.inf
+    return count

@@ -26,6 +26,7 @@ class Work(NamedTuple):
     scratch: np.ndarray  # float32, the block's new state
     flagged: np.ndarray  # uint8
     hits: np.ndarray  # int32
+    lent: np.ndarray  # int32, pixels whose lags are borrowed
     lanes: np.ndarray  # float64
     pixels: np.ndarray  # int64
     live: np.ndarray  # int64
@@ -51,6 +52,7 @@ def new_work() -> Work:
         scratch=aligned(SCRATCH, f32),
         flagged=aligned(BLOCK, np.uint8),
         hits=aligned(BLOCK + 1, np.int32),
+        lent=aligned(BLOCK, np.int32),
         lanes=aligned(LANES, f64),
         pixels=aligned(LANE_COUNT, i64),
         live=aligned(LANE_COUNT + 1, i64),

@@ -9,9 +9,9 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
-from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, SWALLOWED, TALLIES
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES
+from vid2ev.kernels.naps import rouse
 from vid2ev.kernels.order import order_keys, unpack
-from vid2ev.kernels.sleep import rouse
 from vid2ev.kernels.work import new_work
 from vid2ev.light.transfer import code_table
 from vid2ev.physics.delay import Delayed
@@ -43,8 +43,8 @@ class Dvs:
     labels    give each event its cause (`vid2ev.stream.events.Label`)
     transfer  what uint8 or uint16 frames are coded with ("srgb", "bt709", "linear", "gamma:2.2"); without it
               they are refused, because linear light was not promised
-    skip      let blocks of pixels sleep in which nothing can happen; changes nothing but the time it takes
-              (`vid2ev.kernels.sleep`), and the frame before is kept for it, in the type of the frames
+    skip      let strips of pixels sleep in which nothing can happen; changes nothing but the time it takes
+              (`vid2ev.kernels.sleep`)
 
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
@@ -106,7 +106,7 @@ class Dvs:
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
         )
-        self._sleep.begin(flat, interval)
+        self._sleep.begin(interval)
         events = self._events(self._walk(flat, table, interval), interval)
         self._sleep.end()
         self._t_ns = t_ns
@@ -156,7 +156,7 @@ class Dvs:
         """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
         if self._t_ns is None:
             return {}
-        self._rouse(np.arange(-(-self._bad.size // BLOCK)))
+        self._rouse(np.arange(-(-self._bad.size // STRIP)))
         state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise)]
         state["clock"] = np.array(numbers, np.int64)
@@ -190,7 +190,7 @@ class Dvs:
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""
-        self._rouse(np.unique(pixels // BLOCK))
+        self._rouse(np.unique(pixels // STRIP))
         leak = self._numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
         return inside_of(pixels, self._planes, self._flags, self._numbers, leak)
 
@@ -210,7 +210,7 @@ class Dvs:
 
     @property
     def slept(self) -> tuple[int, int]:
-        """How many times a block of 2048 pixels slept through an interval, of how many."""
+        """How many times a strip of 256 pixels slept through an interval, of how many."""
         return self._sleep.count
 
     # ------------------------------------------------------------------------------------------------- inside
@@ -301,8 +301,8 @@ class Dvs:
             self._leak_since_ns = self._t_ns
             self._sleep.wake()
 
-    def _rouse(self, blocks: np.ndarray) -> None:
-        """Bring these blocks up to the last frame, if they have slept."""
-        late = self._sleep.late(blocks)
+    def _rouse(self, strips: np.ndarray) -> None:
+        """Bring these strips up to the last frame, if they have slept."""
+        late = self._sleep.late(strips)
         if late.size:
             rouse(late, self._bad.size, self._planes, self._sleep.naps, self._flags, self._numbers, self._work[0])

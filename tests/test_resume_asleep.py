@@ -1,0 +1,54 @@
+"""A conversion whose still pixels sleep, killed and resumed, leaves the bytes of one that walks them all in one go."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CLIP = "synthetic:moving-edge,size=640x32,fps=100,duration_s=0.12"
+RUN = """
+import json, os, signal, sys
+from vid2ev import convert
+
+last, seen = int(sys.argv[1]), 0
+
+def report(*_):
+    global seen
+    seen += 1
+    if seen == last:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+convert(sys.argv[2], sys.argv[3], report=report, **json.loads(sys.argv[4]))
+"""
+OPTIONS = {
+    "overrides": ["shot_rate_hz=2"],
+    "upsample": "none",
+    "labels": True,
+    "piece": 1 << 15,
+    "threads": 1,
+    "preview": False,
+}
+
+
+def run(directory: Path, killed_at: int = 0, **changed: object) -> int:
+    arguments = [str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed)]
+    return subprocess.run([sys.executable, "-c", RUN, *arguments], stderr=subprocess.DEVNULL, env=os.environ).returncode
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+def test_it_sleeps_on_after_a_kill_to_the_same_bytes(tmp_path: Path) -> None:
+    walked, slept = tmp_path / "walked", tmp_path / "slept"
+    assert run(walked, skip=False) == 0
+    assert run(slept, killed_at=9) == -signal.SIGKILL
+    assert run(slept, resume=True) == 0
+    assert (walked / "events.h5").read_bytes() == (slept / "events.h5").read_bytes()
+    manifests = [json.loads((directory / "manifest.json").read_text()) for directory in (walked, slept)]
+    counts = [manifest.pop("run")["strips_slept"][""] for manifest in manifests]
+    assert manifests[0] == manifests[1]
+    assert counts[0][0] == 0 and counts[1][0] > 0.2 * counts[1][1] > 0
