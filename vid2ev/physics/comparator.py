@@ -4,8 +4,9 @@
     OFF when y <= c_off:  the memory becomes c_off,  likewise
 
 Levels are float64 nats, so they do not drift.  The memory starts at the first signal, or, with `random_phase`, such
-that c_on lies anywhere within one threshold above it: real pixels are not in step, and without noise a scene that
-returns to its first value would sit exactly on a level.
+that c_on lies anywhere within one threshold above it, as leak has it after a rest: real pixels are not in step, and
+without noise a scene that returns to its first value would sit exactly on a level.  So the first change of a clip that
+is less than a threshold sends ON events in its share of the pixels, and no OFF events.
 
 Sources: the paper, section II.A (thresholds apart, the level updated at every potential crossing); timing `linear` is
 ESIM (Rebecq, Gehrig, Scaramuzza, CoRL 2018).
@@ -26,7 +27,7 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
 
     threshold_on: float = Field(0.15, gt=0, le=100, description="mean ON threshold [nat]")
     threshold_off: float = Field(0.15, gt=0, le=100, description="mean OFF threshold [nat]")
-    random_phase: bool = Field(True, description="pixels start anywhere between their levels instead of in step")
+    random_phase: bool = Field(True, description="pixels start with c_on anywhere within a threshold above the signal instead of in step")
     timing: Literal["response", "linear", "frame"] = Field(
         "response",
         description="crossing times from the filter's response, from a line between frames (ESIM), or the frame's time",
