@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -106,6 +107,14 @@ def test_the_recommended_is_on_the_front(places: Places, limit: float) -> None:
 def test_what_is_as_fast_to_within_noise_is_judged_by_its_error() -> None:
     rows = [row(1.0, 0.03), row(1.04, 0.02), row(1.06, 0.01)]
     assert recommended(rows, Budget.parse("vR=0.05")) is rows[1]
+
+
+def test_events_say_nothing_of_frames() -> None:
+    frames = replace(row(1.0, 0.01, lsb=20.0), rung=Rung("frames of an instant", "frames"))
+    rows = [frames, row(2.0, 0.01, lsb=0.1)]
+    assert recommended(rows, Budget.parse("vR=0.05")) is rows[1] and front(rows) == rows[1:]
+    assert recommended(rows, Budget.parse("vR=0.05,lsb=30")) is frames
+    assert recommended(rows, Budget.parse("vR=0.05,lsb=1")) is rows[1]
 
 
 def test_frames_alone_are_judged_by_their_own_error() -> None:

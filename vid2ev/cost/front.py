@@ -83,7 +83,8 @@ def figure(row: Row, name: str) -> float:
 
 def recommended(rows: Sequence[Row], budget: Budget) -> Row | None:
     """The setting to take, of those that may be recommended; None where none is within the budget."""
-    within = [row for row in rows if row.rung.offered and budget.holds(row)]
+    seen = any(name == "lsb" for name, _ in budget.limits)
+    within = [row for row in rows if row.rung.offered and budget.holds(row) and (seen or _is_seen(row))]
     slowest = math.inf if budget.only_time() else AS_FAST * min((row.time for row in within), default=0.0)
     as_fast = [row for row in within if row.time <= slowest]
     return min(as_fast, key=lambda row: (_error(row), row.time), default=None)
@@ -104,10 +105,15 @@ def refusal(rows: Sequence[Row], budget: Budget) -> str:
 def front(rows: Sequence[Row]) -> list[Row]:
     """The settings than which none is as fast and more accurate, nor as accurate and faster; from the fastest on."""
     kept: list[Row] = []
-    for row in sorted(rows, key=lambda row: (row.time, _error(row))):
+    for row in sorted(filter(_is_seen, rows), key=lambda row: (row.time, _error(row))):
         if not kept or _error(row) < _error(kept[-1]):
             kept.append(row)
     return kept
+
+
+def _is_seen(row: Row) -> bool:
+    """Whether the headline error says anything of what the setting changes: that of events nothing of frames."""
+    return row.rung.group != "frames" or row.errors.distance is None
 
 
 def _error(row: Row) -> float:
