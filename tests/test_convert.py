@@ -134,6 +134,12 @@ def test_one_frame_makes_a_recording_without_events(tmp_path: Path, labels: bool
         assert file["ms_to_idx"][:].tolist() == [0, 0] and ("label" in file["events"]) == labels
 
 
+def test_the_manifest_says_what_is_left_of_a_mismatch_that_is_clipped(tmp_path: Path) -> None:
+    np.save(tmp_path / "still.npy", np.full((1, 3, 5), 0.5, np.float32))
+    manifest = convert(tmp_path / "still.npy", tmp_path / "out", "paper", ["mismatch=0.15"], fps=30)
+    assert any("mismatch = 0.15 nat" in text and "0.101 nat (ON)" in text for text in manifest["warnings"])
+
+
 def test_a_random_seed_is_drawn_and_kept(tmp_path: Path) -> None:
     one = convert(CLIP, tmp_path / "one", seed=None, upsample="none")
     other = convert(CLIP, tmp_path / "other", seed=None, upsample="none")

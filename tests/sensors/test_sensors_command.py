@@ -68,3 +68,12 @@ def test_an_unknown_name_is_refused_as_everywhere() -> None:
         run("davis364")
     with pytest.raises(UsageError, match="did you mean phone"):
         run("phones")
+
+
+def test_what_the_clip_leaves_of_the_mismatch_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[dvs]\nthreshold_on = 0.2\nthreshold_off = 0.4\nmismatch = 0.2\n")
+    assert "reached: 0.134 nat ON, 0.187 nat OFF" in run(str(path)) and "reached" not in run("paper")
+    assert json.loads(run(str(path), "--json"))["dvs"]["mismatch"]["reached"] == pytest.approx(
+        [0.1343, 0.1873], abs=1e-4
+    )
