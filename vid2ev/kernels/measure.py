@@ -33,6 +33,7 @@ ROUNDED = F(2.7182818)
 BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT = range(4)
 QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
 STEPS = 6  # of an interval, whose slopes differ
+SMALL_NAT = 0.1  # what goes no further than this is taken at its greatest slope
 
 
 class Pace(NamedTuple):
@@ -161,12 +162,13 @@ def apart(gone, num):
 def pace(i, moved, gone, floor, num, own, tile, spread, scratch):
     """Spread a travel over the slopes of the smoothed signal in the interval, each as much as it goes at them."""
     slope, smooth0 = own[SLOPE * PITCH + i], scratch[SMOOTHED * PITCH + i]
-    old, width = own[LIGHT * PITCH + i] - slope * F(num.dt_s), F(num.dt_s) / F(STEPS)
+    steps = STEPS if gone > F(SMALL_NAT) else 1
+    old, width = own[LIGHT * PITCH + i] - slope * F(num.dt_s), F(num.dt_s) / F(steps)
     whole = F(1e-30)
     for turn in range(2):
         before, light0 = F(0.0), old
-        for step in range(STEPS + 1):
-            smooth = slope + (smooth0 - slope) * num.decays[step]
+        for step in range(steps + 1):
+            smooth = slope + (smooth0 - slope) * num.decays[step * (STEPS // steps)]
             light = old + slope * width * F(step) if num.before_log else own[LIGHT * PITCH + i]
             near = max(light - F(num.smooth_s) * smooth, F(0.0)) + F(floor) if num.before_log else F(1.0)
             here = abs(smooth) / near

@@ -6,8 +6,9 @@ distance is a metric, bounds b_1, b_2, ... are together
 
     (sqrt b_1 + sqrt b_2 + ...)^2 <= tolerance
 
-Estimates leave out nothing, and what costs nothing stays.  Effects are tried in the order of their bounds; the second
-pole before both.
+Estimates leave out nothing, and what costs nothing stays.  Of pixels that start in step, or whose memory jumps to the
+signal after each event (`refractory = "track"`), a bound says only how far apart recordings with nothing in common are.
+Effects are tried in the order of their bounds; the second pole before both.
 
 Costs are of one thread at 1280x720, from the tables of the README and of the kernels' benchmark: nanoseconds per pixel
 and frame, and per event.

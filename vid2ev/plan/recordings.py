@@ -22,7 +22,8 @@ Plans = Mapping[str, Plan]  # by the name of the camera, "" for the only one
 
 
 def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE) -> dict[str, Plan]:
-    """The plan of each camera; the source is read once, and made denser in time as for a recording.
+    """The plan of each camera; the source is read once, and made denser in time as for a recording, which then does
+    the same again.
 
     A source that passes once is not read: all that auto keeps of it is all.  Raises UsageError as `plan_of` does.
     """
