@@ -27,7 +27,9 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
 
     threshold_on: float = Field(0.15, gt=0, le=100, description="mean ON threshold [nat]")
     threshold_off: float = Field(0.15, gt=0, le=100, description="mean OFF threshold [nat]")
-    random_phase: bool = Field(True, description="pixels start with c_on anywhere within a threshold above the signal instead of in step")
+    random_phase: bool = Field(
+        True, description="pixels start with c_on anywhere within a threshold above the signal instead of in step"
+    )
     timing: Literal["response", "linear", "frame"] = Field(
         "response",
         description="crossing times from the filter's response, from a line between frames (ESIM), or the frame's time",
