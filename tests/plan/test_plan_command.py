@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from vid2ev import convert
 from vid2ev.commands.plan import plan
 from vid2ev.errors import UsageError
-from vid2ev.plan.recordings import plans_of
+from vid2ev.plan.recordings import planned, plans_of
 from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
 
@@ -34,6 +34,14 @@ def test_a_recording_is_planned_and_says_so(tmp_path: Path) -> None:
     assert manifest["plan"][""] == json.loads(json.dumps(said.describe()))
     assert manifest["sensor"]["parameters"] == said.spec.model_dump(mode="json")
     assert read_manifest(tmp_path / "a")["plan"] == manifest["plan"]
+
+
+def test_effects_that_are_named_need_no_look_at_the_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vid2ev.plan.recordings.instants", lambda recipe: pytest.fail("measured"))
+    recipe = Recipe.of(CLIP, cis="phone")
+    left, plans = planned(recipe, "refractory,read_noise")
+    assert [mount.sensor.spec.effects() for mount in left.mounts] == [["refractory"], ["read_noise"]]
+    assert all("was not measured" in str(plan) and plan.distance is None for plan in plans.values())
 
 
 def test_all_effects_leave_no_trace(tmp_path: Path) -> None:

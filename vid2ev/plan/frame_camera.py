@@ -15,7 +15,7 @@ Costs are nanoseconds per value of an exposure, of one thread; the exposure's is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
@@ -84,35 +84,61 @@ def frame_plan_of(
 ) -> FramePlan:
     """The plan of a frame camera, for what it sees; `effects` and errors as for `plan_of`."""
     check_tolerance(tolerance)
-    used = spec.effects()
-    omissions = {name: FRAME_EFFECTS[name].omission(seen, spec) for name in used}
+    omissions = {name: FRAME_EFFECTS[name].omission(seen, spec) for name in spec.effects()}
+    plan = _planned(omissions, spec, tolerance, effects, seen.frames_each)
+    always = tuple(FrameRow(name, "kept", omission(seen, spec), 0.0, 0.0) for name, omission in ALWAYS.items())
+    return replace(plan, rows=(*plan.rows, *always), scene=seen.describe())
+
+
+def frame_plan_unseen(
+    spec: CisSpec, why: str, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto"
+) -> FramePlan:
+    """The plan of a frame camera for what was not measured, and `why`: "auto" keeps all."""
+    check_tolerance(tolerance)
+    return _planned(
+        dict.fromkeys(spec.effects(), LevelChange(None, "no bound yet", "-", why)), spec, tolerance, effects, 1.0
+    )
+
+
+def _planned(
+    omissions: dict[str, LevelChange],
+    spec: CisSpec,
+    tolerance: float,
+    effects: str | Sequence[str],
+    frames_each: float,
+) -> FramePlan:
     if effects == "auto":
         gone = _within(omissions, tolerance)
     else:
         kept = names_of(effects)
-        gone = [name for name in used if name not in kept]
+        gone = [name for name in omissions if name not in kept]
     changes = {key: value for name in gone for key, value in FRAME_EFFECTS[name].off.items()}
-    bounds = [omissions[name].distance or 0.0 for name in gone]
-    distance = None if {"exposure", "rolling_shutter"} <= {*gone} else together(*bounds)
-    rows = [FrameRow(name, _fate(name, gone, said), said, _cost(name, seen), 0.0) for name, said in omissions.items()]
-    rows += [FrameRow(name, "kept", omission(seen, spec), 0.0, 0.0) for name, omission in ALWAYS.items()]
+    bounds = [omissions[name].distance for name in gone]
+    known = None not in bounds and not {"exposure", "rolling_shutter"} <= {*gone}
+    distance = together(*(bound for bound in bounds if bound is not None)) if known else None
+    costs = {name: _cost(name, frames_each) for name in omissions}
+    rows = tuple(FrameRow(name, _fate(name, gone, said), said, costs[name], 0.0) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
-    return FramePlan(shown, tolerance, tuple(rows), without(spec, changes), distance, seen.describe())
+    return FramePlan(shown, tolerance, rows, without(spec, changes), distance, {})
 
 
 def _within(omissions: dict[str, LevelChange], tolerance: float) -> list[str]:
     """The effects to leave out, in order of their bounds."""
     gone: list[str] = []
-    bounds = {name: said.distance or 0.0 for name, said in omissions.items() if FRAME_EFFECTS[name].ns > 0}
+    bounds = {
+        name: said.distance
+        for name, said in omissions.items()
+        if said.distance is not None and FRAME_EFFECTS[name].ns > 0
+    }
     for name in sorted(bounds, key=bounds.__getitem__):
         if together(*(bounds[each] for each in [*gone, name])) <= tolerance:
             gone.append(name)
     return gone
 
 
-def _cost(name: str, seen: Exposed) -> float:
+def _cost(name: str, frames_each: float) -> float:
     each = FRAME_EFFECTS[name].ns
-    return round(each * max(seen.frames_each, 1.0), 2) if name == "exposure" else each
+    return round(each * max(frames_each, 1.0), 2) if name == "exposure" else each
 
 
 def _fate(name: str, gone: Sequence[str], said: LevelChange) -> Any:

@@ -153,14 +153,15 @@ def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: 
     return _planned(omissions, spec, tolerance, effects, scene.describe())
 
 
-def plan_unseen(spec: DvsSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
-    """The plan for what passes once, and so cannot be measured before: "auto" keeps all.
+def plan_unseen(spec: DvsSpec, why: str, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
+    """The plan for what was not measured, and `why`: "auto" keeps all.
 
-    An effect that carries state from frame to frame must be there from the first, and what is to come is not known; the
-    one that carries none, the refractory period, costs less than measuring does.  Raises UsageError as `plan_of` does.
+    So it is with what passes once: an effect that carries state from frame to frame must be there from the first, and
+    what is to come is not known; the one that carries none, the refractory period, costs less than measuring does.
+    Raises UsageError as `plan_of` does.
     """
     check_tolerance(tolerance)
-    unseen = Omission(None, "no bound yet", "-", "the source passes once: what is to come is not known")
+    unseen = Omission(None, "no bound yet", "-", why)
     return _planned(dict.fromkeys(spec.effects(), unseen), spec, tolerance, effects, {})
 
 

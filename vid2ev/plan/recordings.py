@@ -10,7 +10,7 @@ from typing import Any
 from vid2ev.instants import instants
 from vid2ev.mounts import Mount
 from vid2ev.plan.expose import Expose
-from vid2ev.plan.frame_camera import frame_plan_of
+from vid2ev.plan.frame_camera import frame_plan_of, frame_plan_unseen
 from vid2ev.plan.measure import Measure
 from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance, names_of, plan_of, plan_unseen
 from vid2ev.plan.subframes import Subframes
@@ -19,6 +19,8 @@ from vid2ev.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 
 Plans = Mapping[str, Plan]  # by the name of the camera, "" for the only one
+PASSES = "the source passes once: what is to come is not known"
+ASKED = "as asked for: the source was not measured"
 
 
 def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE) -> dict[str, Plan]:
@@ -29,10 +31,7 @@ def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: f
     """
     check_effects(recipe, effects, tolerance)
     if not recipe.source.rewindable:
-        specs = {mount.name: mount.sensor.spec for mount in recipe.mounts}
-        return {
-            name: plan_unseen(spec, tolerance, effects) for name, spec in specs.items() if isinstance(spec, DvsSpec)
-        }
+        return _unseen(recipe, PASSES, effects, tolerance)
     cameras = [_measure(mount) for mount in recipe.mounts]
     subframes, depth = Subframes(), DepthRange()
     with closing(instants(recipe)) as seen:
@@ -50,6 +49,17 @@ def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: f
     return plans
 
 
+def _unseen(recipe: Recipe, why: str, effects: str | Sequence[str], tolerance: float) -> dict[str, Plan]:
+    plans: dict[str, Plan] = {}
+    for mount in recipe.mounts:
+        spec = mount.sensor.spec
+        if isinstance(spec, DvsSpec):
+            plans[mount.name] = plan_unseen(spec, why, tolerance, effects)
+        else:
+            plans[mount.name] = frame_plan_unseen(spec, why, tolerance, effects)
+    return plans
+
+
 def _measure(mount: Mount) -> Measure | Expose:
     spec = mount.sensor.spec
     return Measure(spec, mount.size) if isinstance(spec, DvsSpec) else Expose(spec, mount.size)
@@ -64,10 +74,15 @@ def _plan(
 
 
 def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE) -> tuple[Recipe, Plans]:
-    """The recipe with what its plans leave of the sensors; of all effects it is the same, and there are no plans."""
+    """The recipe with what its plans leave of the sensors; of all effects it is the same, and there are no plans.
+
+    Only "auto" has to look at the source for it.
+    """
     if effects == "all":
         return recipe, {}
-    plans = plans_of(recipe, effects, tolerance)
+    check_effects(recipe, effects, tolerance)
+    asked = effects != "auto"
+    plans = _unseen(recipe, ASKED, effects, tolerance) if asked else plans_of(recipe, effects, tolerance)
     mounts = [
         replace(mount, sensor=mount.sensor._replace(spec=plans[mount.name].spec)) if mount.name in plans else mount
         for mount in recipe.mounts
