@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
+from vid2ev.instants import instants
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of
 from vid2ev.plan.plan import KNOWN, names_of
+from vid2ev.recipe import Recipe
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import EFFECTS, CisSpec
 from vid2ev.sensors.presets import cis_names, load_cis
@@ -47,7 +49,10 @@ ratios: dict[str, list[float]] = defaultdict(list)
 def frames(name: str) -> tuple[tuple[int, int], list[Frame]]:
     if name in REAL and not VIDEOS.is_dir():
         pytest.skip(f"{VIDEOS} is not there")
-    return clip(name)
+    if name not in SCENES:
+        return clip(name)
+    recipe = Recipe.of(f"scene:{name}", sensor="ideal", stop=0.15, size="48x36")  # (of thousands of instants)
+    return recipe.mounts[0].size, [instant.frames[0] for instant in instants(recipe)]
 
 
 def exposed(spec: CisSpec, size: tuple[int, int], light: list[Frame]) -> Exposed:
