@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against.clips import hold, noisy, play
+from against.clips import clean, hold, noisy, play
 
+from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Label
 
 SHAPE = (24, 24)
@@ -60,3 +61,10 @@ def test_labels_change_nothing_else(rate_hz):
     assert plain.label is None and len(labelled.label) == len(labelled) == len(plain) > 5_000
     assert all(np.array_equal(getattr(plain, name), getattr(labelled, name)) for name in "txyp")
     assert {Label.SIGNAL, Label.SHOT, Label.HOT} <= set(np.unique(labelled.label))
+
+
+@pytest.mark.parametrize("rate_hz", [0, 1000])
+def test_no_events_are_labelled_too(rate_hz):
+    dvs = Dvs(clean(frame_rate_hz=rate_hz), (3, 2), labels=True)
+    still = [dvs.step(np.ones((2, 3), np.float32), k * 1_000_000) for k in range(3)]
+    assert all(events.label is not None for events in [*still, dvs.flush(), dvs.flush()])

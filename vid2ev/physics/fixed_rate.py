@@ -33,11 +33,11 @@ class FixedRate(BaseModel, frozen=True, extra="forbid"):
 class EventFrames:
     """Events into event frames; the state is `origin_us`, the last frame of each pixel, and the events held back."""
 
-    def __init__(self, spec: FixedRate, width: int, height: int):
-        self.spec, self.width = spec, width
+    def __init__(self, spec: FixedRate, width: int, height: int, labels: bool = False):
+        self.spec, self.width, self.labels = spec, width, labels
         self.origin_us: int | None = None
         self.last = np.full(width * height, -1, np.int64)
-        self.held = Events.empty()
+        self.held = Events.empty(labels)
 
     def instant_us(self, k: np.ndarray) -> np.ndarray:
         """Times [us] of event frames k."""
@@ -76,7 +76,7 @@ class EventFrames:
 
     def flush(self) -> Events:
         """The events held back."""
-        held, self.held = self.held, Events.empty()
+        held, self.held = self.held, Events.empty(self.labels)
         return self._ordered(held)
 
     @staticmethod
@@ -95,9 +95,8 @@ class EventFrames:
         """Take up a state that `state` gave."""
         self.origin_us = int(state["frame_origin"][0])
         self.last[...] = state["frame_last"]
-        label = state["held_label"]
         held = (state[f"held_{k}"] for k in "txyp")
-        self.held = Events(*held, label if len(label) else None)
+        self.held = Events(*held, state["held_label"] if self.labels else None)
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

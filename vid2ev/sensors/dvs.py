@@ -75,7 +75,7 @@ class Dvs:
         self._flags = flags_of(spec, labels)
         self._numbers = numbers_of(spec, seed, camera)
         self._planes, self._bad = planes_of(spec, self._flags, self._numbers, width, height)
-        self._frames = EventFrames(spec, width, height) if spec.frame_rate_hz > 0 else None
+        self._frames = EventFrames(spec, width, height, labels) if spec.frame_rate_hz > 0 else None
         self._delayed = Delayed(spec.delay_us) if spec.delay_us > 0 else None
         self._tallies = np.zeros((threads, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)

@@ -50,9 +50,10 @@ class Events:
     @staticmethod
     def concatenate(parts: Iterable[Events]) -> Events:
         """The parts one after the other; they must be in order of time already."""
+        parts = list(parts)
         kept = [part for part in parts if len(part)]
         if len(kept) <= 1:
-            return kept[0] if kept else Events.empty()
+            return kept[0] if kept else Events.empty(any(part.label is not None for part in parts))
         labelled = all(part.label is not None for part in kept)
         return Events(
             np.concatenate([part.t for part in kept]),
