@@ -100,6 +100,21 @@ def test_bounds_are_near_what_they_bound() -> None:
     assert all(medians[f"{use}{end}"] < 1.05 for use in ("exposure", "rolling_shutter") for end in ("", ", rms"))
 
 
+@pytest.mark.parametrize("use", USES)
+@pytest.mark.parametrize("electrons", [{}, {"shot_noise": True, "prnu": 0.02, "read_noise_e": 5}])
+def test_light_beyond_the_range_makes_no_bound_loose(use: str, electrons: dict) -> None:
+    """Lamps 50 times as bright as white, and much that is nearly black."""
+    size, light = frames("edge")
+    lamps = [Frame(np.where(frame.light > 0.4, 50 * frame.light, frame.light), frame.t_ns) for frame in light]
+    noisy = PLAIN.model_copy(update=USES[use] | (electrons if use in ("exposure", "shading") else {}))
+    spec = noisy.model_copy(update={"min_illuminance": 9000})
+    most, rms, said = changed(spec, use.partition(" ")[0], size, lamps)
+    allowed = 1 if not electrons else 65535 / spec.white_e + 1  # (an electron more or less, by the same draw)
+    assert most <= said.levels.most + allowed
+    assert rms <= said.levels.rms + allowed
+    assert said.levels.most <= 10 * max(most, FINE * math.sqrt(0.01 / 12))
+
+
 @pytest.mark.parametrize("name", cis_names())
 @pytest.mark.parametrize("tolerance", [0.0, 0.01, 1.0])
 def test_auto_keeps_within_the_tolerance(name: str, tolerance: float) -> None:
@@ -155,12 +170,16 @@ def test_what_is_seen_is_all_there_is() -> None:
     plain = CisSpec(frame_rate_hz=50, exposure_us=9000, shading=(-0.5,)).noiseless()
     made = np.array([each.light for each in Cis(plain, (8, 6), linear=True).run(light)], np.float64)
     assert (seen.exposures, seen.values, seen.rows) == (len(made), 6 * 8 * 3, 6)
-    found = seen.light_min, seen.light_max, seen.light_mean, seen.light_square
-    assert found == pytest.approx((made.min(), made.max(), made.mean(), (made**2).mean()), rel=1e-6)
+    found = seen.light_min, seen.light_max, seen.light_mean
+    assert found == pytest.approx((made.min(), made.max(), made.mean()), rel=1e-6)
+    white = (4096 + 1023 * 55) / 65535
+    lit = np.where((made >= 4096 / 65535) & (made <= white), made, 0)
+    found = seen.lit_max, seen.lit_mean, seen.lit_square
+    assert found == pytest.approx((lit.max(), lit.mean(), (lit**2).mean()), rel=1e-6)
     levels = (made * 65535 - 4096) / 55
     clipped = (np.abs(levels - np.clip(levels, 0, 1023))).max()
     assert ALWAYS["clip"](seen, spec).levels.most == pytest.approx(clipped, rel=1e-5)
-    assert seen.changes["full_well"].most == pytest.approx(made.max() - 0.9, rel=1e-5)
+    assert seen.changes["full_well"].most == pytest.approx(white - 0.9, rel=1e-5)
     within = exposed(spec, (8, 6), [Frame(frame.light / 6 + 0.1, frame.t_ns) for frame in light])
     assert ALWAYS["clip"](within, spec).levels.most == 0 and ALWAYS["clip"](within, spec).kind == "exact"
 

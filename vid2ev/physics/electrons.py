@@ -25,6 +25,7 @@ expansion.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from pydantic import BaseModel, Field
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.adc import WHITE
 from vid2ev.physics.elementary import exp64
-from vid2ev.physics.fixed_pattern import greatest_gain
+from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain
 from vid2ev.physics.random import normal_pair
 from vid2ev.stream.exposed import (
     Change,
@@ -100,7 +101,7 @@ def lsb_per_electron(spec: Any) -> float:
 def omission_of_shot_noise(seen: Exposed, spec: Any) -> LevelChange:
     """The shot noise: electrons are then their mean number."""
     levels = _shot_e(seen, spec).times(lsb_per_electron(spec))
-    why = f"the brightest light is {_electrons(seen.light_max, spec):.3g} electrons"
+    why = f"the brightest light that is not clipped is {_electrons(seen.lit_max, spec):.3g} electrons"
     return level_change(levels, "99.9 % bound", why)
 
 
@@ -110,13 +111,14 @@ def omission_of_full_well(seen: Exposed, spec: Any) -> LevelChange:
     With shot noise (n - w)+ <= (mu - w)+ + |n - mu|, and it is 0 but for the share of values that are near w.
     """
     beyond = seen.changes["full_well"].times(spec.white_e * spec.exposure_gain)
-    electrons = _electrons(seen.light_max, spec)
+    electrons = _electrons(seen.lit_max, spec)
     if spec.shot_noise and beyond.near > 0:
         reach = poisson_most(electrons, seen.draws)
         shot = surely_square(electrons * beyond.near, reach, seen.draws)
-        beyond = Change(max(electrons + reach - spec.full_well_e, 0.0), (beyond.rms + shot.rms) ** 2)
+        most = max(electrons + reach - spec.full_well_e, beyond.most)
+        beyond = Change(most, (beyond.rms + shot.rms) ** 2)
     kind = "99.9 % bound" if spec.shot_noise else "bound"
-    why = f"the brightest light is {electrons:.3g} electrons, the well holds {spec.full_well_e:g}"
+    why = f"the well holds {spec.full_well_e:g}, the brightest light that is not clipped is {electrons:.3g} electrons"
     return level_change(beyond.times(lsb_per_electron(spec)), kind, why)
 
 
@@ -125,6 +127,24 @@ def omission_of_read_noise(seen: Exposed, spec: Any) -> LevelChange:
     sigma = spec.read_noise_e * lsb_per_electron(spec)
     levels = surely_square(sigma**2, sigma * normal_most(seen.draws), seen.draws)
     return level_change(levels, "99.9 % bound", f"{spec.read_noise_e:g} electrons, whatever the light")
+
+
+def always_clipped(spec: Any) -> tuple[float, float]:
+    """The light below which all levels are clipped to black, and that above which all are to white, whatever noise and
+    fixed pattern do; but for one of 10^12 values."""
+    e, black_e = spec.white_e * spec.exposure_gain, spec.min_illuminance / WHITE * spec.white_e
+    white_e = black_e + ((1 << spec.bits) - 1) / lsb_per_electron(spec)
+    fixed_e = spec.read_noise_e * normal_most(10**12) + LIMIT * spec.dsnu
+
+    def reach_e(mean: float) -> float:
+        return fixed_e + (poisson_most(mean, 10**12) if spec.shot_noise else 0.0)
+
+    bright_e = white_e
+    for _ in range(60):  # (a contraction: the root of the mean grows slower than the mean)
+        bright_e = white_e + reach_e(bright_e)
+    least = least_gain(spec)
+    dark = max(black_e - reach_e(black_e), 0.0) / (e * greatest_gain(spec))
+    return dark, bright_e * (1 + 1e-9) / (e * least) if least > 0 else math.inf
 
 
 def near_full_well(spec: Any) -> float:
@@ -140,5 +160,5 @@ def _electrons(light: float, spec: Any) -> float:
 
 def _shot_e(seen: Exposed, spec: Any) -> Change:
     """n - mu [electrons], 99.9 %; the variance of Poisson's is its mean."""
-    most = poisson_most(_electrons(seen.light_max, spec), seen.draws)
-    return surely_square(_electrons(seen.light_mean, spec), most, seen.draws)
+    most = poisson_most(_electrons(seen.lit_max, spec), seen.draws)
+    return surely_square(_electrons(seen.lit_mean, spec), most, seen.draws)

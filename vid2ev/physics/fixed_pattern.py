@@ -53,11 +53,16 @@ def greatest_gain(spec: Any) -> float:
     return 1.0 + min(LIMIT * spec.prnu, 1.0)
 
 
+def least_gain(spec: Any) -> float:
+    """The least sensitivity of a pixel, as a share of the mean."""
+    return 1.0 - min(LIMIT * spec.prnu, 1.0)
+
+
 def omission(seen: Exposed, spec: Any) -> LevelChange:
     """The fixed pattern: one draw for each value of an exposure."""
     lsb, lsb_per_e = lsb_per_light(spec), WHITE / (spec.white_e * spec.slope)
     reach = min(normal_most(2 * seen.values), LIMIT)
     gain, dark = lsb * spec.prnu, lsb_per_e * spec.dsnu
-    square = gain**2 * seen.light_square + dark**2
-    levels = surely_square(square, reach * (gain * seen.light_max + dark), seen.values if seen.exposures else 0)
+    square = gain**2 * seen.lit_square + dark**2
+    levels = surely_square(square, reach * (gain * seen.lit_max + dark), seen.values if seen.exposures else 0)
     return level_change(levels, "99.9 % bound", f"{100 * spec.prnu:g} % of the light, {spec.dsnu:g} electrons")

@@ -14,17 +14,19 @@ from typing import Any
 import numpy as np
 
 from vid2ev.physics.adc import lsb_per_light
-from vid2ev.physics.electrons import near_full_well
+from vid2ev.physics.electrons import always_clipped, near_full_well
 from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.shading import shading_map
 from vid2ev.plan.exposure_sums import (
     CLIPPED,
     LEAST,
+    LIT_MOST,
+    LIT_SQUARE,
+    LIT_SUM,
     MOST,
     NEAR,
     OVERFULL,
     SHADED,
-    SQUARE,
     SUM,
     SUMS,
     add_change,
@@ -51,7 +53,8 @@ class Expose:
         channels = 3 if spec.colour else 1
         self._rows = (height, width * channels)
         self._shade = np.repeat(shading_map(spec.shading, width, height), channels, axis=1)
-        self._limits = (*_range(spec), greatest_gain(spec), *_well(spec))
+        self._ends = always_clipped(spec)
+        self._limits = (*self._ends, *_range(spec), greatest_gain(spec), *_well(spec))
         self._sums = np.zeros((SUMS, self._rows[1]))
         self._sums[LEAST] = np.inf
         self._changes = {name: np.zeros((2, self._rows[1])) for name in ways if name}
@@ -69,7 +72,7 @@ class Expose:
             lights = {name: waiting.popleft() for name, waiting in self._waiting.items()}
             add_light(lights[""], self._shade, *self._limits, self._sums)
             for name, sums in self._changes.items():
-                add_change(lights[""], lights[name], self._shade, sums)
+                add_change(lights[""], lights[name], self._shade, *self._ends, sums)
             self._exposures += 1
 
     def exposed(self, speed_px_per_s: float | None = None) -> Exposed:
@@ -90,7 +93,9 @@ class Expose:
             light_min=float(sums[LEAST].min()) if self._exposures else 0.0,
             light_max=float(sums[MOST].max()),
             light_mean=float(sums[SUM].sum()) / draws,
-            light_square=float(sums[SQUARE].sum()) / draws,
+            lit_max=float(sums[LIT_MOST].max()),
+            lit_mean=float(sums[LIT_SUM].sum()) / draws,
+            lit_square=float(sums[LIT_SQUARE].sum()) / draws,
             changes=changes | {"full_well": changes["full_well"]._replace(near=near)},
             speed_px_per_s=speed_px_per_s,
         )

@@ -12,42 +12,51 @@ from numba import njit
 from vid2ev.kernel_cache import mark_our_kernels
 
 mark_our_kernels()
-LEAST, MOST, SUM, SQUARE = range(4)  # of the light behind the lens shading
-SHADED, CLIPPED, OVERFULL, NEAR = 4, 6, 8, 10  # changes, and how many values are near the full well
-SUMS = 11
+LEAST, MOST, SUM, LIT_MOST, LIT_SUM, LIT_SQUARE = range(6)  # of the light behind the lens shading
+SHADED, CLIPPED, OVERFULL, NEAR = 6, 8, 10, 12  # changes, and how many values are near the full well
+SUMS = 13
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_light(light, shade, black, white, gain, well, near_well, sums):
-    """Add the light of an exposure; all is in light: that of the first code and of the last, what a well holds of a
-    pixel that is `gain` times as sensitive, and from where on it may be full."""
+def add_light(light, shade, dark, bright, black, white, gain, well, near_well, sums):
+    """Add the light of an exposure.  All is in light: what lies between dark and bright may be seen, black is the first
+    code and white the last, a well is what a pixel `gain` times as sensitive holds, near_well where it may be full.
+    """
     for y in range(light.shape[0]):
         row, optical = light[y], shade[y]
         for i in range(row.size):
             before = np.float64(row[i])
             value = before * np.float64(optical[i])
-            shaded = value - before
+            seen = min(max(value, dark), bright)
+            lit = value if seen == value else 0.0
+            shaded = seen - min(max(before, dark), bright)
             clipped = value - min(max(value, black), white)
-            overfull = max(value * gain - well, 0.0)
+            overfull = max(seen * gain - well, 0.0)
             sums[LEAST, i] = min(sums[LEAST, i], value)
             sums[MOST, i] = max(sums[MOST, i], value)
             sums[SUM, i] += value
-            sums[SQUARE, i] += value * value
+            sums[LIT_MOST, i] = max(sums[LIT_MOST, i], lit)
+            sums[LIT_SUM, i] += lit
+            sums[LIT_SQUARE, i] += lit * lit
             sums[SHADED, i] = max(sums[SHADED, i], abs(shaded))
             sums[SHADED + 1, i] += shaded * shaded
             sums[CLIPPED, i] = max(sums[CLIPPED, i], abs(clipped))
             sums[CLIPPED + 1, i] += clipped * clipped
             sums[OVERFULL, i] = max(sums[OVERFULL, i], overfull)
             sums[OVERFULL + 1, i] += overfull * overfull
-            sums[NEAR, i] += 1.0 if value >= near_well else 0.0
+            sums[NEAR, i] += 1.0 if seen >= near_well else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_change(one, other, shade, sums):
-    """Add what two pictures of light differ by, where the lens brightens it more (float64 [2, n])."""
+def add_change(one, other, shade, dark, bright, sums):
+    """Add what two pictures of light differ by, between dark and bright; behind the lens or before it, whatever is more
+    (float64 [2, n])."""
     for y in range(one.shape[0]):
         first, second, optical = one[y], other[y], shade[y]
         for i in range(first.size):
-            change = (np.float64(first[i]) - np.float64(second[i])) * max(np.float64(optical[i]), 1.0)
-            sums[0, i] = max(sums[0, i], abs(change))
+            a, b, gain = np.float64(first[i]), np.float64(second[i]), np.float64(optical[i])
+            plain = abs(min(max(a, dark), bright) - min(max(b, dark), bright))
+            shaded = abs(min(max(a * gain, dark), bright) - min(max(b * gain, dark), bright))
+            change = max(plain, shaded)
+            sums[0, i] = max(sums[0, i], change)
             sums[1, i] += change * change

@@ -65,7 +65,9 @@ class Exposed:
     values, rows          of an exposure
     exposures             how many were looked at
     frames, frames_each   frames of light, and those that fall into one exposure, in the mean
-    light_min, light_max, light_mean, light_square     extremes, mean and mean square
+    light_min, light_max, light_mean    of all of it
+    lit_max, lit_mean, lit_square       greatest, mean and mean square; light that is clipped whatever noise does
+                          counts as 0, as there nothing changes
     changes               of light, by the name of an effect: what it is with the effect less what it is without
     speed_px_per_s        how fast things move in the source, where that was looked at
     """
@@ -78,7 +80,9 @@ class Exposed:
     light_min: float
     light_max: float
     light_mean: float
-    light_square: float
+    lit_max: float
+    lit_mean: float
+    lit_square: float
     changes: Mapping[str, Change]
     speed_px_per_s: float | None = None
 
