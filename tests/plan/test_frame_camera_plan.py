@@ -51,7 +51,7 @@ def frames(name: str) -> tuple[tuple[int, int], list[Frame]]:
         pytest.skip(f"{VIDEOS} is not there")
     if name not in SCENES:
         return clip(name)
-    recipe = Recipe.of(f"scene:{name}", sensor="ideal", stop=0.15, size="48x36")  # (of thousands of instants)
+    recipe = Recipe.of(f"scene:{name},size=64x48", sensor="ideal", stop=0.15)
     return recipe.mounts[0].size, [instant.frames[0] for instant in instants(recipe)]
 
 
