@@ -75,14 +75,15 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         if len(flags.forced):
             keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
+        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         asleep = 0
         if naps.wanted and len(flags.noise) == 0:
-            asleep = doze(block, scratch, light, lut, planes.shade, p0, size, naps, flags, num, iv)
+            asleep = doze(block, scratch, p0, size, naps, flags, num, iv)
             if asleep * STRIP >= size and forced == 0:
                 continue
         if asleep > 0 or size < BLOCK:
             flagged[:] = 0
-        look(block, rest, work, light, lut, p0, size, naps, planes, flags, num, iv, tally)
+        look(block, rest, work, p0, size, naps, flags, num, iv)
         borrowed = np.int64(0)
         if asleep > 0 and forced > 0:
             borrowed = stir(block, scratch, work.lent, p0, keys, forced, naps, flags, num, iv)
@@ -113,15 +114,14 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
 
 
 @inner
-def look(block, rest, work, light, lut, p0, size, naps, planes, flags, num, iv, tally):
-    """Scan what is awake of a block."""
+def look(block, rest, work, p0, size, naps, flags, num, iv):
+    """Scan what is awake of a block, of which the light is in the scratch."""
     scratch, flagged = work.scratch, work.flagged
     forget_rests(scratch)
     first, last, steep = 0, 0, np.int32(0)
     while last < size:
         first, last = next_run(last, p0, size, naps.wanted, naps.state)
         own, part, n = block[first:], scratch[first:], last - first
-        read_light(part, light, lut, planes.shade, p0 + first, n, flags, tally)
         steep += scan(own, rest[first:], part, flagged[first:], p0 + first, n, flags, num, iv)
     note_rests(scratch, steep)
 

@@ -11,8 +11,7 @@ before, it
 Events that are forced in such a strip go the usual way, their pixels alone: a shot takes the signal as the new memory,
 and a threshold is never so small that what is left of the hull or some leak would reach it (`stir`).
 
-The light of the frame before is in the state, as the walk takes it: with shading, or as a level.  Light that has to be
-mended is other light.
+The light of the frame before is in the state, as the walk takes it: mended, with shading, or as a level.
 
 The hull contains the signal at all times (`physics.photoreceptor`: the weights of a step are positive and their sum is
 at most 1).  In float32 a lag of the first pole never grows in steady light, rounding included, and one of the second by
@@ -29,14 +28,12 @@ every pixel in every interval: with it nothing sleeps.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.core.extending import overload
 
-from vid2ev.kernel_compiler import INNER_OPTIONS, inner
+from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
 from vid2ev.kernels.naps import AWAKE, HISTORY, NAPS, SLEEPS, borrow, catch_up
-from vid2ev.kernels.scan import BRIGHTEST, NEW, STEEP
+from vid2ev.kernels.scan import NEW, NOISE0, STEEP
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.log_curve import log_level_32
 from vid2ev.physics.mismatch import FLOOR as MISMATCH_FLOOR
@@ -44,18 +41,19 @@ from vid2ev.physics.mismatch import FLOOR as MISMATCH_FLOOR
 F = np.float32
 SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
+ROOM = NOISE0  # a plane of the scratch: where pixels sleep there is no noise
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
 
 
 @inner
-def doze(block, scratch, light, lut, shade, p0, size, naps, flags, num, iv):
+def doze(block, scratch, p0, size, naps, flags, num, iv):
     """Let those strips of a block sleep in which nothing but what is forced happens in this interval; returns how many
-    of them do.  The lags of the others are made up for.
+    of them do.  The lags of the others are made up for.  The light is in the scratch, mended, and stays there.
     """
     asleep, at = 0, last_light(flags) if len(flags.light_bandwidth) else np.int64(INPUT * PITCH)
     for first in range(0, size, STRIP):
         strip, n = (p0 + first) // STRIP, min(STRIP, size - first)
-        same = is_seen(block, at + first, light, lut, shade, p0 + first, n, flags, num)
+        same = is_seen(block, at + first, scratch, NEW + first, n, flags, num)
         if same:
             if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
                 settle_down(block[first:], scratch[first:], strip, n, naps, flags, num, iv)
@@ -99,32 +97,16 @@ def settle_down(block, scratch, strip, n, naps, flags, num, iv):
 
 
 @inner
-def is_seen(block, at, light, lut, shade, p0, n, flags, num):
-    """Whether the light of n pixels from p0 on is what the state has, from `at` on."""
+def is_seen(seen, at, light, begin, n, flags, num):
+    """Whether n pixels of light from `begin` on are those that were seen, from `at` on."""
+    # (offsets in place of slices: each slice is counted, which takes longer than to look at a strip)
     differ = np.uint32(0)
     for i in range(n):
-        pixel = np.uintp(p0) + np.uintp(i)  # (unsigned: otherwise it may be negative, and does not vectorise)
-        value = light_of(light[pixel], lut)
-        if len(flags.shading) + len(flags.log_input):
-            mended = ((value >= F(0.0)) & (value <= BRIGHTEST)) == False  # noqa: E712 (vectorises)
-            differ = np.uint32(differ | np.uint32(mended))
-        if len(flags.shading):
-            value = value * shade[pixel]
+        value = light[np.uintp(begin) + np.uintp(i)]  # (unsigned: otherwise it may be negative, and does not vectorise)
         if (len(flags.log_input) > 0) & (len(flags.light_bandwidth) == 0):
             value = log_level_32(value, num.curve)
-        differ = np.uint32(differ | np.uint32(value != block[np.uintp(at) + np.uintp(i)]))
+        differ = np.uint32(differ | np.uint32(value != seen[np.uintp(at) + np.uintp(i)]))
     return differ == 0
-
-
-def light_of(value, lut):
-    """Light of a code, or light."""
-
-
-@overload(light_of, jit_options=INNER_OPTIONS)
-def _light_of(value, lut):
-    if isinstance(value, types.Integer):
-        return lambda value, lut: F(value) * lut[0] if lut.size == 1 else lut[value]
-    return lambda value, lut: F(value)
 
 
 @inner
@@ -173,7 +155,7 @@ def smallest_threshold(num):
 @inner
 def is_quiet(block, scratch, i, lag, top, bottom, gain, flags, num, iv):
     """Whether a pixel's signal, between bottom and top, is between its levels; with leak, how far it may rise goes to
-    scratch.  `gain`: of the leak so far."""
+    ROOM.  `gain`: of the leak so far."""
     high, low = block[HIGH * PITCH + i], block[LOW * PITCH + i]
     if len(flags.log_compare) and not len(flags.log_input):
         top = log_level_32(max(top, F(0.0)), num.curve)
@@ -182,10 +164,10 @@ def is_quiet(block, scratch, i, lag, top, bottom, gain, flags, num, iv):
         at_rest = (lag == F(0.0)) | (lag <= TINY) & (abs(block[INPUT * PITCH + i]) >= LEAST)
         return (top < high) & (bottom > low) | at_rest & (high > F(-np.inf))
     if len(flags.log_compare):
-        scratch[NEW + i] = (high - top) - NATS
+        scratch[ROOM + i] = (high - top) - NATS
         return bottom + F(iv.leak0) - NATS > low
     dark = F(num.curve.dark)
-    scratch[NEW + i] = high / (top + dark)
+    scratch[ROOM + i] = high / (top + dark)
     return (bottom > -dark) & ((bottom + dark) * (gain - NATS * gain) > low)
 
 
@@ -194,7 +176,7 @@ def least_room(scratch, n, flags):
     """The leak that lifts the first pixel to its level [nat], from what `is_quiet` has left."""
     least = np.inf
     for i in range(n):
-        least = min(least, np.float64(scratch[NEW + i]))
+        least = min(least, np.float64(scratch[ROOM + i]))
     if len(flags.log_compare):
         return least
     return log64(least) - NATS if 0.0 < least < np.inf else (least if least > 0.0 else -np.inf)
