@@ -113,7 +113,7 @@ class Auto(click.ParamType):
 )  # fmt: skip
 @click.option(
     "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",
-    help="How far from all effects the events may be with auto, as a distance.",
+    help="How far from those of all effects events and frames may be with auto, as a distance.",
 )  # fmt: skip
 @click.option(
     "--budget", metavar="LIMIT[,LIMIT...]",
