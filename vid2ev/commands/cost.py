@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from vid2ev.commands.convert import Auto
-from vid2ev.commands.source_options import source_options
-
-if TYPE_CHECKING:
-    pass
+from vid2ev.commands.source_options import camera_options, source_options
 
 
 @click.command(short_help="Say what accuracy costs in time, on your clip and machine.")
@@ -24,12 +21,7 @@ if TYPE_CHECKING:
 @click.option("--duration", "duration_s", type=click.FloatRange(0, min_open=True), metavar="S", help="How much of the"
     " middle of the clip to take.  [default: 30 frames of 640x480, less of larger ones]")  # fmt: skip
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="How often to time each setting.")
-@click.option("--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="As for convert.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor.")
-@click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's.")
-@click.option("--depth", metavar="DEPTH", help="How far the scene is, for cameras that stand elsewhere.")
-@click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, in the same place.")
-@click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames.")
+@camera_options
 @click.option(
     "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
     help="Light between the frames: this in all settings.",

@@ -7,17 +7,12 @@ from typing import Any
 
 import click
 
-from vid2ev.commands.source_options import source_options
+from vid2ev.commands.source_options import camera_options, source_options
 
 
 @click.command(short_help="Say which effects of a sensor a clip calls for.")
 @click.argument("source")
-@click.option("--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="As for convert.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor.")
-@click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's.")
-@click.option("--depth", metavar="DEPTH", help="How far the scene is, for cameras that stand elsewhere.")
-@click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, as for convert.")
-@click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras, as for convert.")
+@camera_options
 @click.option(
     "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
     help="Light between the frames: what is measured is what the sensor would see.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
@@ -43,8 +43,27 @@ SOURCE_OPTIONS = (
 )
 
 
+CAMERA_OPTIONS = (
+    click.option("--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="As for convert."),
+    click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor."),
+    click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's."),
+    click.option("--depth", metavar="DEPTH", help="How far the scene is, for cameras that stand elsewhere."),
+    click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, in the same place."),
+    click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames."),
+)
+
+
 def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """A command with the options of `open_source`, in this order."""
-    for option in reversed(SOURCE_OPTIONS):
+    return _with(SOURCE_OPTIONS, command)
+
+
+def camera_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command with the options of cameras that `convert` has, for those that write no recording."""
+    return _with(CAMERA_OPTIONS, command)
+
+
+def _with(options: Sequence[Callable[..., Any]], command: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(options):
         command = option(command)
     return command

@@ -22,6 +22,11 @@ def plot(comparison: Comparison, picture: Path) -> None:
     _draw_map(figure, panels["map"], comparison)
     _draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
+    save(figure, picture)
+
+
+def save(figure: Any, picture: Path) -> None:
+    """Write a figure as a PNG file, which is there as a whole or not at all; raises DataError."""
     with writing(picture):
         picture.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(picture) as file:

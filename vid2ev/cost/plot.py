@@ -6,10 +6,9 @@ import math
 from pathlib import Path
 from typing import Any
 
+from vid2ev.compare.plots import save
 from vid2ev.cost.front import Row
 from vid2ev.cost.measure import Cost
-from vid2ev.errors import DataError
-from vid2ev.recording.disk import whole_file
 
 COLOURS = {
     "light": "#1f77b4",
@@ -52,14 +51,7 @@ def plot(cost: Cost, picture: Path) -> None:
     _draw_recommended(axes, cost)
     figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=8)
     _label(axes, rows)
-    try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(picture) as file:
-            figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
-    except OSError as error:
-        picture.with_name(f"{picture.name}.new").unlink(missing_ok=True)
-        reason = error.strerror or str(error)
-        raise DataError(f"{picture} cannot be written: {reason}; make room or access there") from error
+    save(figure, picture)
 
 
 def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:

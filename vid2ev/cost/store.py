@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 from vid2ev.cost.measure import Cost
-from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import whole_file
+from vid2ev.errors import UsageError
+from vid2ev.recording.disk import whole_file, writing
 
 
 def check(name: str | None, source: str, overwrite: bool) -> tuple[Path, Path]:
@@ -22,13 +22,10 @@ def check(name: str | None, source: str, overwrite: bool) -> tuple[Path, Path]:
 
 def store(cost: Cost, place: Path) -> None:
     """Write the JSON file, which is there as a whole or not at all; raises DataError."""
-    try:
+    with writing(place):
         place.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(place) as file:
             file.write(f"{json.dumps(cost.describe(), indent=2, allow_nan=False)}\n".encode())
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise DataError(f"{place} cannot be written: {reason}; make room or access there") from error
 
 
 def _short(source: str) -> str:
