@@ -36,6 +36,7 @@ GUESSES = 9 * LANE_PITCH
 # Accepted last step, in units of the faster time constant: the method is of third order, with a large constant near a
 # turning point.
 ENOUGH = 2e-3
+ROUNDED, TRACE = 1e-15, 1e-30
 
 
 @inner
@@ -80,8 +81,10 @@ def prepare_responses(lanes, turns, guesses, live, count, b, flags, num, iv):
         # The end comes from the state that the next interval starts with, so that nothing happens in between.
         lanes[F0 + j], lanes[F1 + j], lanes[LAST + j] = y0, last, last
         k1, k2 = a * c1, b * c2
-        lanes[SLOPE0 + j], lanes[SLOPE1 + j] = rise - k1 - k2, rise - k1 * end1 - k2 * end2
-        lanes[BEND0 + j], lanes[BEND1 + j] = a * k1 + b * k2, a * k1 * end1 + b * k2 * end2
+        bend = above_rounding(a * k1 + b * k2, abs(a * k1) + abs(b * k2), rise)
+        lanes[SLOPE0 + j] = above_rounding(rise - k1 - k2, abs(rise) + abs(k1) + abs(k2), bend)
+        lanes[SLOPE1 + j] = rise - k1 * end1 - k2 * end2
+        lanes[BEND0 + j], lanes[BEND1 + j] = bend, a * k1 * end1 + b * k2 * end2
         least = rise - max(k1, k1 * end1) - max(k2, k2 * end2)
         most = rise - min(k1, k1 * end1) - min(k2, k2 * end2)
         lanes[STEADY + j] = 1.0 if (least > 0.0) | (most < 0.0) else 0.0
@@ -90,6 +93,12 @@ def prepare_responses(lanes, turns, guesses, live, count, b, flags, num, iv):
     if poles:
         split_pieces(lanes, turns, guesses, live, count, b)
     ends_in_nats(lanes, count, flags, num)
+
+
+@inner
+def above_rounding(total, size, later):
+    """A sum of terms of this size; where nothing but rounding is left of it, as from rest, a trace of what comes later."""
+    return total if abs(total) > ROUNDED * size else TRACE * later
 
 
 @inner

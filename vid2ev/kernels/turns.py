@@ -10,7 +10,7 @@ import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import LANE_PITCH
-from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log64
+from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log32, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
 
 F = np.float32
@@ -45,12 +45,28 @@ def bracket_turns(turns, count, b):
 
 @inner
 def start_turns(turns, guesses, count, b):
-    """The lanes in float32, each starting in the middle of its bracket."""
+    """The lanes in float32, each starting where two of its three slopes cancel each other."""
     for k in range(count):
         lo, hi, a = turns[LO + k], turns[HI + k], turns[A + k]
-        guesses[G_LO + k], guesses[G_HI + k], guesses[G_ROOT + k] = lo, hi, 0.5 * (lo + hi)
+        guesses[G_LO + k], guesses[G_HI + k] = lo, hi
         guesses[G_K1 + k], guesses[G_K2 + k], guesses[G_A + k] = a * turns[C1 + k], b * turns[C2 + k], a
         guesses[G_RISE + k], guesses[G_UP + k] = turns[RISE + k], 1.0 if turns[AT_0 + k] > 0.0 else -1.0
+    slower = F(b)
+    for k in range(count):
+        lo, hi, a = guesses[G_LO + k], guesses[G_HI + k], guesses[G_A + k]
+        k1, k2, rise = guesses[G_K1 + k], guesses[G_K2 + k], guesses[G_RISE + k]
+        late = balance(k1 if a < slower else k2, rise, min(a, slower), lo, hi)
+        early = balance(k2, -k1, slower - a, lo, hi)
+        guesses[G_ROOT + k] = late if late > lo else (early if early > lo else F(0.5) * (lo + hi))
+
+
+@inner
+def balance(k, other, rate, lo, hi):
+    """Where k exp(-rate s) has fallen to `other`, if that is between lo and hi; otherwise lo."""
+    ratio = k / other
+    usable = (ratio > F(1e-30)) & (ratio < F(1e30))
+    s = log32(ratio if usable else F(1.0)) / rate
+    return s if usable & (s > lo) & (s < hi) else lo
 
 
 @inner
