@@ -1,7 +1,8 @@
 """Shot noise in pixels where nothing else happens in the interval: a batch of resets instead of a walk for each.
 
 Almost all shots are of this kind.  The memory goes to the signal at the shot's instant; as the signal hardly moves from
-there to the end of the interval, no level is reached again, whatever thresholds are drawn.
+there to the end of the interval, no level is reached again, whatever thresholds are drawn.  Shots of one pixel are sent
+in the order of their time.
 """
 
 from __future__ import annotations
@@ -18,14 +19,28 @@ from vid2ev.physics.mismatch import FLOOR
 
 
 @inner
-def is_single(block, flagged, keys, chance, forced, j, iv):
-    """Whether candidate j is a shot, the only one of a good pixel that reaches no level."""
+def end_of_pixel(keys, forced, j, iv):
+    """The candidate after those of candidate j's pixel."""
     i = place_of_candidate(keys[j], iv)[0]
-    if chance[j] == 0.0 or flagged[i] != 0 or not block[HIGH * PITCH + i] < np.inf:
+    j += 1
+    while j < forced and place_of_candidate(keys[j], iv)[0] == i:
+        j += 1
+    return j
+
+
+@inner
+def is_quiet(block, scratch, flagged, keys, chance, first, last, p0, planes, flags, num, iv):
+    """Whether candidates first ... last - 1, those of a pixel, are shots of a good one that reaches no level."""
+    i = place_of_candidate(keys[first], iv)[0]
+    if flagged[i] != 0 or not block[HIGH * PITCH + i] < np.inf:
         return False
-    if j > 0 and place_of_candidate(keys[j - 1], iv)[0] == i:
-        return False
-    return j + 1 == forced or place_of_candidate(keys[j + 1], iv)[0] != i
+    path = path_of(block, scratch, i, flags, num, iv)
+    for j in range(first, last):
+        change = value(path, 1.0) - value(path, place_of_candidate(keys[j], iv)[1])
+        far = farthest(block, scratch, i, change, flags, iv)
+        if chance[j] == 0.0 or not is_below_thresholds(far, p0 + i, planes.theta, flags, num):
+            return False
+    return True
 
 
 @inner
@@ -53,23 +68,24 @@ def is_below_thresholds(far, pixel, theta, flags, num):
 
 @inner
 def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv):
-    """Load the lonely shots of a block and flag the pixels of the other candidates: (candidates left, shots loaded)."""
-    left = 0
-    for j in range(forced):
-        i, s = place_of_candidate(keys[j], iv)
-        lonely = shots < LANE_COUNT and is_single(block, flagged, keys, chance, forced, j, iv)
-        if lonely:
+    """Load the shots of a block's quiet pixels and flag the pixels of the other candidates: (candidates left, shots
+    loaded)."""
+    left, first = 0, 0
+    while first < forced:
+        last, i = end_of_pixel(keys, forced, first, iv), place_of_candidate(keys[first], iv)[0]
+        if shots + (last - first) <= LANE_COUNT and is_quiet(
+            block, scratch, flagged, keys, chance, first, last, p0, planes, flags, num, iv
+        ):
             path = path_of(block, scratch, i, flags, num, iv)
-            here = value(path, s)
-            far = farthest(block, scratch, i, value(path, 1.0) - here, flags, iv)
-            lonely = is_below_thresholds(far, p0 + i, planes.theta, flags, num)
-            lanes[AT + shots], lanes[WHEN + shots], pixels[shots] = here, s, p0 + i
-            lanes[UP + shots], lanes[LABEL + shots] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
-        chance[j] = 2.0 if lonely else chance[j]
-        shots += np.int64(lonely)
-    for j in range(forced):
-        if chance[j] < 1.5:  # (what is loaded is marked by a chance that no candidate has)
-            keys[left], chance[left] = keys[j], chance[j]
-            flagged[place_of_candidate(keys[left], iv)[0]] = 1
-            left += 1
+            for j in range(first, last):
+                s = place_of_candidate(keys[j], iv)[1]
+                lanes[AT + shots], lanes[WHEN + shots], pixels[shots] = value(path, s), s, p0 + i
+                lanes[UP + shots], lanes[LABEL + shots] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
+                shots += 1
+        else:
+            flagged[i] = 1
+            for j in range(first, last):
+                keys[left], chance[left] = keys[j], chance[j]
+                left += 1
+        first = last
     return left, shots
