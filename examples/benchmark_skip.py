@@ -8,9 +8,13 @@
 A strip is 256 pixels of a row: at 1280x720 a fifth of it.  The band is as high as makes the share `--moving` of them
 change in every frame; in `--width` of it photographs move by half a pixel a frame, 1 ms apart.
 
-Timed is `Dvs.step`, in CPU time of one thread, float32 frames in, arrays of events out.  Both ways see ten
-frames in turn, so that a slow minute of the machine hits both alike and neither empties the caches of the other; the
-table has medians over the frames but the first of ten, and the events of both are compared.
+    told    the frames say which strips have not changed (`vid2ev.stream.still`), as those of scenes and upsamplers do
+    looks   the sensor looks, as it does for arrays and plain videos
+    walks   skip=False
+
+Timed is `Dvs.step`, in CPU time of one thread, float32 frames in, arrays of events out.  All ways see ten
+frames in turn, so that a slow minute of the machine hits all alike and none empties the caches of another; the
+table has medians over the frames but the first of ten, and the events of all are compared.
 """
 
 from __future__ import annotations
@@ -29,9 +33,11 @@ from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
 from vid2ev.stream import Events
+from vid2ev.stream.still import Still, still_strips
 
 PRESETS = ("ideal", "v2e-clean", "paper", "v2e-noisy")
 FRAME_NS = 1_000_000
+WAYS = ("told", "looks", "walks")
 TURN = 10  # frames; the first ones warm up
 
 
@@ -65,27 +71,28 @@ def share_changed(frames: np.ndarray) -> float:
 
 
 def measure(preset: str, frames: np.ndarray, t_ns: np.ndarray, settings: tuple[str, ...]) -> dict[str, float]:
-    """Medians of both ways [ns per pixel], what has slept, and how many events there are."""
-    size = (frames.shape[2], frames.shape[1])
-    spec = load_sensor(preset, settings)
-    sensors = {skip: Dvs(spec, size, skip=skip) for skip in (True, False)}
-    spent: dict[bool, list[float]] = {True: [], False: []}
+    """Medians of all ways [ns per pixel], what has slept, and how many events there are."""
+    size, pictures = (frames.shape[2], frames.shape[1]), list(frames)
+    stills = [None, *(Still(before, still_strips(before, after)) for before, after in itertools.pairwise(pictures))]
+    sensors = {way: Dvs(load_sensor(preset, settings), size, skip=way != "walks") for way in WAYS}
+    spent: dict[str, list[float]] = {way: [] for way in WAYS}
     events = 0
-    for first in range(0, len(frames), TURN):
-        sent: dict[bool, list[Events]] = {True: [], False: []}
-        for skip in (True, False) if first % (2 * TURN) else (False, True):
-            for k in range(first, min(first + TURN, len(frames))):
+    for first in range(0, len(pictures), TURN):
+        sent: dict[str, list[Events]] = {way: [] for way in WAYS}
+        for way in WAYS if first % (2 * TURN) else reversed(WAYS):
+            for k in range(first, min(first + TURN, len(pictures))):
                 began = time.thread_time_ns()
-                sent[skip].append(sensors[skip].step(frames[k], int(t_ns[k])))
+                sent[way].append(sensors[way].step(pictures[k], int(t_ns[k]), stills[k] if way == "told" else None))
                 if first > 0 and k > first:
-                    spent[skip].append((time.thread_time_ns() - began) / frames[k].size)
-        ours, theirs = Events.concatenate(sent[True]), Events.concatenate(sent[False])
-        if not all(np.array_equal(getattr(ours, name), getattr(theirs, name)) for name in "txyp"):
-            raise click.ClickException(f"{preset}: other events with skip than without from frame {first} on")
-        events += len(ours)
-    slept, of = sensors[True].slept
-    skip_ns, walk_ns = statistics.median(spent[True]), statistics.median(spent[False])
-    return {"skip": skip_ns, "walk": walk_ns, "slept": slept / of, "events": events / frames.size}
+                    spent[way].append((time.thread_time_ns() - began) / frames[k].size)
+        ours = {way: Events.concatenate(sent[way]) for way in WAYS}
+        for way, name in itertools.product(("told", "looks"), "txyp"):
+            if not np.array_equal(getattr(ours[way], name), getattr(ours["walks"], name)):
+                raise click.ClickException(f"{preset}: other events with skip than without from frame {first} on")
+        events += len(ours["walks"])
+    slept, of = sensors["told"].slept
+    medians = {way: statistics.median(spent[way]) for way in WAYS}
+    return medians | {"slept": slept / of, "events": events / frames.size}
 
 
 @click.command(help=__doc__.split("\n\n")[0] if __doc__ else None)
@@ -103,13 +110,14 @@ def main(presets, size, moving, part, count, clip, settings) -> None:
     click.echo(
         f"{frames.shape[2]}x{frames.shape[1]}, {len(frames)} frames, {100 * changed:.1f} % of the strips change\n"
     )
-    click.echo("| sensor | skip, ns / pixel | --no-skip, ns / pixel | ratio | slept | events / pixel / frame |")
-    click.echo("| --- | --: | --: | --: | --: | --: |")
+    click.echo("ns per pixel and frame\n")
+    click.echo("| sensor | told | looks | walks | walks / told | walks / looks | slept | events / pixel / frame |")
+    click.echo("| --- | --: | --: | --: | --: | --: | --: | --: |")
     for preset in presets:
         row = measure(preset, frames, t_ns, settings)
-        ratio = row["walk"] / row["skip"]
-        numbers = f"{row['skip']:.2f} | {row['walk']:.2f} | {ratio:.2f} | {100 * row['slept']:.0f} %"
-        click.echo(f"| {preset} | {numbers} | {row['events']:.4f} |")
+        times = " | ".join(f"{row[way]:.2f}" for way in WAYS)
+        ratios = " | ".join(f"{row['walks'] / row[way]:.2f}" for way in WAYS[:2])
+        click.echo(f"| {preset} | {times} | {ratios} | {100 * row['slept']:.0f} % | {row['events']:.4f} |")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sight import scene_of
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
@@ -51,7 +52,8 @@ def convert(
 
     seed       of the sensor; None draws one
     threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
-    skip       let strips of pixels sleep in which nothing can happen; changes nothing but the time it takes
+    skip       let strips of pixels sleep in which nothing can happen, and keep what cannot have changed of a scene's
+               picture; changes nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
@@ -81,6 +83,8 @@ def convert(
         if folder.finished:
             return folder.finished
         threads = threads or usable_cores()
+        if scene := scene_of(recipe.source):
+            scene.world.afresh = not skip
         recorder = Recorder(recipe, outputs, folder, threads, skip)
         recorder.take_up()
         if not recorder.done.finished:

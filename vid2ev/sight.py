@@ -12,6 +12,7 @@ from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.views import View, Views, is_same
+from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import Source
@@ -74,6 +75,7 @@ class Stage:
                 "a rig sees all of a scene: leave --crop, --size and --slowdown out; set its camera's size"
             )
         self.world, self._mounts = scene.world, mounts
+        self._reels: dict[tuple[object, ...], Reel] = {}
         self.instants_ns = scene.instants_between(*(source.ends_ns() if isinstance(source, Cut) else (None, None)))
 
     def pictures(self, t_ns: int) -> list[Picture]:
@@ -82,7 +84,8 @@ class Stage:
         keys = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in self._mounts]
         for key, mount in zip(keys, self._mounts, strict=True):
             if key not in seen:
-                seen[key] = self.world.render(t_ns, mount.intrinsics, mount.pose)
+                reel = self._reels.setdefault(key, Reel(self.world, mount.intrinsics, mount.pose))
+                seen[key], _ = reel.picture(t_ns)
         return [seen[key] for key in keys]
 
 

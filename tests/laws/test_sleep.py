@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from vid2ev import load_sensor
 from vid2ev.sensors.dvs import Dvs, DvsSpec
+from vid2ev.stream.still import Still, still_strips
 
 SIZE = (96, 70)  # three blocks of eight strips, two strips and a part of one
 VIDEOS = Path(__file__).parents[2] / ".." / "shared" / "data" / "videos"
@@ -92,20 +93,32 @@ def assert_same_state(one: Dvs, other: Dvs) -> None:
         assert array.tobytes() == theirs[name].tobytes(), name
 
 
-def play_both(spec: DvsSpec, scene: Scene, dtype: type, seed: int, threads=1, labels=False) -> tuple[int, int]:
+def told_of(before: np.ndarray, light: np.ndarray, seed: int) -> Still | None:
+    """Now and then what is the same in two frames, or some of it."""
+    rng = np.random.default_rng(seed)
+    still = still_strips(before, light)
+    return Still(before, still & (rng.random(still.size) < rng.choice([0.5, 1.0]))) if rng.random() < 0.7 else None
+
+
+def play_both(
+    spec: DvsSpec, scene: Scene, dtype: type, seed: int, threads=1, labels=False, told=False
+) -> tuple[int, int]:
     """Both ways through a scene, compared at every frame; returns what has slept, of how much."""
     options = {"seed": seed, "transfer": "srgb", "labels": labels}
     skips = Dvs(spec, SIZE, threads=threads, **options)
     walks = Dvs(spec, SIZE, skip=False, **options)
     frames = list(frames_of(scene, dtype, seed))
     slept = total = 0
+    before = frames[0][0]
     for (light, what), t_ns in zip(frames, times_ns(len(frames), seed), strict=True):
         if what == "resume":
             saved, slept, total = skips.state(), slept + skips.slept[0], total + skips.slept[1]
             skips = Dvs(spec, SIZE, threads=3 - threads, **options)
             skips.restore(saved)
         see = "restart" if what == "restart" else "step"
-        ours, theirs = getattr(skips, see)(light, int(t_ns)), getattr(walks, see)(light, int(t_ns))
+        still = (told_of(before, light, seed + t_ns),) if told and see == "step" else ()
+        ours, theirs = getattr(skips, see)(light, int(t_ns), *still), getattr(walks, see)(light, int(t_ns))
+        before = light
         for name in ("t", "x", "y", "p", "label"):
             assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
         if what == "look":
@@ -120,9 +133,9 @@ def play_both(spec: DvsSpec, scene: Scene, dtype: type, seed: int, threads=1, la
 
 @sensors
 @settings(max_examples=20, deadline=None)
-@given(happenings, st.integers(0, 1000), st.sampled_from([1, 2]))
-def test_sleep_changes_no_bit(spec, scene, seed, threads):
-    play_both(spec, scene, np.float32, seed, threads)
+@given(happenings, st.integers(0, 1000), st.sampled_from([1, 2]), st.booleans())
+def test_sleep_changes_no_bit(spec, scene, seed, threads, told):
+    play_both(spec, scene, np.float32, seed, threads, told=told)
 
 
 @pytest.mark.parametrize(
@@ -180,3 +193,13 @@ def test_real_clips(name, sensor):
         for column in ("t", "x", "y", "p"):
             assert np.array_equal(getattr(ours, column), getattr(theirs, column))
     assert_same_state(skips, walks)
+
+
+def test_what_is_said_of_another_array_is_not_believed():
+    light = np.full(SIZE[::-1], 0.5, np.float32)
+    dvs = Dvs(load_sensor("ideal"), SIZE)
+    dvs.step(light, 1_000_000)
+    brighter = light * 2
+    all_still = np.ones(27, np.bool_)
+    assert len(dvs.step(brighter, 2_000_000, Still(light.copy(), all_still))) == 4 * light.size
+    assert len(dvs.step(light, 3_000_000, Still(brighter, all_still))) == 0  # of this one it is, wrong as it is here

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from skimage import data
 
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.still import strip_count
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.flow import FlowUpsampling
 from vid2ev.upsample.proxies import agreement
@@ -187,7 +188,7 @@ def carried(
     motion[0], motion[1], motion[2] = velocity[0], velocity[1], weight
     out = np.empty(before.shape, F)
     before, after = (cv2.copyMakeBorder(x, BEFORE, AFTER, BEFORE, AFTER, cv2.BORDER_REPLICATE) for x in (before, after))
-    carry(before, after, motion, F(time), out)
+    carry(before, after, motion, F(time), out, np.empty(strip_count(*out.shape[::-1]), np.bool_))
     return out
 
 

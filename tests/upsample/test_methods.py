@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ def test_frames_of_the_source_pass_untouched(method: str, subframes) -> None:
     a, b = two_frames()
     kept = a.light.copy(), b.light.copy()
     made = list(make_upsampler(method, subframes).between(a, b))
-    assert made[-1] is b
+    assert made[-1].light is b.light and made[-1].original
     assert not any(frame.original for frame in made[:-1])
     assert np.array_equal(a.light, kept[0]) and np.array_equal(b.light, kept[1])
     times = [a.t_ns, *(frame.t_ns for frame in made)]
@@ -71,7 +73,7 @@ def test_nothing_is_remembered_from_pair_to_pair(method: str) -> None:
 def test_frames_that_are_not_finite_do_not_stop_it(method: str) -> None:
     a, b = two_frames()
     a.light[5, 5], b.light[5, 5], b.light[40, 3] = np.inf, np.inf, np.nan
-    assert list(make_upsampler(method, 3).between(a, b))[-1] is b
+    assert list(make_upsampler(method, 3).between(a, b))[-1].light is b.light
 
 
 @pytest.mark.parametrize("arguments", [
@@ -80,3 +82,26 @@ def test_frames_that_are_not_finite_do_not_stop_it(method: str) -> None:
 def test_refusals(arguments: tuple) -> None:
     with pytest.raises(UsageError, match="expected"):
         make_upsampler(*arguments)
+
+
+@pytest.mark.parametrize("colours", [False, True])
+@pytest.mark.parametrize("method", ["linear", "flow"])
+def test_what_is_said_to_be_still_is(method: str, colours: bool) -> None:
+    a, b = two_frames((70, 333))
+    b.light[20:] = a.light[20:]
+    b.light[66, 60], a.light[60, 0], b.light[60, 0] = np.nan, -1.0, -1.0
+    if colours:
+        a, b = (replace(frame, light=np.stack([frame.light] * 3, axis=-1)) for frame in (a, b))
+        b.light[50, 300, 1] += 0.1
+    before = a
+    for frame in make_upsampler(method, 4).between(a, b):
+        assert frame.still is not None and frame.still.before is before.light
+        now, then = (light.reshape(70 * 333, -1) for light in (frame.light, before.light))
+        same = (now == then).all(axis=1)
+        assert all(same[256 * k : 256 * (k + 1)].all() for k in np.flatnonzero(frame.still.strips))
+        assert len(frame.still.strips) == 92
+        # Of the lower rows all is known but where something is odd, and where motion may reach down from above.
+        odd = {(60 * 333) // 256, (66 * 333 + 60) // 256, *([(50 * 333 + 300) // 256] if colours else [])}
+        known = np.array([k not in odd for k in range(55, 92)])
+        assert np.array_equal(frame.still.strips[55:], known)
+        before = frame

@@ -31,6 +31,7 @@ class Naps(NamedTuple):
     """What is known of the sleep of the strips; arrays of strips, but for the history."""
 
     wanted: bool
+    told: np.ndarray  # uint8: whether the light is that of the frame before; empty: nobody knows, and the light tells
     state: np.ndarray  # uint8: AWAKE, NAPS or SLEEPS
     since: np.ndarray  # int64: the first interval that the lags have still to be stepped through; -1: none
     until: np.ndarray  # float64: leak since its reference [nat] up to which the strip may sleep

@@ -97,7 +97,7 @@ def prepare_responses(lanes, turns, guesses, live, count, b, flags, num, iv):
 
 @inner
 def above_rounding(total, size, later):
-    """A sum of terms of this size; where nothing but rounding is left of it, as from rest, a trace of what comes later."""
+    """A sum of terms of this size; where only rounding is left of it, as from rest, a trace of what comes later."""
     return total if abs(total) > ROUNDED * size else TRACE * later
 
 

@@ -16,10 +16,11 @@ from vid2ev.physics.elementary import expm1_32
 from vid2ev.physics.log_curve import light_at, log_level_32
 from vid2ev.physics.photoreceptor import light_weights_32
 from vid2ev.physics.photoreceptor_noise import noise_draw, rice_expected, rice_gap
+from vid2ev.stream.still import BRIGHTEST as MOST
 
 F = np.float32
+BRIGHTEST = F(MOST)
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
-BRIGHTEST = F(1e30)
 STEEP = 2.0
 
 # Planes of the scratch of one block: the new light, input of the filter and lags; the clock of the first pole

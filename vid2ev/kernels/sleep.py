@@ -1,7 +1,7 @@
 """Sleep: strips of pixels in which nothing can happen are not walked, and nothing shows it.
 
 A strip is 256 pixels of a row, or what follows them in the next.  If it sees light of the same bits as in the frame
-before, it
+before, by what its frame says or by looking, it
 
     sleeps   if its lags are 0: then an interval changes nothing in it, whatever its length;
     naps     if the hull of its inputs and lags lies between the levels of every pixel: then an interval does no more
@@ -48,12 +48,16 @@ TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does no
 @inner
 def doze(block, scratch, p0, size, naps, flags, num, iv):
     """Let those strips of a block sleep in which nothing but what is forced happens in this interval; returns how many
-    of them do.  The lags of the others are made up for.  The light is in the scratch, mended, and stays there.
+    of them do.  The lags of the others are made up for.  Unless they are told which strips keep their light, it is in
+    the scratch, mended, and stays there.
     """
     asleep, at = 0, last_light(flags) if len(flags.light_bandwidth) else np.int64(INPUT * PITCH)
     for first in range(0, size, STRIP):
         strip, n = (p0 + first) // STRIP, min(STRIP, size - first)
-        same = is_seen(block, at + first, scratch, NEW + first, n, flags, num)
+        if naps.told.size > 0:
+            same = naps.told[strip] > 0
+        else:
+            same = is_seen(block, at + first, scratch, NEW + first, n, flags, num)
         if same:
             if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
                 settle_down(block[first:], scratch[first:], strip, n, naps, flags, num, iv)

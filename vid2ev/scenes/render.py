@@ -22,6 +22,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.details import details_of
 from vid2ev.scenes.lens import rays_of_pixels
+from vid2ev.scenes.rays.layout import World
 from vid2ev.scenes.rays.scratch import Scratch, scratch_for
 from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
 from vid2ev.scenes.snapshot import Snapshot
@@ -45,6 +46,32 @@ class Picture(NamedTuple):
     thing: np.ndarray
 
 
+class Canvas(NamedTuple):
+    """What a picture is painted on: light and thing of `Picture`, depth and keys with a margin of a pixel."""
+
+    light: np.ndarray
+    thing: np.ndarray
+    depth: np.ndarray
+    keys: np.ndarray  # int64
+
+    def picture(self) -> Picture:
+        """The picture on it, which stays as it is when the canvas is painted on."""
+        return Picture(self.light, self.depth[1:-1, 1:-1].copy(), self.thing)
+
+
+def canvas_of(size: tuple[int, int]) -> Canvas:
+    """An empty canvas for a picture of this size (width, height)."""
+    width, height = size
+    light, thing = np.empty((height, width, 3), np.float32), np.empty((height, width), np.int32)
+    return Canvas(light, thing, *(np.empty((height + 2, width + 2), dtype) for dtype in (np.float32, np.int64)))
+
+
+def tiles_of(size: tuple[int, int]) -> tuple[int, int]:
+    """How many tiles a canvas of this size (width, height) has down and across."""
+    width, height = size
+    return -(-(height + 2) // TILE), -(-(width + 2) // TILE)
+
+
 def render(
     snapshot: Snapshot, intrinsics: Intrinsics, pose: Pose, *, samples: int = SAMPLES, threads: int | None = None
 ) -> Picture:
@@ -53,24 +80,36 @@ def render(
     samples  1: one ray for each pixel, jagged edges; n >= 2: pixels at edges are measured in n x n cells
     threads  all cores if not given; the picture is the same
     """
+    world = numbers_of(snapshot, pose)
+    canvas, details = canvas_of(intrinsics.size), details_of(snapshot, world, intrinsics, pose)
+    paint(canvas, world, details, intrinsics, np.ones(tiles_of(intrinsics.size), np.uint8), samples, threads)
+    return canvas.picture()
+
+
+def paint(
+    canvas: Canvas,
+    world: World,
+    details: np.ndarray,
+    intrinsics: Intrinsics,
+    wanted: np.ndarray,
+    samples: int = SAMPLES,
+    threads: int | None = None,
+) -> None:
+    """Paint the tiles that are `wanted`, uint8 of `tiles_of`; all others stay as they are."""
     if not 1 <= samples <= 16:
         raise UsageError(f"{samples} samples must be 1 (jagged edges) to 16; 2 is usual")
-    width, height = intrinsics.size
-    rays, world = rays_of_pixels(intrinsics), numbers_of(snapshot, pose)
-    light, thing = np.empty((height, width, 3), np.float32), np.empty((height, width), np.int32)
-    depths, keys = (np.empty((height + 2, width + 2), dtype) for dtype in (np.float32, np.int64))
+    rays, cells = rays_of_pixels(intrinsics), (samples, max(samples, FINE))
+    light, thing, depth, keys = canvas
 
     def trace(first: int, last: int, scratch: Scratch) -> Any:
-        trace_band(world, rays, first, last, light, depths, thing, keys, scratch)
+        trace_band(world, rays, first, last, wanted, light, depth, thing, keys, scratch)
 
     def smooth(first: int, last: int, scratch: Scratch) -> Any:
-        smooth_band(world, rays, first, last, cells, details, light, depths, keys, scratch)
+        smooth_band(world, rays, first, last, wanted, cells, details, light, depth, keys, scratch)
 
     works: list[Work] = [trace, smooth] if samples > 1 else [trace]
-    cells, details = (samples, max(samples, FINE)), details_of(snapshot, world, intrinsics, pose)
     for work in works:
-        _in_bands(work, height + 2, lambda: scratch_for(len(world.kind), cells[1]), threads)
-    return Picture(light, depths[1:-1, 1:-1].copy(), thing)
+        _in_bands(work, len(rays), lambda: scratch_for(len(world.kind), cells[1]), threads)
 
 
 def _in_bands(work: Work, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:

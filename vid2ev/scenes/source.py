@@ -13,11 +13,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from vid2ev.errors import UsageError
 from vid2ev.scenes.instants import Instants, rate_of
+from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.scene_file import plain_size, read_scene
 from vid2ev.scenes.world import World
 from vid2ev.stream.frames import LUMINANCE, Colour, Frame
+from vid2ev.stream.still import Still
 
 
 class Request(NamedTuple):
@@ -104,10 +108,14 @@ class SceneSource:
 
     def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
         """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
+        reel = Reel(self.world)
+        before: np.ndarray = np.empty(0)
         for k in self._indices(since_ns, until_ns, start):
             t_ns = self.instants[k]
-            light = self.world.render(t_ns).light
-            yield Frame(light if self.colour == "rgb" else light @ LUMINANCE, t_ns)
+            picture, still = reel.picture(t_ns)
+            light = picture.light if self.colour == "rgb" else picture.light @ LUMINANCE
+            yield Frame(light, t_ns, still=None if still is None else Still(before, still))
+            before = light
 
     def instants_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> list[int]:
         """The instants [ns] from `since_ns` to `until_ns`, both included, None without end; from index `start` on."""

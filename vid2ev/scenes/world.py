@@ -34,6 +34,7 @@ class World:
 
     threads     that render; None for all cores.  They change nothing but the time it takes
     renderer    what makes pictures, such as `blender.renderer.Cycles`; the embedded renderer if there is none
+    afresh      whether all of each picture is rendered, also what cannot have changed since the last one (`reel`)
     viewpoints  the cameras of the scene's rig, in the coordinates of the reference camera; none without a rig
 
     Raises UsageError for a scene that cannot be, DataError for a texture, a mesh or a rig that cannot be read.
@@ -43,7 +44,7 @@ class World:
         self, scene: Scene | SceneFile, seed: int = 0, *, threads: int | None = None, renderer: Renderer | None = None
     ):
         self.scene = scene if isinstance(scene, Scene) else scene.resolved(seed)
-        self.threads, self.renderer = threads, renderer
+        self.threads, self.renderer, self.afresh = threads, renderer, False
         self._textures: dict[Look, Texture] = {}
         self._looks = [(thing, self._shape(thing), self._surface(thing)) for thing in self.scene.objects]
         self._still = {id(thing): pose_of(thing.trajectory, 0.0) for thing in self.scene.objects if is_still(thing)}

@@ -24,6 +24,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.still import Still, strip_count
 
 __all__ = ["Dvs", "DvsSpec"]
 
@@ -80,6 +81,7 @@ class Dvs:
         self._tallies = np.zeros((threads, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
+        self._seen: np.ndarray | None = None  # the light of the last frame, as it was given
         self._leak_since_ns = 0
         self._step = 0
         self._fresh_noise = True
@@ -91,12 +93,13 @@ class Dvs:
 
     # ------------------------------------------------------------------------------------------------- light in
 
-    def step(self, light: np.ndarray, t_ns: int) -> Events:
+    def step(self, light: np.ndarray, t_ns: int, still: Still | None = None) -> Events:
         """Advance to a frame of light at t_ns [int, ns]; returns the events in (previous frame, this frame].
 
         `light` is [height, width]: floating point is linear light (1.0 diffuse white; NaN and negative count as 0,
         what is above 1e30 as 1e30), uint8 or uint16 are codes of `transfer`.  The first frame settles the sensor and
-        has no events. Raises UsageError for another shape or type, or a time that is not after the last one.
+        has no events. `still`, where it is about the array of the last step, saves looking for what has not changed.
+        Raises UsageError for another shape or type, or a time that is not after the last one.
         """
         if self._t_ns is None:
             return self.restart(light, t_ns)
@@ -106,10 +109,10 @@ class Dvs:
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
         )
-        self._sleep.begin(interval)
+        self._sleep.begin(interval, still.strips if still is not None and still.before is self._seen else None)
         events = self._events(self._walk(flat, table, interval), interval)
         self._sleep.end()
-        self._t_ns = t_ns
+        self._t_ns, self._seen = t_ns, light
         self._step += 1
         self._fresh_noise = not interval.noise_resolved
         if self._delayed is not None:
@@ -125,6 +128,7 @@ class Dvs:
         before.  Noise goes on: what is drawn by count or by time is drawn on.  Raises UsageError as `step` does.
         """
         flat, table = self._light(light)
+        self._seen = light
         if self._t_ns is None and self._frames is not None:
             self._frames.origin_us = int(t_ns) // 1000
         t_ns = self._later(t_ns)
@@ -138,7 +142,9 @@ class Dvs:
 
     def see(self, frame: Frame) -> Events:
         """`step` to a frame, or `restart` where it begins a new shot."""
-        return (self.restart if frame.cut else self.step)(frame.light, frame.t_ns)
+        if frame.cut:
+            return self.restart(frame.light, frame.t_ns)
+        return self.step(frame.light, frame.t_ns, frame.still)
 
     def run(self, frames: Iterable[Frame]) -> Iterator[Events]:
         """`see` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""
@@ -156,7 +162,7 @@ class Dvs:
         """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
         if self._t_ns is None:
             return {}
-        self._rouse(np.arange(-(-self._bad.size // STRIP)))
+        self._rouse(np.arange(strip_count(*self.size)))
         state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise)]
         state["clock"] = np.array(numbers, np.int64)
@@ -169,6 +175,7 @@ class Dvs:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
         self._sleep.forget()
+        self._seen = None
         if not state:
             self._t_ns = None
             return

@@ -7,6 +7,8 @@ import numpy as np
 from vid2ev.kernels.layout import BLOCK, STRIP, Interval
 from vid2ev.kernels.naps import AGAIN, AWAKE, COLUMNS, HISTORY, Naps
 
+NOT_TOLD = np.empty(0, np.uint8)
+
 
 class Sleep:
     """The sleep of the strips of `pixels` pixels; where it is not `wanted`, nothing is kept."""
@@ -16,6 +18,7 @@ class Sleep:
         strips = self._strips if wanted else 0
         self.naps = Naps(
             wanted=wanted,
+            told=NOT_TOLD,
             state=np.full(strips, AWAKE, np.uint8),
             since=np.full(strips, -1, np.int64),
             until=np.zeros(strips, np.float64),
@@ -25,8 +28,9 @@ class Sleep:
             tick=0,
         )
 
-    def begin(self, interval: Interval) -> None:
-        """An interval."""
+    def begin(self, interval: Interval, still: np.ndarray | None) -> None:
+        """An interval, and which strips keep their light in it, if that is known."""
+        self.naps = self.naps._replace(told=NOT_TOLD if still is None or not self.naps.wanted else still.view(np.uint8))
         tick, history = self.naps.tick, self.naps.history
         weights = (interval.x1, interval.x2, interval.g, interval.a, interval.b)
         again = weights == tuple(history[(tick - 1) % HISTORY, :AGAIN].tolist())

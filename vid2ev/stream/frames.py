@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from vid2ev.stream.still import Still
+
 Colour = Literal["luminance", "rgb"]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of red, green, blue: Rec. ITU-R BT.709-6 item 3.2
 
@@ -21,7 +23,8 @@ class Frame:
     `t_ns` is the instant in nanoseconds on the clock of the source.  `original` is True for a frame of the source,
     False for one made between two of them.  `cut` is True where a new shot begins: what was seen before has nothing to
     do with it.  `depth`, where it is known, is float32 [H, W]: how far the scene is along the axis of the camera that
-    sees it [m]; what is not finite and positive is unknown.
+    sees it [m]; what is not finite and positive is unknown.  `still` says what has not changed since the frame before,
+    where whoever made both knows.
     """
 
     light: np.ndarray
@@ -29,6 +32,7 @@ class Frame:
     original: bool = True
     cut: bool = False
     depth: np.ndarray | None = None
+    still: Still | None = None
 
     @property
     def luminance(self) -> np.ndarray:

@@ -36,7 +36,7 @@ class Upsampler(Protocol):
     def between(self, a: Frame, b: Frame) -> Interval:
         """The frames after a up to and including b.
 
-        The last one is b, the very same object; it is the only one with `original`.  What comes out depends
+        The last one is b, its very light; it is the only one with `original`.  What comes out depends
         on a and b alone, so that a recording can be taken up in the middle.  a and b have one shape, and a
         comes before b.  Motion is estimated at once, frames are made when they are asked for: two threads can share
         the work.

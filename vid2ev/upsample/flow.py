@@ -16,12 +16,14 @@ N. Sundaram et al., "Dense point trajectories by GPU-accelerated large displacem
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
 
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.still import Still, strip_count
 from vid2ev.upsample import Interval
 from vid2ev.upsample.proxies import agreement, finite, proxies
 from vid2ev.upsample.subframes import instants, steps_for
@@ -98,15 +100,21 @@ class FlowUpsampling:
 def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
     """The frames after a up to and including b, in even steps of time."""
     before, after = (list(map(with_margin, channels_of(frame.light))) for frame in (a, b))
-    moving = np.empty((3, *a.light.shape[:2]), np.float32)
+    height, width = a.light.shape[:2]
+    moving, last = np.empty((3, height, width), np.float32), a.light
+    was_still = np.ones(strip_count(width, height), np.bool_)
     for t_ns in instants(a.t_ns, b.t_ns, steps):
         time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
         motion_at(motion, time, moving)
-        channels = [np.empty(a.light.shape[:2], np.float32) for _ in before]
-        for pair in zip(before, after, channels, strict=True):
-            carry(*pair[:2], moving, time, pair[2])
-        yield Frame(channels[0] if a.light.ndim == 2 else np.stack(channels, axis=-1), t_ns, original=False)
-    yield b
+        channels = np.empty((len(before), height, width), np.float32)
+        still = np.empty((len(before), strip_count(width, height)), np.bool_)
+        for k, pair in enumerate(zip(before, after, strict=True)):
+            carry(*pair, moving, time, channels[k], still[k])
+        light = channels[0] if a.light.ndim == 2 else np.moveaxis(channels, 0, -1).copy()
+        is_still = np.logical_and.reduce(still)
+        yield Frame(light, t_ns, original=False, still=Still(last, is_still & was_still))
+        last, was_still = light, is_still
+    yield b if last is a.light else replace(b, still=Still(last, was_still))
 
 
 def channels_of(light: np.ndarray) -> list[np.ndarray]:

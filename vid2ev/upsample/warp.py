@@ -16,9 +16,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vid2ev.stream.still import BRIGHTEST, STRIP
+
 F = np.float32
 BEFORE, AFTER = 1, 2  # pixels of margin that `carry` needs around an image
 _HALF, _ONE, _TWO, _THREE, _FOUR = F(0.5), F(1), F(2), F(3), F(4)
+_BRIGHTEST = F(BRIGHTEST)
 _TINY = F(1e-20)  # in place of a sum of nothing
 
 
@@ -112,31 +115,59 @@ def settle(field, time, enough, motion):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carry(before, after, motion, time, out):
+def carry(before, after, motion, time, out, still):
     """Light at `time` (share of the interval gone by) into out [h, w].
 
     before, after   the frames [h + 3, w + 3], with margins of BEFORE and AFTER px that repeat the border
     motion          [3, h, w] of `settle`, for every pixel of the frames, in px of the frames
+    still           bool [strips of out, as of `stream.still`]: where nothing moves, and both frames are the same
     """
     height, width = out.shape
     pitch, x_last, y_last = before.shape[1], F(width - 1), F(height - 1)
     columns, entry = np.empty(width, np.int32), np.empty(width, np.int32)
     across, down, weights = np.empty(width, F), np.empty(width, F), np.empty((8, width), F)
     seen_before, seen_after = np.empty(width, F), np.empty(width, F)
+    flat_before, flat_after, flat_motion, flat_out = (
+        before.reshape(-1), after.reshape(-1), motion.reshape(-1), out.reshape(-1)
+    )  # fmt: skip
+    still[:] = True
     for y in range(height):
-        moving = 0
-        for x in range(width):  # (what stands still is cheap: most of most pictures)
-            p, q = before[y + BEFORE, x + BEFORE], after[y + BEFORE, x + BEFORE]
-            out[y, x] = q + motion[2, y, x] * (p - q)  # (in this form equal light stays the same to the bit)
-            if motion[0, y, x] != F(0) or motion[1, y, x] != F(0):
-                columns[moving], across[moving], down[moving] = x, motion[0, y, x], motion[1, y, x]
-                moving += 1
-        _places(columns[:moving], F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
-        _look_up(before.reshape(-1), pitch, entry, weights, seen_before[:moving])
-        _places(columns[:moving], F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
-        _look_up(after.reshape(-1), pitch, entry, weights, seen_after[:moving])
-        for i in range(moving):
-            out[y, columns[i]] = seen_after[i] + motion[2, y, columns[i]] * (seen_before[i] - seen_after[i])
+        moving, first = 0, 0
+        while first < width:
+            place = y * width + first
+            count = min(STRIP - place % STRIP, width - first)
+            margined = (y + BEFORE) * pitch + BEFORE + first
+            moves, differs = _fade(flat_before, flat_after, margined, flat_motion, flat_out, place, count)
+            still[place // STRIP] &= not (moves or differs)
+            if moves:
+                for x in range(first, first + count):
+                    if motion[0, y, x] != F(0) or motion[1, y, x] != F(0):
+                        columns[moving], across[moving], down[moving] = x, motion[0, y, x], motion[1, y, x]
+                        moving += 1
+            first += count
+        if moving > 0:
+            _places(columns[:moving], F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
+            _look_up(flat_before, pitch, entry, weights, seen_before[:moving])
+            _places(columns[:moving], F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
+            _look_up(flat_after, pitch, entry, weights, seen_after[:moving])
+            for i in range(moving):
+                out[y, columns[i]] = seen_after[i] + motion[2, y, columns[i]] * (seen_before[i] - seen_after[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fade(before, after, margined, motion, out, place, count):
+    """What stands still, of `count` pixels of a row, from `margined` on in the frames and from `place` on elsewhere;
+    returns whether any of them moves, and whether any is not the same in both frames, or not light."""
+    # (offsets that cannot be negative, and no branches: this runs in vectors)
+    k, j, size = np.uintp(margined), np.uintp(place), np.uintp(out.size)
+    moves, differs = np.uint32(0), np.uint32(0)
+    for i in range(np.uintp(count)):
+        p, q = before[k + i], after[k + i]
+        out[j + i] = q + motion[size + size + j + i] * (p - q)  # (in this form equal light stays the same to the bit)
+        moves = np.uint32(moves | np.uint32((motion[j + i] != F(0)) | (motion[size + j + i] != F(0))))
+        fine = (p == q) & (q >= F(0)) & (q <= _BRIGHTEST)
+        differs = np.uint32(differs | np.uint32(fine == False))  # noqa: E712 (vectorises, `not` does not)
+    return moves != 0, differs != 0
 
 
 # Places first and look-ups after: the first loop runs in vectors, which a loop with a look-up in it cannot.

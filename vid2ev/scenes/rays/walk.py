@@ -18,14 +18,17 @@ TILE = 16
 
 
 @walk
-def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
+def trace_band(world, rays, first, last, wanted, light, depth, thing, keys, scratch):
     """Light, depth, thing and key at the centres of the rows first ... last - 1 of `rays` (the margin is row 0).
 
     rays   float64 [H + 2, W + 2, 2]: (x, y) of the rays (x, y, 1) through the centres of the pixels and of a margin
+    wanted uint8 [bands, tiles]: 0 for tiles that stay as they are
     light  float32 [H, W, 3]; thing int32 [H, W]; with the margin: depth float32, keys int64 [H + 2, W + 2]
     """
     height, width = rays.shape[0], rays.shape[1]
     for left in range(0, width, TILE):
+        if not wanted[first // TILE, left // TILE]:
+            continue
         right = min(left + TILE, width)
         count = things_in_tile(world, rays, first, last, left, right, scratch.things)
         for line in range(first, last):
@@ -45,7 +48,7 @@ def trace_band(world, rays, first, last, light, depth, thing, keys, scratch):
 
 
 @walk
-def smooth_band(world, rays, first, last, cells, details, light, depth, keys, scratch):
+def smooth_band(world, rays, first, last, wanted, cells, details, light, depth, keys, scratch):
     """Light anew where the keys of rows first ... last - 1 differ from a neighbour's, and in finer cells at details.
 
     cells    into how many a pixel is cut each way: usually, and at details
@@ -53,6 +56,8 @@ def smooth_band(world, rays, first, last, cells, details, light, depth, keys, sc
     """
     height, width = rays.shape[0], rays.shape[1]
     for left in range(0, width, TILE):
+        if not wanted[first // TILE, left // TILE]:
+            continue
         right, count = min(left + TILE, width), -1
         for line in range(max(first, 1), min(last, height - 1)):
             for column in range(max(left, 1), min(right, width - 1)):

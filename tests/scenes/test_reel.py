@@ -1,0 +1,143 @@
+"""Pictures one after the other are those that are rendered by themselves, and what is said to have stayed has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_any_world import TEXTURES, point, surfaces, things, turn, worlds
+
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
+from vid2ev.scenes.reel import Reel
+from vid2ev.scenes.render import render
+from vid2ev.scenes.scene import Scene
+from vid2ev.scenes.snapshot import Lamp, Shape, Snapshot, Surface, Thing
+from vid2ev.scenes.world import World
+from vid2ev.stream.still import still_strips
+
+CAMERA = Intrinsics.of_field((150, 70), 80)
+HOME = Pose.of((0, 0, 0), (0, 0, 0))
+nudge = st.tuples(*[st.floats(-0.3, 0.3)] * 3)
+
+
+def assert_same_as_alone(snapshots: list[Snapshot], poses: list[Pose]) -> list[float]:
+    """Renders both ways; returns the share of strips that are said to be still, of each picture but the first."""
+    reel, before, shares = Reel(World(Scene()), CAMERA), None, []
+    for snapshot, pose in zip(snapshots, poses, strict=True):
+        picture, still = reel.render(snapshot, pose)
+        alone = render(snapshot, CAMERA, pose, threads=1)
+        for ours, theirs in zip(picture, alone, strict=True):
+            assert np.array_equal(ours, theirs)
+        assert (still is None) == (before is None)
+        if still is not None:
+            assert not (still & ~still_strips(before, alone.light)).any()
+            shares.append(float(still.mean()))
+        before = picture.light
+    return shares
+
+
+def moved(snapshot: Snapshot, number: int, way, turned) -> Snapshot:
+    """The same with one thing elsewhere."""
+    if not snapshot.things:
+        return snapshot
+    all_things = list(snapshot.things)
+    thing = all_things[number % len(all_things)]
+    all_things[number % len(all_things)] = replace(thing, pose=Pose.of(turned, way) @ thing.pose)
+    return replace(snapshot, things=all_things)
+
+
+changes = st.lists(
+    st.one_of(
+        st.tuples(st.just("move"), st.integers(0, 3), nudge, turn),
+        st.tuples(st.just("look"), st.integers(0, 3), surfaces),
+        st.tuples(st.just("another"), things),
+        st.tuples(st.just("camera"), nudge),
+        st.tuples(st.just("lamp"), point),
+        st.tuples(st.just("nothing")),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@settings(max_examples=120, deadline=None)
+@given(worlds, st.builds(Pose.of, turn, point), changes)
+def test_whatever_changes_the_picture_is_the_same(world, pose, happenings):
+    snapshots, poses = [world], [pose]
+    for what, *how in happenings:
+        last, here = snapshots[-1], poses[-1]
+        if what == "move":
+            last = moved(last, *how)
+        elif what == "look" and last.things:
+            changed = list(last.things)
+            changed[how[0] % len(changed)] = replace(changed[how[0] % len(changed)], surface=how[1])
+            last = replace(last, things=changed)
+        elif what == "another":
+            last = replace(last, things=[*last.things, how[0]])
+        elif what == "camera":
+            here = Pose.of((0, 0, 0), how[0]) @ here
+        elif what == "lamp" and last.lamps:
+            last = replace(last, lamps=[replace(last.lamps[0], position_m=how[0]), *last.lamps[1:]])
+        snapshots.append(last)
+        poses.append(here)
+    assert_same_as_alone(snapshots, poses)
+
+
+LAMPS = {
+    "none": [],
+    "sun": [Lamp("sun", direction=(0.4, 1.0, 0.7), shadows=True)],
+    "low sun": [Lamp("sun", direction=(1.0, 0.05, 0.02), shadows=True)],
+    "point": [Lamp("point", position_m=(0.5, -1.5, 1.0), reach_m=2.0, shadows=True)],
+    "point among things": [Lamp("point", position_m=(0.2, 0.2, 2.2), shadows=True)],
+    "two": [Lamp("sun", direction=(0, 0.3, 1.0), shadows=True), Lamp("point", position_m=(-1, 0, 1), shadows=True)],
+}
+
+
+def still_life(lamps: list[Lamp], seed: int) -> Snapshot:
+    """A room's corner with things of all kinds in it."""
+    rng = np.random.default_rng(seed)
+    walls = [
+        Thing("back", Shape("plane", (9, 7, 0)), Surface(TEXTURES[2]), Pose.of((0, 0, 0), (0, 0, 5))),
+        Thing("floor", Shape("plane", (9, 9, 0)), Surface(TEXTURES[1]), Pose.of((90, 0, 0), (0, 1.2, 3))),
+    ]
+    kinds = ("sphere", "box", "cylinder", "plane")
+    small = [
+        Thing(
+            kinds[k % 4],
+            Shape(kinds[k % 4], tuple(rng.uniform(0.05, 0.7, 3))),
+            Surface(TEXTURES[k % 3], specular=0.3),
+            Pose.of(rng.uniform(-90, 90, 3), rng.uniform((-1.5, -0.8, 1.8), (1.5, 0.9, 4))),
+        )
+        for k in range(7)
+    ]
+    return Snapshot([*walls, *small], [Lamp("ambient", (0.3, 0.3, 0.3)), *lamps])
+
+
+@pytest.mark.parametrize("lamps", list(LAMPS))
+@pytest.mark.parametrize("seed", range(4))
+def test_shadows_of_what_moves_fall_where_they_fell(lamps, seed):
+    rng = np.random.default_rng(seed + 100)
+    snapshots = [still_life(LAMPS[lamps], seed)]
+    for k in range(4):
+        snapshots.append(moved(snapshots[-1], 2 + (seed + k) % 7, rng.uniform(-0.2, 0.2, 3), rng.uniform(-20, 20, 3)))
+    assert_same_as_alone(snapshots, [HOME] * 5)
+
+
+def test_where_little_moves_most_is_kept():
+    first = still_life(LAMPS["sun"], 3)
+    pea = Thing("pea", Shape("sphere", (0.05,) * 3), Surface(), Pose.of((0, 0, 0), (0.5, 1.0, 2.0)))
+    first = replace(first, things=[*first.things, pea])
+    shares = assert_same_as_alone([first, moved(first, 9, (0.02, 0, 0), (0, 0, 0)), first, first], [HOME] * 4)
+    assert min(shares) > 0.5 and shares[-1] == 1.0
+
+
+def test_a_picture_stays_as_it_is_when_the_next_is_painted():
+    reel, first = Reel(World(Scene()), CAMERA), still_life(LAMPS["sun"], 3)
+    one, _ = reel.render(first, HOME)
+    kept = [plane.copy() for plane in one]
+    reel.render(moved(first, 3, (0.1, 0, 0), (0, 0, 0)), HOME)
+    assert all(np.array_equal(plane, copy) for plane, copy in zip(one, kept, strict=True))
