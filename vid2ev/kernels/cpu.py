@@ -75,7 +75,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         if len(flags.forced):
             keys, chance, forced = candidates(keys, chance, p0, size, planes.hot, num, iv)
-        asleep = open_eyes(block, scratch, light, lut, planes.shade, p0, size, naps, flags, num, iv, tally)
+        asleep = open_eyes(block, scratch, light, lut, planes, p0, size, naps, flags, num, iv, tally)
         if asleep * STRIP >= size and forced == 0:
             continue
         if asleep > 0 or size < BLOCK:
@@ -83,7 +83,7 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
         look(block, rest, work, p0, size, naps, flags, num, iv)
         borrowed = np.int64(0)
         if asleep > 0 and forced > 0:
-            borrowed = stir(block, scratch, work.lent, p0, keys, forced, naps, flags, num, iv)
+            borrowed = stir(block, scratch, work.lent, p0, keys, forced, planes.theta, naps, flags, num, iv)
         if len(flags.forced):
             if shots > LANE_COUNT // 2:
                 out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
@@ -111,17 +111,17 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
 
 
 @inner
-def open_eyes(block, scratch, light, lut, shade, p0, size, naps, flags, num, iv, tally):
+def open_eyes(block, scratch, light, lut, planes, p0, size, naps, flags, num, iv, tally):
     """Light of what is awake of a block into the scratch; returns how many of its strips sleep."""
     if not naps.wanted or naps.told.size == 0:
-        read_light(scratch, light, lut, shade, p0, size, flags, tally)
+        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
     asleep = 0
     if naps.wanted and len(flags.noise) == 0:
-        asleep = doze(block, scratch, p0, size, naps, flags, num, iv)
+        asleep = doze(block, scratch, p0, size, planes.theta, naps, flags, num, iv)
         first, last = 0, 0
         while naps.told.size > 0 and last < size:
             first, last = next_run(last, p0, size, naps.wanted, naps.state)
-            read_light(scratch[first:], light, lut, shade, p0 + first, last - first, flags, tally)
+            read_light(scratch[first:], light, lut, planes.shade, p0 + first, last - first, flags, tally)
     return asleep
 
 

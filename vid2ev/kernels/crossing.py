@@ -14,6 +14,7 @@ from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.physics.crossing_noise import noisy_thresholds
+from vid2ev.physics.mismatch import FLOOR
 
 SIGNAL, SHOT, LEAK, HOT = range(4)
 
@@ -38,6 +39,15 @@ def load_thresholds(lanes, pixels, count, planes, flags, num):
     else:
         for j in range(count):
             lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = num.threshold_on, num.threshold_off
+
+
+@inner
+def least_threshold(pixel, theta, flags, num):
+    """What no threshold of a pixel is below, whatever is drawn [nat]."""
+    least = min(num.threshold_on, num.threshold_off)
+    if len(flags.mismatch):
+        least = np.float64(min(theta[pixel, 0], theta[pixel, 1]))
+    return FLOOR * least if len(flags.crossing_noise) else least
 
 
 @inner

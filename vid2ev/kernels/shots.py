@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
-from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN
+from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN, least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
 from vid2ev.kernels.layout import HIGH, LAG1, LANE_COUNT, PITCH
@@ -58,12 +58,9 @@ def farthest(block, scratch, i, change, flags, iv):
 @inner
 def is_below_thresholds(far, pixel, theta, flags, num):
     """Whether a signal that goes no farther than `far` from its memory reaches no level, whatever is drawn."""
-    smallest = min(num.threshold_on, num.threshold_off)
-    if far < FLOOR * FLOOR * smallest:  # which every pixel has: its own need not be fetched
+    if far < FLOOR * FLOOR * min(num.threshold_on, num.threshold_off):  # below all: this pixel's need not be fetched
         return True
-    if len(flags.mismatch):
-        smallest = np.float64(min(theta[pixel, 0], theta[pixel, 1]))
-    return far < (FLOOR * smallest if len(flags.crossing_noise) else smallest)
+    return far < least_threshold(pixel, theta, flags, num)
 
 
 @inner

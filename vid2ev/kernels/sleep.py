@@ -30,13 +30,13 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
+from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
 from vid2ev.kernels.naps import AWAKE, HISTORY, NAPS, SLEEPS, borrow, catch_up
 from vid2ev.kernels.scan import NEW, NOISE0, STEEP
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.log_curve import log_level_32
-from vid2ev.physics.mismatch import FLOOR as MISMATCH_FLOOR
 
 F = np.float32
 SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
@@ -46,7 +46,7 @@ TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does no
 
 
 @inner
-def doze(block, scratch, p0, size, naps, flags, num, iv):
+def doze(block, scratch, p0, size, theta, naps, flags, num, iv):
     """Let those strips of a block sleep in which nothing but what is forced happens in this interval; returns how many
     of them do.  The lags of the others are made up for.  Unless they are told which strips keep their light, it is in
     the scratch, mended, and stays there.
@@ -60,7 +60,7 @@ def doze(block, scratch, p0, size, naps, flags, num, iv):
             same = is_seen(block, at + first, scratch, NEW + first, n, flags, num)
         if same:
             if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
-                settle_down(block[first:], scratch[first:], strip, n, naps, flags, num, iv)
+                settle_down(block[first:], scratch[first:], strip, n, theta, naps, flags, num, iv)
         else:
             naps.state[strip] = AWAKE
             if naps.since[strip] >= 0:
@@ -91,11 +91,12 @@ def sleeps_on(state, until, since, tick, leak):
 
 
 @inner
-def settle_down(block, scratch, strip, n, naps, flags, num, iv):
+def settle_down(block, scratch, strip, n, theta, naps, flags, num, iv):
     """Whether a strip that keeps its light falls asleep; `block` and `scratch` begin at it."""
     if naps.since[strip] >= 0:
         catch_up(block, scratch, strip, n, naps, flags, num)
-    naps.state[strip], naps.until[strip], wide = sleep_of(block, scratch, n, flags, num, iv)
+    pixel = strip * STRIP
+    naps.state[strip], naps.until[strip], wide = sleep_of(block, scratch, pixel, n, theta, flags, num, iv)
     naps.calm[strip] = np.uint8(wide == 0)
     naps.since[strip] = naps.tick if naps.state[strip] == NAPS else -1
 
@@ -114,14 +115,13 @@ def is_seen(seen, at, light, begin, n, flags, num):
 
 
 @inner
-def sleep_of(block, scratch, n, flags, num, iv):
+def sleep_of(block, scratch, pixel, n, theta, flags, num, iv):
     """(NAPS, SLEEPS or AWAKE; the leak up to which it holds; pixels that are not calm) of a strip in its light."""
     poles = len(flags.poles)
     if poles + len(flags.leak) + len(flags.track) == 0:
         return SLEEPS, np.inf, 0
     restless, moving, wide = np.int32(0), np.int32(0), np.int32(0)
     gain, floor = F(exp64(iv.leak0)), F(num.curve.floor)
-    near = F(0.125 * smallest_threshold(num))  # (no curve is steeper than 4 / (light + floor))
     for i in range(n):
         u = block[INPUT * PITCH + i]
         lag, top, bottom = F(0.0), u, u
@@ -139,6 +139,7 @@ def sleep_of(block, scratch, n, flags, num, iv):
         moving = np.int32(moving + np.int32(lag != F(0.0)))
         if len(flags.forced):
             scale = F(1.0) if len(flags.log_input) else bottom + floor
+            near = F(0.125 * least_threshold(pixel + i, theta, flags, num))  # (no curve is steeper than 4 / scale)
             wide = np.int32(wide + np.int32((top - bottom <= near * scale) == False))  # noqa: E712
     if restless > 0:
         return AWAKE, -np.inf, wide
@@ -148,12 +149,6 @@ def sleep_of(block, scratch, n, flags, num, iv):
     if until <= iv.leak1:
         return AWAKE, until, wide
     return (NAPS if moving > 0 else SLEEPS), until, wide
-
-
-@inner
-def smallest_threshold(num):
-    """What no threshold is below, whatever is drawn [nat]."""
-    return MISMATCH_FLOOR * MISMATCH_FLOOR * min(num.threshold_on, num.threshold_off)
 
 
 @inner
@@ -187,12 +182,12 @@ def least_room(scratch, n, flags):
 
 
 @inner
-def stir(block, scratch, lent, p0, keys, forced, naps, flags, num, iv):
+def stir(block, scratch, lent, p0, keys, forced, theta, naps, flags, num, iv):
     """What a scan would leave of the sleeping pixels in which events are forced; returns how many lags are borrowed.
 
-    What is forced leaves a signal no farther than half the smallest threshold from where its memory then is.
+    What is forced leaves a signal no farther than half its pixel's least threshold from where its memory then is.
     """
-    count, last, room = 0, np.int64(-1), 0.5 * smallest_threshold(num) - 4.0 * NATS
+    count, last = 0, np.int64(-1)
     for j in range(forced):
         i = place_of_candidate(keys[j], iv)[0]
         strip = (p0 + i) // STRIP
@@ -204,6 +199,7 @@ def stir(block, scratch, lent, p0, keys, forced, naps, flags, num, iv):
             lent[count] = i
             count += 1
         last = i
+        room = 0.5 * least_threshold(p0 + i, theta, flags, num) - 4.0 * NATS
         naps.until[strip] = min(naps.until[strip], iv.leak0 + room)
         if len(flags.track) > 0 or naps.calm[strip] == 0 or room < 4.0 * NATS:
             naps.until[strip] = -np.inf
