@@ -21,6 +21,7 @@ from vid2ev.recorder import Progress, Recorder, growing
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.tiles import usable_cores
 from vid2ev.sight import scene_of
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
@@ -74,7 +75,8 @@ def convert(
     check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
-    recipe, plans = planned(recipe, effects, tolerance)
+    threads = threads or usable_cores()
+    recipe, plans = planned(recipe, effects, tolerance, threads)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = recipe.describe() | {"outputs": outputs.describe()} | described(plans) | plain({**(notes or {})})
@@ -82,7 +84,6 @@ def convert(
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
-        threads = threads or usable_cores()
         if scene := scene_of(recipe.source):
             scene.world.afresh = not skip
         recorder = Recorder(recipe, outputs, folder, threads, skip)
@@ -104,11 +105,6 @@ def default_directory(video: str | Path) -> Path:
         return Path("stdin_events" if str(video) == "-" else f"{str(video).replace(':', '')}_events")
     path = Path(os.path.abspath(str(video).removeprefix("synthetic:").removeprefix("scene:").partition(",")[0]))
     return Path(f"{path.name if path.is_dir() else path.stem}_events")
-
-
-def usable_cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:

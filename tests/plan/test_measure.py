@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from against.clips import clean
@@ -9,7 +11,7 @@ from against.clips import clean
 from vid2ev.errors import UsageError
 from vid2ev.plan.measure import Measure, scene_of
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import QUARTER_EDGES
+from vid2ev.stream.scene import QUARTER_EDGES, SPREAD, Scene
 
 from .clips import clip, sent
 
@@ -99,6 +101,48 @@ def test_a_still_scene_is_still() -> None:
     frames = [Frame(np.full(SIZE[::-1], 0.3, np.float32), k * 1_000_000) for k in range(5)]
     scene = scene_of(clean(), SIZE, frames)
     assert scene.still and scene.slope_max.max() == 0 and scene.describe()["still_tiles"] == 2
+
+
+def fields(scene: Scene) -> dict[str, np.ndarray]:
+    return {each.name: np.asarray(getattr(scene, each.name)) for each in dataclasses.fields(scene)}
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_change_no_bit(threads: int) -> None:
+    size, spec = (160, 90), clean(photoreceptor_tau_us=3000, follower_tau_us=1000)
+    draws = np.random.default_rng(7)
+    lights = np.exp(np.cumsum(draws.normal(0, 0.2, (20, *size[::-1])), axis=0)).astype(np.float32)
+    lights[5:9, :40] = lights[5, :40]
+    frames = [Frame(light, k * 1_000_000, cut=k == 12) for k, light in enumerate(lights)]
+    one, several = (Measure(spec, size, many) for many in (1, threads))
+    for frame in frames:
+        one.see(frame)
+        several.see(frame)
+    for name, value in fields(one.scene()).items():
+        assert value.tobytes() == fields(several.scene())[name].tobytes(), name
+
+
+@pytest.mark.parametrize("way", ["before", "after"])
+def test_what_is_left_alone_while_it_is_still_is_measured_like_what_is_not(way: str) -> None:
+    """Beside a pixel that flickers, too little to be pushed, no strip is left alone."""
+    spec = clean(filter=way, photoreceptor_tau_us=9000, follower_tau_us=100)
+    frames = walk(6)
+    still = [
+        dataclasses.replace(frame, light=frames[10].light if 10 <= k < 17 else frame.light)
+        for k, frame in enumerate(frames)
+    ]
+    both = []
+    for flicker in (1.0, 0.9999):
+        lights = [frame.light.copy() for frame in still]
+        for k, light in enumerate(lights):
+            light.reshape(-1)[::200] = 0.5 * flicker ** (k % 2)
+        both.append(scene_of(spec, SIZE, [Frame(light, f.t_ns) for light, f in zip(lights, still, strict=True)]))
+    left, walked = map(fields, both)
+    assert left["turns"].tobytes() == walked["turns"].tobytes() and left["turns"].sum() > 0
+    for name in ("travel", "pushed_s", "bend", "bend_at_turns", "dense", "by_pixel", "slope_max"):
+        assert left[name] == pytest.approx(walked[name], rel=2e-6), name
+    for name in SPREAD:  # (what is beside an edge of two quarters may fall to either)
+        assert left[name][1].sum() == pytest.approx(walked[name][1].sum(), rel=1e-5), name
 
 
 def test_wrong_frames_are_refused() -> None:

@@ -38,8 +38,9 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
     """
     from vid2ev.plan.recordings import described, plans_of
     from vid2ev.recipe import Recipe
+    from vid2ev.sensors.tiles import usable_cores
 
-    plans = plans_of(Recipe.of(source, **options), effects, tolerance)
+    plans = plans_of(Recipe.of(source, **options), effects, tolerance, usable_cores())
     if as_json:
         click.echo(json.dumps(described(plans)["plan"], indent=2))
         return

@@ -62,11 +62,11 @@ class Pass:
     events: int
 
 
-def recipe_of(options: Mapping[str, Any]) -> Recipe:
+def recipe_of(options: Mapping[str, Any], threads: int = 1) -> Recipe:
     """The recipe of a conversion's options, with what is left of its sensors' effects."""
     rest = dict(options)
     effects, tolerance = rest.pop("effects", "all"), rest.pop("tolerance")
-    return planned(Recipe.of(**rest), effects, tolerance)[0]
+    return planned(Recipe.of(**rest), effects, tolerance, threads)[0]
 
 
 def run(options: Mapping[str, Any], rung: Rung, threads: int, *, keep: bool = False, views: bool = False) -> Pass:
@@ -74,7 +74,7 @@ def run(options: Mapping[str, Any], rung: Rung, threads: int, *, keep: bool = Fa
 
     Raises UsageError for more events than memory should hold, DataError as the source does.
     """
-    recipe = recipe_of(rung.applied(options))
+    recipe = recipe_of(rung.applied(options), threads)
     sensors = [_sensor(mount, rung, threads) for mount in recipe.mounts]
     done = Pass([Sent(mount) for mount in recipe.mounts], (0, 0), 0)
     first_ns, last_ns, originals = None, 0, 0

@@ -1,9 +1,13 @@
 """Measuring what a sensor sees, frame by frame: extremes and sums of a scene (`vid2ev.stream.scene`).
 
-A tile's pixels go through two loops: one without branches, for what every pixel has (light, level, slope, bend), and
-one for the play of pixels that are pushed or were until now.
-The state is one array, tile by tile and in it plane by plane, and extremes are taken of the bits of numbers >= 0, whose
-order is theirs: so the first loop is vector code.
+A block's pixels go through two loops: one without branches, for what every pixel has (light, level, slope, bend), and
+the play of those that are pushed or were until now (`play`).  Extremes are taken of the bits of numbers >= 0, whose
+order is theirs: so the first loop is vector code.  All sums are kept block by block, so it does not matter which thread
+has which.
+
+A strip of 256 pixels is **calm** after an interval in which its light kept all its bits: its slopes are 0 and nothing
+in it is pushed.  While it goes on like that it is left alone: bends and smoothed slopes only decay, by factors that are
+multiplied for the strip and `owed` to its pixels until its light changes.
 """
 
 from __future__ import annotations
@@ -14,26 +18,33 @@ import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernels.cpu import hits_of
-from vid2ev.kernels.layout import BLOCK, PITCH
+from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
+from vid2ev.kernels.play import (
+    BEFORE,
+    BENDS,
+    BENT,
+    IF_TURNED,
+    LEVEL,
+    LIGHT,
+    PLANES,
+    PLAY,
+    SEEN,
+    SLOPE,
+    SMOOTH,
+    SMOOTHED,
+    STEPS,
+    WAY,
+    follow,
+)
 from vid2ev.physics.elementary import bits_32, float_32
 from vid2ev.physics.log_curve import log_level_32
 
 F = np.float32
-# Planes of the state of a tile, in units of PITCH.
-LIGHT, LEVEL, SLOPE, PLAY, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH = range(10)
-PLANES = 10
-# Planes of the scratch: the level and the smoothed slope before, bend, the bend as it counts at a turn.
-BEFORE, SMOOTHED, BENT, IF_TURNED = range(4)
-SCRATCH = 4 * PITCH
-LEAST, MOST, STEEPEST, TRAVELLED, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(9)  # of a tile
-FIGURES = 9
+LEAST, MOST, STEEPEST = range(3)  # of a block; the rest are sums of `play`
+STRIPS = BLOCK // STRIP
 # A turn from slope r to -r' falls short by tau r' ln(1 + r/r') <= tau sqrt(r r'), where the reach is tau/e.
 ROUNDED = F(2.7182818)
-# How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
-BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT = range(4)
-QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
-STEPS = 6  # of an interval, whose slopes differ
-SMALL_NAT = 0.1  # what goes no further than this is taken at its greatest slope
+CHANGES, CALM, LEFT = range(3)  # a strip's light has changed; it has not; nor the time before, and the strip is owed
 
 
 class Pace(NamedTuple):
@@ -59,18 +70,36 @@ class Pace(NamedTuple):
     tau_s: float
 
 
+class Seen(NamedTuple):
+    """What is kept of the pixels, and what was found so far.
+
+    state   float32, block by block and in it plane by plane
+    calm    uint8 [blocks, STRIPS]
+    owed    float32 [blocks, STRIPS, 2], factors on bends and on smoothed slopes
+    tiles   float64 [blocks, FIGURES]
+    spread  float64 [blocks, 4, QUARTERS, 2] (`play`)
+    """
+
+    state: np.ndarray
+    calm: np.ndarray
+    owed: np.ndarray
+    tiles: np.ndarray
+    spread: np.ndarray
+
+
 @inner
-def arriving(light, gain):
+def arriving(light):
     """Light as the sensor takes it: what is no number or negative is none."""
     light = light if light > F(0.0) else F(0.0)
-    return (light if light < F(1e30) else F(1e30)) * gain
+    return light if light < F(1e30) else F(1e30)
 
 
 @compiled
-def settle_measure(light, shade, curve, half, state, tiles):
+def settle_measure(light, shade, curve, half, found):
     """Begin with a frame of light [float32, n]: the play of every pixel is pushed from below."""
+    state, tiles = found.state, found.tiles
     for i in range(light.size):
-        seen = arriving(light[i], shade[i] if shade.size else F(1.0))
+        seen = arriving(light[i]) * (shade[i] if shade.size else F(1.0))
         tile = tiles[i // BLOCK]
         tile[LEAST], tile[MOST] = min(tile[LEAST], seen), max(tile[MOST], seen)
         level = log_level_32(seen, curve)
@@ -78,30 +107,93 @@ def settle_measure(light, shade, curve, half, state, tiles):
         state[at + LIGHT * PITCH], state[at + LEVEL * PITCH], state[at + PLAY * PITCH] = seen, level, level - F(half)
         for plane in (SLOPE, WAY, BENDS, SMOOTH):
             state[at + plane * PITCH] = F(0.0)
+    found.calm[:] = CALM
+    found.owed[:] = F(1.0)
 
 
 @compiled
-def measure_frame(light, shade, curve, num, state, tiles, spread, work):
-    """Go on to the next frame; num is `Pace`, spread float64 [4, 2, QUARTERS]."""
-    for first in range(0, light.size, BLOCK):
-        last = min(first + BLOCK, light.size)
-        k = first // BLOCK
-        tile, own = tiles[k], state[k * PLANES * PITCH : (k + 1) * PLANES * PITCH]
-        extremes = look(light[first:last], shade[first : min(last, shade.size)], curve, num, own, work[0])
-        tile[LEAST], tile[MOST] = min(tile[LEAST], extremes[0]), max(tile[MOST], extremes[1])
-        tile[STEEPEST] = max(tile[STEEPEST], extremes[2])
-        follow(last - first, curve.floor, num, own, tile, spread, work)
+def measure_blocks(first, last, light, shade, curve, num, found, work):
+    """Take blocks first ... last - 1 on to the next frame of light [float32, n]; num is `Pace`, found `Seen`, work the
+    scratch of one thread: float32 planes, flags, hits, lanes."""
+    scratch, flagged, hits, lanes = work
+    for k in range(first, last):
+        p0 = k * BLOCK
+        n = min(BLOCK, light.size - p0)
+        own, tile = found.state[k * PLANES * PITCH : (k + 1) * PLANES * PITCH], found.tiles[k]
+        take(light[p0 : p0 + n], shade[p0 : min(p0 + n, shade.size)], scratch)
+        if rest(own, scratch, n, found.calm[k], found.owed[k], F(num.keep), F(num.decays[STEPS])) or n < BLOCK:
+            flagged[:] = 0
+        start, stop = 0, 0
+        while stop < n:
+            start, stop = next_run(stop, n, found.calm[k])
+            if stop > start:
+                part = look(own[start:], scratch[start:], flagged[start:], stop - start, curve, num)
+                tile[LEAST], tile[MOST] = min(tile[LEAST], part[0]), max(tile[MOST], part[1])
+                tile[STEEPEST] = max(tile[STEEPEST], part[2])
+        count = hits_of(flagged, hits)
+        if count > 0:
+            follow(count, hits, curve.floor, num, own, scratch, lanes, tile, found.spread[k])
 
 
-@compiled
-def look(light, shade, curve, num, own, scratch):
-    """What every pixel of a tile has, into state and scratch; returns least and most light and the greatest slope."""
-    least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
-    shaded, before_log, rate = shade.size > 0, num.before_log, F(1.0) / F(num.dt_s)
-    back, ahead, keep, kept = F(num.back_s), F(num.ahead_s), F(num.keep), F(num.decays[STEPS])
+@inner
+def take(light, shade, scratch):
+    """Light of a block into scratch, behind the lens shading if there is some."""
     for i in range(light.size):
-        seen = arriving(light[i], shade[i] if shaded else F(1.0))
-        old, slope0 = own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
+        scratch[SEEN + i] = arriving(light[i])
+    for i in range(shade.size):
+        scratch[SEEN + i] = scratch[SEEN + i] * shade[i]
+
+
+@inner
+def rest(own, scratch, n, calm, owed, keep, kept):
+    """Find the strips that can be left alone, and give the others what they are owed; returns whether there are any."""
+    left = False
+    for strip in range((n + STRIP - 1) // STRIP):
+        begin = strip * STRIP
+        same = is_same(own, scratch, begin, min(STRIP, n - begin))
+        if same and calm[strip] != CHANGES:
+            calm[strip], left = LEFT, True
+            owed[strip, 0], owed[strip, 1] = owed[strip, 0] * keep, owed[strip, 1] * kept
+            continue
+        if calm[strip] == LEFT:
+            bends, smooth = own[BENDS * PITCH + begin :], own[SMOOTH * PITCH + begin :]
+            for i in range(STRIP):
+                bends[i], smooth[i] = bends[i] * owed[strip, 0], smooth[i] * owed[strip, 1]
+            owed[strip, 0], owed[strip, 1] = F(1.0), F(1.0)
+        calm[strip] = CALM if same else CHANGES
+    return left
+
+
+@inner
+def is_same(own, scratch, begin, n):
+    """Whether n pixels have the light that they had."""
+    differ = np.uint32(0)
+    for i in range(n):
+        at = np.uintp(begin) + np.uintp(i)  # (unsigned: otherwise it may be negative, and does not vectorise)
+        differ = np.uint32(differ | np.uint32(own[np.uintp(LIGHT * PITCH) + at] != scratch[np.uintp(SEEN) + at]))
+    return differ == 0
+
+
+@inner
+def next_run(first, n, calm):
+    """The next pixels that are not left alone, from `first` on: (the first of them, the one after the last)."""
+    while first < n and calm[first // STRIP] == LEFT:
+        first += STRIP
+    last = first
+    while last < n and calm[last // STRIP] != LEFT:
+        last += STRIP
+    return min(first, n), min(max(last, first), n)
+
+
+@compiled
+def look(own, scratch, flagged, n, curve, num):
+    """What each of n pixels has, into state and scratch, and which ones are pushed or were; returns least and most
+    light and the greatest slope."""
+    least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
+    before_log, rate, half = num.before_log, F(1.0) / F(num.dt_s), F(num.half)
+    back, ahead, keep, kept = F(num.back_s), F(num.ahead_s), F(num.keep), F(num.decays[STEPS])
+    for i in range(n):
+        seen, old, slope0 = scratch[SEEN + i], own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
         level, level0 = log_level_32(seen, curve), own[LEVEL * PITCH + i]
         risen = seen - old
         speed = abs(risen) * rate / (min(seen, old) + F(curve.floor))
@@ -113,95 +205,12 @@ def look(light, shade, curve, num, own, scratch):
         near = near + F(curve.floor) if before_log else F(1.0)
         bend, bends = abs(slope - slope0) / near, own[BENDS * PITCH + i] * keep
         turned = min(bend, ROUNDED * np.sqrt(abs(slope * slope0)) / near)
-        smooth = own[SMOOTH * PITCH + i]
+        smooth, play = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i]
         own[LIGHT * PITCH + i], own[SLOPE * PITCH + i], own[BENDS * PITCH + i] = seen, slope, bends + bend
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
-        own[LEVEL * PITCH + i], scratch[BEFORE * PITCH + i], scratch[BENT * PITCH + i] = level, level0, bend
-        scratch[SMOOTHED * PITCH + i], scratch[IF_TURNED * PITCH + i] = smooth, bends + turned
+        own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend
+        scratch[SMOOTHED + i], scratch[IF_TURNED + i] = smooth, bends + turned
+        flagged[i] = np.uint8((level - half > play) | (level + half < play) | (own[WAY * PITCH + i] != F(0.0)))
         least, most = np.int32(min(least, bits_32(seen))), np.int32(max(most, bits_32(seen)))
         steepest = np.int32(max(steepest, bits_32(speed)))
     return float_32(least), float_32(most), float_32(steepest)
-
-
-@compiled
-def follow(n, floor, num, own, tile, spread, work):
-    """The play of the n pixels of a tile, from the levels in scratch to those in `own`."""
-    half, (scratch, flagged, hits) = F(num.half), work
-    for i in range(n):
-        level, play = own[LEVEL * PITCH + i], own[PLAY * PITCH + i]
-        flagged[i] = (level - half > play) | (level + half < play) | (own[WAY * PITCH + i] != F(0.0))
-    flagged[n:] = 0
-    for k in range(hits_of(flagged, hits)):
-        i = hits[k]
-        level, play, way = own[LEVEL * PITCH + i], own[PLAY * PITCH + i], own[WAY * PITCH + i]
-        pushed = F(level - half > play) - F(level + half < play)
-        turn(i, way, pushed, own, tile, scratch)
-        if pushed != F(0.0):
-            moved, gone = abs(level - pushed * half - play), abs(level - scratch[BEFORE * PITCH + i])
-            share = min(moved / max(gone, F(1e-30)), F(1.0))
-            own[PLAY * PITCH + i] = level - pushed * half
-            own[TRAVEL * PITCH + i] += moved
-            tile[TRAVELLED] += moved
-            tile[PUSHED_S] += num.dt_s * share
-            lost = moved * apart(gone, num)
-            note(spread[BY_TURNS], own[TURNS * PITCH + i], lost)
-            note(spread[BY_BENDS], own[TURNED_BENDS * PITCH + i], lost)
-            pace(i, moved, gone, floor, num, own, tile, spread, scratch)
-        own[WAY * PITCH + i] = pushed
-
-
-@compiled
-def apart(gone, num):
-    """What two events that should be one cost, if one is anywhere up to a threshold after the other: the mean of
-    1 - exp(-x / (slope tau)), x from 0 to theta, at the least slope of an interval that goes so many nats."""
-    reach = (1.0 - np.exp(-gone)) / num.dt_s * num.tau_s / (2.0 * num.half)
-    return 1.0 - reach * (1.0 - np.exp(-1.0 / max(reach, 1e-3)))
-
-
-@compiled
-def pace(i, moved, gone, floor, num, own, tile, spread, scratch):
-    """Spread a travel over the slopes of the smoothed signal in the interval, each as much as it goes at them."""
-    slope, smooth0 = own[SLOPE * PITCH + i], scratch[SMOOTHED * PITCH + i]
-    steps = STEPS if gone > F(SMALL_NAT) else 1
-    old, width = own[LIGHT * PITCH + i] - slope * F(num.dt_s), F(num.dt_s) / F(steps)
-    whole = F(1e-30)
-    for turn in range(2):
-        before, light0 = F(0.0), old
-        for step in range(steps + 1):
-            smooth = slope + (smooth0 - slope) * num.decays[step * (STEPS // steps)]
-            light = old + slope * width * F(step) if num.before_log else own[LIGHT * PITCH + i]
-            near = max(light - F(num.smooth_s) * smooth, F(0.0)) + F(floor) if num.before_log else F(1.0)
-            here = abs(smooth) / near
-            if step > 0 and turn == 0:
-                whole += before + here
-            elif step > 0:
-                part, steep = moved * (before + here) / whole, max(before, here)
-                note(spread[BY_SLOPE], steep, part)
-                note(spread[BY_LIGHT], max(min(light, light0), F(0.0)), part)
-                within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
-                tile[DENSE] += part * min(F(2.0 * num.tau_s) * steep, within)
-            before, light0 = here, light
-
-
-@compiled
-def turn(i, way, pushed, own, tile, scratch):
-    """Where a pixel that was pushed goes another way, or one begins to be."""
-    bend = own[BENDS * PITCH + i]
-    if way != F(0.0):
-        bend = scratch[BENT * PITCH + i]
-        if pushed != way:
-            turned = scratch[IF_TURNED * PITCH + i]
-            tile[TURNED] += 1.0
-            tile[TURN_BEND] += turned
-            own[TURNS * PITCH + i] += F(1.0)
-            own[TURNED_BENDS * PITCH + i] += turned
-    tile[BEND] += bend
-
-
-@compiled
-def note(spread, number, counted):
-    """Add a travel to the quarter of an octave that a number >= 0 has, spread [2, QUARTERS]: what is counted of it,
-    and that times the number."""
-    quarter = min(max(np.int64(bits_32(F(number)) >> np.int32(21)) - LOWEST, 0), QUARTERS - 1)
-    spread[0, quarter] += counted
-    spread[1, quarter] += counted * number

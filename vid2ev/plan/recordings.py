@@ -23,16 +23,18 @@ PASSES = "the source passes once: what is to come is not known"
 ASKED = "as asked for: the source was not measured"
 
 
-def plans_of(recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE) -> dict[str, Plan]:
+def plans_of(
+    recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE, threads: int = 1
+) -> dict[str, Plan]:
     """The plan of each camera; the source is read once, and made denser in time as for a recording, which then does
-    the same again.
+    the same again.  `threads` measure, and change nothing but the time it takes.
 
     A source that passes once is not read: all that auto keeps of it is all.  Raises UsageError as `plan_of` does.
     """
     check_effects(recipe, effects, tolerance)
     if not recipe.source.rewindable:
         return _unseen(recipe, PASSES, effects, tolerance)
-    cameras = [_measure(mount) for mount in recipe.mounts]
+    cameras = [_measure(mount, threads) for mount in recipe.mounts]
     subframes, depth = Subframes(), DepthRange()
     with closing(instants(recipe)) as seen:
         for instant in seen:
@@ -60,9 +62,9 @@ def _unseen(recipe: Recipe, why: str, effects: str | Sequence[str], tolerance: f
     return plans
 
 
-def _measure(mount: Mount) -> Measure | Expose:
+def _measure(mount: Mount, threads: int) -> Measure | Expose:
     spec = mount.sensor.spec
-    return Measure(spec, mount.size) if isinstance(spec, DvsSpec) else Expose(spec, mount.size)
+    return Measure(spec, mount.size, threads) if isinstance(spec, DvsSpec) else Expose(spec, mount.size)
 
 
 def _plan(
@@ -73,7 +75,9 @@ def _plan(
     return frame_plan_of(camera.exposed(speed_px_per_s), camera.spec, tolerance, effects)
 
 
-def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE) -> tuple[Recipe, Plans]:
+def planned(
+    recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE, threads: int = 1
+) -> tuple[Recipe, Plans]:
     """The recipe with what its plans leave of the sensors; of all effects it is the same, and there are no plans.
 
     Only "auto" has to look at the source for it.
@@ -82,7 +86,7 @@ def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOL
         return recipe, {}
     check_effects(recipe, effects, tolerance)
     asked = effects != "auto"
-    plans = _unseen(recipe, ASKED, effects, tolerance) if asked else plans_of(recipe, effects, tolerance)
+    plans = _unseen(recipe, ASKED, effects, tolerance) if asked else plans_of(recipe, effects, tolerance, threads)
     mounts = [
         replace(mount, sensor=mount.sensor._replace(spec=plans[mount.name].spec)) if mount.name in plans else mount
         for mount in recipe.mounts

@@ -1,0 +1,162 @@
+"""The play of pixels that are pushed or were until now (`vid2ev.stream.scene`), and the sums that are taken of it.
+
+Those of a block go to lanes: first what takes numbers alone, for all of them in vector code, then the sums, pixel after
+pixel in their order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.kernels.layout import PITCH
+from vid2ev.physics.elementary import bits_32, expm1_32
+
+F = np.float32
+# Planes of the state of a block, in units of PITCH.
+LIGHT, LEVEL, SLOPE, PLAY, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH = range(10)
+PLANES = 10
+# Planes of the scratch: light now, the level and the smoothed slope before, bend, the bend as it counts at a turn.
+SEEN, BEFORE, SMOOTHED, BENT, IF_TURNED = (k * PITCH for k in range(5))
+SCRATCH = 5 * PITCH
+# Planes of the lanes: what is taken from a pixel, and what is found for it.
+AT_LEVEL, AT_PLAY, FROM, AT_SLOPE, AT_SMOOTH, AT_LIGHT = (k * PITCH for k in range(6))
+PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(6, 14))
+LANES = 14 * PITCH
+TRAVELLED, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(3, 9)  # sums of a block, after its extremes
+FIGURES = 9
+# How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
+BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT = range(4)
+QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
+STEPS = 6  # of an interval, whose slopes differ
+SMALL_NAT = 0.1  # what goes no further than this is taken at its greatest slope
+
+
+@inner
+def follow(count, hits, floor, num, own, scratch, lanes, tile, spread):
+    """The play of the pixels in `hits`, from the levels in scratch to those in `own`; sums into tile and spread."""
+    gather(count, hits, own, scratch, lanes)
+    push(count, floor, num, lanes)
+    add_up(count, hits, floor, num, own, scratch, lanes, tile, spread)
+
+
+@compiled
+def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
+    """Move the plays of the pixels in `hits`, one after the other, and take their sums.
+
+    A pixel that begins to be pushed brings the bends that it still feels; one that was counts each of its own, and
+    where it goes another way or none, a turn.
+    """
+    # (sums in numbers of their own: an entry of an array would go through memory each time)
+    travelled = pushed_s = turns = bends = turn_bends = dense = 0.0
+    half, dt = F(num.half), num.dt_s
+    for k in range(count):
+        i, pushed = np.uintp(hits[k]), lanes[k + PUSHED]
+        way, bend = own[WAY * PITCH + i], own[BENDS * PITCH + i]
+        if way != F(0.0):
+            bend = scratch[BENT + i]
+            if pushed != way:
+                turned = scratch[IF_TURNED + i]
+                turns += 1.0
+                turn_bends += turned
+                own[TURNS * PITCH + i] += F(1.0)
+                own[TURNED_BENDS * PITCH + i] += turned
+        bends += bend
+        own[WAY * PITCH + i] = pushed
+        if pushed == F(0.0):
+            continue
+        moved, gone, lost = lanes[MOVED + k], lanes[GONE + k], lanes[LOST + k]
+        own[PLAY * PITCH + i] = own[LEVEL * PITCH + i] - pushed * half
+        own[TRAVEL * PITCH + i] += moved
+        travelled += moved
+        pushed_s += dt * lanes[SHARE + k]
+        note(spread, BY_TURNS, own[TURNS * PITCH + i], lost)
+        note(spread, BY_BENDS, own[TURNED_BENDS * PITCH + i], lost)
+        if gone > F(SMALL_NAT):
+            dense += pace(i, moved, gone, floor, num, own, spread, scratch)
+            continue
+        note(spread, BY_SLOPE, lanes[STEEP + k], moved)
+        note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
+        dense += moved * lanes[BUNCHED + k]
+    tile[TRAVELLED] += travelled
+    tile[PUSHED_S] += pushed_s
+    tile[TURNED] += turns
+    tile[BEND] += bends
+    tile[TURN_BEND] += turn_bends
+    tile[DENSE] += dense
+
+
+@inner
+def gather(count, hits, own, scratch, lanes):
+    """What is known of the pixels in `hits` into lanes."""
+    for k in range(count):
+        i = hits[k]
+        lanes[AT_LEVEL + k], lanes[AT_PLAY + k] = own[LEVEL * PITCH + i], own[PLAY * PITCH + i]
+        lanes[FROM + k], lanes[AT_SMOOTH + k] = scratch[BEFORE + i], scratch[SMOOTHED + i]
+        lanes[AT_SLOPE + k], lanes[AT_LIGHT + k] = own[SLOPE * PITCH + i], own[LIGHT * PITCH + i]
+
+
+@inner
+def push(count, floor, num, lanes):
+    """How far and which way each is pushed, and what follows from that if it is not far."""
+    half, dt, tau, smooth_s = F(num.half), F(num.dt_s), F(num.tau_s), F(num.smooth_s)
+    before_log, black, reach_of = num.before_log, F(floor), F(num.tau_s / (num.dt_s * 2.0 * num.half))
+    whole, first, kept = F(1.0 + 2.0 * num.tau_s / num.dt_s), num.decays[0], num.decays[STEPS]
+    for k in range(count):
+        level, play = lanes[AT_LEVEL + k], lanes[AT_PLAY + k]
+        pushed = F(level - half > play) - F(level + half < play)
+        gone = abs(level - lanes[FROM + k])
+        moved = abs(level - pushed * half - play) if pushed != F(0.0) else F(0.0)
+        lanes[PUSHED + k], lanes[MOVED + k], lanes[GONE + k] = pushed, moved, gone
+        lanes[SHARE + k] = min(moved / max(gone, F(1e-30)), F(1.0))
+        # What two events that should be one cost, if one is anywhere up to a threshold after the other: the mean of
+        # 1 - exp(-x / (slope tau)), x from 0 to theta, at the least slope of an interval that goes so many nats.
+        reach = -expm1_32(-gone) * reach_of
+        lanes[LOST + k] = moved * (F(1.0) + reach * expm1_32(F(-1.0) / max(reach, F(1e-3))))
+        slope, light1 = lanes[AT_SLOPE + k], lanes[AT_LIGHT + k]
+        smooth0 = slope + (lanes[AT_SMOOTH + k] - slope) * first
+        smooth1, light0 = slope + (smooth0 - slope) * kept, light1
+        near0 = near1 = F(1.0)
+        if before_log:
+            light0 = light1 - slope * dt
+            near0, near1 = (
+                max(light0 - smooth_s * smooth0, F(0.0)) + black,
+                max(light1 - smooth_s * smooth1, F(0.0)) + black,
+            )
+        steep = max(abs(smooth0) / near0, abs(smooth1) / near1)
+        lanes[STEEP + k], lanes[DIMMEST + k] = steep, max(min(light0, light1), F(0.0))
+        lanes[BUNCHED + k] = min(F(2.0) * tau * steep, gone * whole)
+
+
+@inner
+def pace(i, moved, gone, floor, num, own, spread, scratch):
+    """Spread a travel over the slopes of the smoothed signal in the interval, each as much as it goes at them."""
+    slope, smooth0 = own[SLOPE * PITCH + i], scratch[SMOOTHED + i]
+    old, width = own[LIGHT * PITCH + i] - slope * F(num.dt_s), F(num.dt_s) / F(STEPS)
+    whole, dense = F(1e-30), 0.0
+    for turn in range(2):
+        before, light0 = F(0.0), old
+        for step in range(STEPS + 1):
+            smooth = slope + (smooth0 - slope) * num.decays[step]
+            light = old + slope * width * F(step) if num.before_log else own[LIGHT * PITCH + i]
+            near = max(light - F(num.smooth_s) * smooth, F(0.0)) + F(floor) if num.before_log else F(1.0)
+            here = abs(smooth) / near
+            if step > 0 and turn == 0:
+                whole += before + here
+            elif step > 0:
+                part, steep = moved * (before + here) / whole, max(before, here)
+                note(spread, BY_SLOPE, steep, part)
+                note(spread, BY_LIGHT, max(min(light, light0), F(0.0)), part)
+                within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
+                dense += part * min(F(2.0 * num.tau_s) * steep, within)
+            before, light0 = here, light
+    return dense
+
+
+@inner
+def note(spread, of, number, counted):
+    """Add a travel to the quarter of an octave that a number >= 0 has, spread [4, QUARTERS, 2]: what is counted of it,
+    and that times the number."""
+    quarter = np.uintp(min(max(np.int64(bits_32(number) >> np.int32(21)) - LOWEST, 0), QUARTERS - 1))
+    spread[of, quarter, 0] += counted
+    spread[of, quarter, 1] += counted * number
