@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,10 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
 from vid2ev.plan.plan import TOLERANCE
+from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import described, planned
 from vid2ev.recipe import Recipe, plain
-from vid2ev.recorder import Progress, Recorder, growing
+from vid2ev.recorder import Progress, Recorder, growing, progress_of
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.spec import DvsSpec
@@ -59,7 +61,8 @@ def convert(
     resume     go on where an interrupted conversion was; a finished one is left as it is
     report     called at every source frame; if it returns True, the recording ends there
     piece      pixel-steps between two checkpoints
-    effects    those to simulate: all, auto (what the clip calls for, by bounds within `tolerance`), none, or names
+    effects    those to simulate: all, auto (what the clip calls for, by bounds within `tolerance`; `plan.planner` has
+               what it takes), none, or names
     notes      what else the manifest is to say, ready for JSON
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
@@ -75,22 +78,23 @@ def convert(
     check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
+    if scene := scene_of(recipe.source):
+        scene.world.afresh = not skip
     threads = threads or usable_cores()
-    recipe, plans = planned(recipe, effects, tolerance, threads)
+    planner = Planner(recipe, tolerance, threads) if effects == "auto" else None
+    recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
-    job = recipe.describe() | {"outputs": outputs.describe()} | described(plans) | plain({**(notes or {})})
+    job = _asked(recipe, tolerance) if planner else recipe.describe() | described(plans)
+    job |= {"outputs": outputs.describe()} | plain({**(notes or {})})
     beside = growing(recipe, outputs)
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
-        if scene := scene_of(recipe.source):
-            scene.world.afresh = not skip
-        recorder = Recorder(recipe, outputs, folder, threads, skip)
-        recorder.take_up()
-        if not recorder.done.finished:
-            _record(recorder, piece, report)
-        manifests = _manifests(job, recorder, _run(video, threads, recorder))
+        make = partial(Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip)
+        recorder = _recorded(recipe, planner, folder, make, piece, report)
+        said = described(planner.plans if planner else plans)
+        manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
         with folder.writing():
             recorder.write(folder.whole)
             for within, manifest in manifests.items():
@@ -133,27 +137,73 @@ def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> 
     return {"": job | {"results": results, "run": run}, **manifests}
 
 
-def _record(recorder: Recorder, piece: int, report: Report | None) -> None:
-    """From the point of the last checkpoint to the end of the source."""
+def _asked(recipe: Recipe, tolerance: float) -> dict[str, Any]:
+    """What decides a recording whose effects are chosen by its light: the sensors as they were before."""
+    said = recipe.describe()
+    sensors = {key: said.pop(key) for key in ("sensor", "cameras") if key in said}
+    return said | {"asked": {"effects": "auto", "tolerance": tolerance} | sensors}
+
+
+def _recorded(
+    recipe: Recipe,
+    planner: Planner | None,
+    folder: Folder,
+    make: Callable[[Recipe], Recorder],
+    piece: int,
+    report: Report | None,
+) -> Recorder:
+    """A recording made to its end, from the last checkpoint on, or by new plans from the beginning."""
+    if planner:
+        done = progress_of(folder)
+        planner.begin(done.looked, done.ended)
+        recipe = planner.left
+    recorder = make(recipe)
+    recorder.take_up()
+    while not recorder.done.finished and not _record(recorder, planner, piece, report):
+        assert planner
+        recorder.give_up()
+        if recorder.done.by_hand:
+            report = partial(_ends, recorder.done.frames)
+        recorder = make(planner.left)
+    return recorder
+
+
+def _ends(frames: int, _: Recipe, done: Progress) -> bool:
+    """Whether a recording ends again where it was ended by hand."""
+    return done.frames >= frames
+
+
+def _record(recorder: Recorder, planner: Planner | None, piece: int, report: Report | None) -> bool:
+    """From the point of the last checkpoint to the end of the source; returns False where there are new plans."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
-    with closing(instants(recipe, max(done.frames - 1, 0))) as seen:
+    coming = planner.instants if planner else partial(instants, recipe)
+    with closing(coming(max(done.frames - 1, 0))) as seen:
         first = next(seen, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
         recorder.begin(first)
         for instant in seen:
+            if planner and planner.see(instant, done.frames + done.subframes):
+                return False
             recorder.add(instant)
             done.limited, done.seconds = limited_before + instant.limited, time.monotonic() - began
             work += max(STEP, sum(frame.light.size for frame in instant.frames))
             if instant.original and report and report(recipe, done) is True:
+                done.by_hand = True
                 done.warnings.append(f"ended by hand after {done.frames} frames")
                 break
             if instant.original and work >= piece:
+                done.looked, done.ended = (planner.looked, planner.ended) if planner else (0, False)
                 recorder.checkpoint()
                 work = 0
     done.warnings += recipe.source.warnings
+    if planner:
+        if planner.finish():
+            return False
+        done.looked, done.ended = planner.looked, True
     recorder.finish()
+    return True
 
 
 def _run(video: str | Path, threads: int, recorder: Recorder) -> dict[str, Any]:

@@ -45,7 +45,10 @@ class Progress:
     end_ns: int = 0  # the last frame
     cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots
     seconds: float = 0.0  # of work, in all runs
+    looked: int = 0  # instants that the plans go by
+    ended: bool = False  # and whether they are all
     finished: bool = False
+    by_hand: bool = False  # ended before the source did
     warnings: list[str] = field(default_factory=list)
 
     def add(self, instant: Instant) -> None:
@@ -55,6 +58,12 @@ class Progress:
         self.start_ns = instant.t_ns if self.frames == 1 and instant.original else self.start_ns
         self.end_ns = instant.t_ns
         self.cuts_us += [instant.t_ns // 1000] * instant.cut
+
+
+def progress_of(folder: Folder) -> Progress:
+    """How far the recording of a folder is, at its last checkpoint."""
+    saved = folder.saved()
+    return Progress(**json.loads(str(saved["progress"]))) if saved else Progress()
 
 
 class Recorder:
@@ -77,7 +86,7 @@ class Recorder:
             for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
                 name = f"track{mount.number}."
                 track.restore({key.removeprefix(name): array for key, array in saved.items() if key.startswith(name)})
-            self.done = Progress(**json.loads(str(saved["progress"])))
+            self.done = progress_of(self.folder)
 
     def begin(self, instant: Instant) -> None:
         """The first instant of the recording; after `take_up`, the last source frame before the checkpoint."""
@@ -114,6 +123,13 @@ class Recorder:
                 track.close()
                 state |= {f"track{mount.number}.{name}": array for name, array in track.state().items()}
             self.folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(self.done)))})
+
+    def give_up(self) -> None:
+        """Make nothing more of this recording, and forget what was made."""
+        with self.folder.writing():
+            for track in self.tracks:
+                track.close()
+            self.folder.begin_again()
 
     def write(self, whole: Path) -> None:
         """The files of all cameras, but for the manifests."""

@@ -1,7 +1,7 @@
 """A pass: a conversion of which nothing is written, and what its cameras send.
 
-What is timed is all of it: the source opened and decoded, its scene measured where effects are chosen by it, light made
-between the frames, views formed, sensors run.
+What is timed is all of it: the source opened and decoded, light made between the frames, views formed and, where
+effects are chosen by them, measured; sensors run, again if the choice was wrong.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from vid2ev.errors import UsageError
 from vid2ev.instants import Instant, instants
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.mounts import Mount
+from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import planned
 from vid2ev.recipe import Recipe
 from vid2ev.sensors.cis import Cis
@@ -62,31 +63,44 @@ class Pass:
     events: int
 
 
-def recipe_of(options: Mapping[str, Any], threads: int = 1) -> Recipe:
-    """The recipe of a conversion's options, with what is left of its sensors' effects."""
-    rest = dict(options)
-    effects, tolerance = rest.pop("effects", "all"), rest.pop("tolerance")
-    return planned(Recipe.of(**rest), effects, tolerance, threads)[0]
-
-
 def run(options: Mapping[str, Any], rung: Rung, threads: int, *, keep: bool = False, views: bool = False) -> Pass:
     """One pass of a setting; `keep` what the cameras send, and `views`: some of what they see.
 
     Raises UsageError for more events than memory should hold, DataError as the source does.
     """
-    recipe = recipe_of(rung.applied(options), threads)
+    rest = rung.applied(options)
+    effects, tolerance = rest.pop("effects", "all"), rest.pop("tolerance")
+    recipe = Recipe.of(**rest)
+    if effects != "auto":
+        recipe = planned(recipe, effects, tolerance)[0]
+        return _passed(recipe, None, rung, threads, keep=keep, views=views)  # type: ignore[return-value]
+    planner, done = Planner(recipe, tolerance, threads), None
+    planner.begin()
+    while done is None:
+        done = _passed(planner.left, planner, rung, threads, keep=keep, views=views)
+    return done
+
+
+def _passed(
+    recipe: Recipe, planner: Planner | None, rung: Rung, threads: int, *, keep: bool, views: bool
+) -> Pass | None:
+    """One pass of a recipe; None where there are new plans for it."""
     sensors = [_sensor(mount, rung, threads) for mount in recipe.mounts]
     done = Pass([Sent(mount) for mount in recipe.mounts], (0, 0), 0)
     first_ns, last_ns, originals = None, 0, 0
     every = max(1, (recipe.source.frames_expected or PICTURES) // PICTURES)
-    with closing(instants(recipe)) as coming:
-        for instant in coming:
+    with closing(planner.instants() if planner else instants(recipe)) as coming:
+        for index, instant in enumerate(coming):
+            if planner and planner.see(instant, index):
+                return None
             first_ns, last_ns = instant.t_ns if first_ns is None else first_ns, instant.t_ns
             _sense(sensors, instant, done, keep)
             if views and instant.original and originals % every == 0:
                 for sent, frame in zip(done.sent, instant.frames, strict=True):
                     sent.views.append(srgb_codes(frame.luminance))
             originals += instant.original
+    if planner and planner.finish():
+        return None
     for sensor, sent in zip(sensors, done.sent, strict=True):
         if isinstance(sensor, Dvs):
             _take(sensor.flush(), sent, done, keep)

@@ -80,12 +80,16 @@ class FramePlan(Plan):
 
 
 def frame_plan_of(
-    seen: Exposed, spec: CisSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto"
+    seen: Exposed,
+    spec: CisSpec,
+    tolerance: float = TOLERANCE,
+    effects: str | Sequence[str] = "auto",
+    among: Sequence[str] | None = None,
 ) -> FramePlan:
-    """The plan of a frame camera, for what it sees; `effects` and errors as for `plan_of`."""
+    """The plan of a frame camera, for what it sees; `effects`, `among` and errors as for `plan_of`."""
     check_tolerance(tolerance)
     omissions = {name: FRAME_EFFECTS[name].omission(seen, spec) for name in spec.effects()}
-    plan = _planned(omissions, spec, tolerance, effects, seen.frames_each)
+    plan = _planned(omissions, spec, tolerance, effects, seen.frames_each, among)
     always = tuple(FrameRow(name, "kept", omission(seen, spec), 0.0, 0.0) for name, omission in ALWAYS.items())
     return replace(plan, rows=(*plan.rows, *always), scene=seen.describe())
 
@@ -106,9 +110,10 @@ def _planned(
     tolerance: float,
     effects: str | Sequence[str],
     frames_each: float,
+    among: Sequence[str] | None = None,
 ) -> FramePlan:
     if effects == "auto":
-        gone = _within(omissions, tolerance)
+        gone = _within({name: said for name, said in omissions.items() if among is None or name in among}, tolerance)
     else:
         kept = names_of(effects)
         gone = [name for name in omissions if name not in kept]

@@ -114,6 +114,11 @@ class Plan:
     distance: float | None
     scene: dict[str, Any]
 
+    @property
+    def gone(self) -> tuple[str, ...]:
+        """The effects that are left out or replaced."""
+        return tuple(row.effect for row in self.rows if row.effect in KNOWN and row.fate != "kept")
+
     def describe(self) -> dict[str, Any]:
         """The plan, ready for JSON."""
         rows = [row.describe() for row in self.rows]
@@ -142,22 +147,28 @@ def _cells(row: Row) -> tuple[str, ...]:
     return row.effect, row.fate, distance, said.kind, said.figure, cost, said.why
 
 
-def plan_of(scene: Scene, spec: DvsSpec, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
+def plan_of(
+    scene: Scene,
+    spec: DvsSpec,
+    tolerance: float = TOLERANCE,
+    effects: str | Sequence[str] = "auto",
+    among: Sequence[str] | None = None,
+) -> Plan:
     """The plan for a scene that was measured for `spec`.
 
     effects  "auto", "all", "none", or the names of those to keep; those without a bound go, too, where that is asked
+    among    names of those that auto may leave out, None for any
     Raises UsageError for an effect that there is not, or a specification that cannot be without what is left out.
     """
     check_tolerance(tolerance)
     omissions = {name: EFFECTS[name].omission(scene, spec) for name in spec.effects()}
-    return _planned(omissions, spec, tolerance, effects, scene.describe())
+    return _planned(omissions, spec, tolerance, effects, scene.describe(), among)
 
 
 def plan_unseen(spec: DvsSpec, why: str, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
     """The plan for what was not measured, and `why`: "auto" keeps all.
 
-    So it is with what passes once: an effect that carries state from frame to frame must be there from the first, and
-    what is to come is not known; the one that carries none, the refractory period, costs less than measuring does.
+    So it is with what passes once and goes on for longer than light is held (`plan.planner` says why).
     Raises UsageError as `plan_of` does.
     """
     check_tolerance(tolerance)
@@ -166,11 +177,16 @@ def plan_unseen(spec: DvsSpec, why: str, tolerance: float = TOLERANCE, effects: 
 
 
 def _planned(
-    omissions: dict[str, Omission], spec: DvsSpec, tolerance: float, effects: str | Sequence[str], seen: dict[str, Any]
+    omissions: dict[str, Omission],
+    spec: DvsSpec,
+    tolerance: float,
+    effects: str | Sequence[str],
+    seen: dict[str, Any],
+    among: Sequence[str] | None = None,
 ) -> Plan:
     used = list(omissions)
     if effects == "auto":
-        gone = _within(omissions, tolerance)
+        gone = _within({name: said for name, said in omissions.items() if among is None or name in among}, tolerance)
         changes = dict(change for name in gone for change in omissions[name].replace or EFFECTS[name].off.items())
     else:
         kept = names_of(effects)

@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from vid2ev.instants import instants
+from vid2ev.instants import Instant, instants
 from vid2ev.mounts import Mount
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.frame_camera import frame_plan_of, frame_plan_unseen
@@ -26,32 +26,63 @@ ASKED = "as asked for: the source was not measured"
 def plans_of(
     recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE, threads: int = 1
 ) -> dict[str, Plan]:
-    """The plan of each camera; the source is read once, and made denser in time as for a recording, which then does
-    the same again.  `threads` measure, and change nothing but the time it takes.
+    """The plan of each camera, from a look at the whole source, made denser in time as for a recording, which does
+    without (`plan.planner`).  `threads` measure, and change nothing but the time it takes.
 
     A source that passes once is not read: all that auto keeps of it is all.  Raises UsageError as `plan_of` does.
     """
     check_effects(recipe, effects, tolerance)
     if not recipe.source.rewindable:
-        return _unseen(recipe, PASSES, effects, tolerance)
-    cameras = [_measure(mount, threads) for mount in recipe.mounts]
-    subframes, depth = Subframes(), DepthRange()
+        return plans_unseen(recipe, PASSES, effects, tolerance)
+    look = Look(recipe, threads)
     with closing(instants(recipe)) as seen:
         for instant in seen:
-            subframes.see(instant)
-            depth.see(instant.depth if instant.original else None)
-            for camera, frame in zip(cameras, instant.frames, strict=True):
-                camera.see(frame)
-    shared = () if recipe.source.dense or recipe.upsample != "flow" else (subframes.row(),)
-    plans: dict[str, Plan] = {}
-    for mount, camera in zip(recipe.mounts, cameras, strict=True):
-        plan = _plan(camera, effects, tolerance, subframes.speed_px_per_s)
-        view = () if recipe.alone else (view_row(mount, recipe, depth),)
-        plans[mount.name] = replace(plan, rows=(*view, *shared, *plan.rows))
-    return plans
+            look.see(instant)
+    return look.plans(effects, tolerance)
 
 
-def _unseen(recipe: Recipe, why: str, effects: str | Sequence[str], tolerance: float) -> dict[str, Plan]:
+class Look:
+    """A look at what the cameras of a recipe see: `see` each instant, then ask for the `plans`."""
+
+    def __init__(self, recipe: Recipe, threads: int):
+        self.recipe = recipe
+        self._cameras = {mount.name: _measure(mount, threads) for mount in recipe.mounts}
+        self._subframes, self._depth = Subframes(), DepthRange()
+
+    def see(self, instant: Instant) -> None:
+        """The next instant."""
+        self._subframes.see(instant)
+        self._depth.see(instant.depth if instant.original else None)
+        for mount, frame in zip(self.recipe.mounts, instant.frames, strict=True):
+            if mount.name in self._cameras:
+                self._cameras[mount.name].see(frame)
+
+    def forget(self, name: str) -> None:
+        """Look no longer at what a camera sees; there are no more plans for it."""
+        del self._cameras[name]
+
+    def plans(
+        self,
+        effects: str | Sequence[str],
+        tolerance: float,
+        among: Mapping[str, Sequence[str]] | None = None,
+    ) -> dict[str, Plan]:
+        """The plan of each camera that is looked at, for what was seen so far; `among` limits what auto may leave out,
+        by the camera's name."""
+        recipe, plans = self.recipe, dict[str, Plan]()
+        shared = () if recipe.source.dense or recipe.upsample != "flow" else (self._subframes.row(),)
+        for mount in recipe.mounts:
+            if mount.name in self._cameras:
+                able = None if among is None else among[mount.name]
+                speed_px_per_s = self._subframes.speed_px_per_s
+                plan = _plan(self._cameras[mount.name], effects, tolerance, speed_px_per_s, able)
+                view = () if recipe.alone else (view_row(mount, recipe, self._depth),)
+                plans[mount.name] = replace(plan, rows=(*view, *shared, *plan.rows))
+        return plans
+
+
+def plans_unseen(recipe: Recipe, why: str, effects: str | Sequence[str], tolerance: float) -> dict[str, Plan]:
+    """The plans of cameras that were not looked at, and `why`."""
     plans: dict[str, Plan] = {}
     for mount in recipe.mounts:
         spec = mount.sensor.spec
@@ -68,30 +99,34 @@ def _measure(mount: Mount, threads: int) -> Measure | Expose:
 
 
 def _plan(
-    camera: Measure | Expose, effects: str | Sequence[str], tolerance: float, speed_px_per_s: float | None
+    camera: Measure | Expose,
+    effects: str | Sequence[str],
+    tolerance: float,
+    speed_px_per_s: float | None,
+    among: Sequence[str] | None,
 ) -> Plan:
     if isinstance(camera, Measure):
-        return plan_of(camera.scene(), camera.spec, tolerance, effects)
-    return frame_plan_of(camera.exposed(speed_px_per_s), camera.spec, tolerance, effects)
+        return plan_of(camera.scene(), camera.spec, tolerance, effects, among)
+    return frame_plan_of(camera.exposed(speed_px_per_s), camera.spec, tolerance, effects, among)
 
 
-def planned(
-    recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE, threads: int = 1
-) -> tuple[Recipe, Plans]:
-    """The recipe with what its plans leave of the sensors; of all effects it is the same, and there are no plans.
-
-    Only "auto" has to look at the source for it.
-    """
+def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOLERANCE) -> tuple[Recipe, Plans]:
+    """The recipe with what is left of the sensors by effects other than "auto", and the plans that say so; of all
+    effects it is the same, and there are none.  The source is not looked at."""
     if effects == "all":
         return recipe, {}
     check_effects(recipe, effects, tolerance)
-    asked = effects != "auto"
-    plans = _unseen(recipe, ASKED, effects, tolerance) if asked else plans_of(recipe, effects, tolerance, threads)
+    plans = plans_unseen(recipe, ASKED, effects, tolerance)
+    return left_of(recipe, plans), plans
+
+
+def left_of(recipe: Recipe, plans: Plans) -> Recipe:
+    """The recipe with what its plans leave of the sensors."""
     mounts = [
         replace(mount, sensor=mount.sensor._replace(spec=plans[mount.name].spec)) if mount.name in plans else mount
         for mount in recipe.mounts
     ]
-    return replace(recipe, mounts=tuple(mounts)), plans
+    return replace(recipe, mounts=tuple(mounts))
 
 
 def check_effects(recipe: Recipe, effects: str | Sequence[str], tolerance: float) -> None:

@@ -131,6 +131,14 @@ class Folder:
         path.mkdir(exist_ok=True)
         return path
 
+    def begin_again(self) -> None:
+        """Forget what was made so far, the last checkpoint too."""
+        for file in self._files.values():
+            file.close()
+        self._clear()
+        self._write_job()
+        self._open({})
+
     def publish(self) -> None:
         """Put the finished recording in its place, at once."""
         for path in self.whole.rglob("*"):
@@ -157,8 +165,14 @@ class Folder:
             return
         else:
             self._clear()
-            with whole_file(self.partial / "job.json") as file:
-                file.write(json.dumps(self.job, indent=2).encode())
+            self._write_job()
+        self._open(sizes)
+
+    def _write_job(self) -> None:
+        with whole_file(self.partial / "job.json") as file:
+            file.write(json.dumps(self.job, indent=2).encode())
+
+    def _open(self, sizes: Mapping[str, int]) -> None:
         for name in self._growing:
             (self.partial / name).parent.mkdir(exist_ok=True)
             (self.partial / name).touch()

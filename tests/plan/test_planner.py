@@ -1,0 +1,224 @@
+"""Plans made while a recording is: those of a look at the whole clip where it is short, sound and repeatable anyway."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from against.clips import clean
+
+from vid2ev import convert, read_events
+from vid2ev.instants import instants
+from vid2ev.plan import planner as planning
+from vid2ev.plan.planner import Planner
+from vid2ev.plan.recordings import plans_of
+from vid2ev.recipe import Recipe
+from vid2ev.sources.arrays import ArrayStack
+from vid2ev.stream import Events
+
+from .clips import distance
+
+SIZE = (40, 30)
+SPEC = clean(photoreceptor_tau_us=300, follower_tau_us=100, random_phase=True)
+QUIET: dict[str, Any] = {"upsample": "none", "preview": False, "fps": 200, "cuts": "keep"}
+SOME = 10 * SIZE[0] * SIZE[1] * 4  # bytes of ten frames
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    """Light that rises without a bend for a while, and then trembles."""
+    draws = np.random.default_rng(3)
+    ramp = 0.2 + 0.01 * np.arange(30)[:, None, None] * np.ones((1, *SIZE[::-1]))
+    wild = ramp[-1] * np.exp(draws.normal(0, 0.3, (70, *SIZE[::-1])))
+    path = tmp_path / "clip.npy"
+    np.save(path, np.concatenate([ramp, wild]).astype(np.float32))
+    return path
+
+
+def made(clip: Path, folder: Path, **options: Any) -> dict[str, Any]:
+    return convert(clip, folder, **{"sensor": SPEC, "effects": "auto", **QUIET, **options})
+
+
+def gone(manifest: dict[str, Any]) -> list[str]:
+    return [row["effect"] for row in manifest["plan"][""]["rows"] if row["fate"] != "kept"]
+
+
+def recipe(clip: Path) -> Recipe:
+    return Recipe.of(clip, SPEC, fps=200, upsample="none", cuts="keep")
+
+
+def events_of(folder: Path) -> Events:
+    return Events.concatenate(list(read_events(folder)))
+
+
+def same_events(one: Path, other: Path) -> bool:
+    return (one / "events.h5").read_bytes() == (other / "events.h5").read_bytes()
+
+
+def test_a_clip_that_is_held_is_planned_as_a_whole(clip: Path, tmp_path: Path) -> None:
+    for tolerance in (0.001, 0.02, 0.3):
+        manifest = made(clip, tmp_path / f"{tolerance}", tolerance=tolerance)
+        plan = plans_of(recipe(clip), "auto", tolerance)[""]
+        assert manifest["plan"][""] == json.loads(json.dumps(plan.describe()))
+        assert manifest["sensor"]["parameters"] == plan.spec.model_dump(mode="json")
+        assert manifest["asked"]["sensor"]["parameters"] == SPEC.model_dump(mode="json")
+
+
+def test_what_turns_out_to_matter_comes_back_from_the_beginning(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second pole is left out for the ramp; the recording of all of it has it from its first event on."""
+    monkeypatch.setattr(planning, "HELD", SOME)
+    first = Planner(recipe(clip), 0.02)
+    first.begin()
+    assert first.plans[""].gone == ("follower",)
+    reports: list[int] = []
+    manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda _, done: reports.append(done.frames))
+    made(clip, tmp_path / "all", effects="all")
+    assert gone(manifest) == [] and reports.count(10) == 2 and reports[-1] == 100
+    assert same_events(tmp_path / "auto", tmp_path / "all")
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("held", [1, SOME, 7 * SOME])
+def test_bounds_hold_for_the_whole_clip_however_much_is_held(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tolerance: float, held: int
+) -> None:
+    monkeypatch.setattr(planning, "HELD", held)
+    manifest = made(clip, tmp_path / "auto", tolerance=tolerance)
+    made(clip, tmp_path / "all", effects="all")
+    plan = manifest["plan"][""]
+    whole = {row.effect: row.omission.distance for row in plans_of(recipe(clip))[""].rows}
+    assert plan["distance"] <= tolerance
+    for row in plan["rows"]:
+        assert row["fate"] == "kept" or row["distance"] == whole[row["effect"]]
+    sides = [events_of(tmp_path / name) for name in ("auto", "all")]
+    assert distance(*sides, SIZE) <= plan["distance"]
+
+
+def test_light_is_made_once_where_the_first_plans_hold(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planning, "HELD", SOME)
+    times = []
+
+    def counted(*arguments: Any) -> Any:
+        times.append(arguments)
+        return instants(*arguments)
+
+    monkeypatch.setattr(planning, "instants", counted)
+    assert gone(made(clip, tmp_path / "wide", tolerance=1.0)) == ["photoreceptor", "follower"] and len(times) == 1
+    assert gone(made(clip, tmp_path / "none", tolerance=0.0)) == [] and len(times) == 2
+
+
+def test_of_a_camera_of_which_all_is_kept_no_more_is_measured(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planning, "HELD", SOME)
+    planner = Planner(recipe(clip), 0.0)
+    planner.begin()
+    seen = [planner.see(instant, index) for index, instant in enumerate(planner.instants())]
+    assert len(seen) == 100 and not any(seen) and not planner.finish() and planner.looked == 10
+
+
+def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planning, "HELD", SOME)
+    asked = iter([False] * 37 + [True] + [False] * 500)
+    manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda *_: next(asked))
+    assert manifest["counts"]["frames"] == 39 and gone(manifest) == []
+
+
+def test_a_rig_is_planned_camera_by_camera(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planning, "HELD", SOME)
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[[camera]]\nname = "one"\nkind = "dvs"\n[[camera]]\nname = "two"\nkind = "cis"\n')
+    manifest = made(clip, tmp_path / "auto", rig=rig, cis="phone", sensor="paper", tolerance=0.02)
+    alone = made(clip, tmp_path / "all", rig=rig, cis="phone", sensor="paper", effects="all")
+    assert set(manifest["plan"]) == {"one", "two"}
+    assert manifest["asked"]["cameras"].keys() == manifest["cameras"].keys() == alone["cameras"].keys()
+    again = made(clip, tmp_path / "auto", rig=rig, cis="phone", sensor="paper", tolerance=0.02, resume=True)
+    assert again == manifest
+
+
+def test_a_finished_recording_is_known_again(clip: Path, tmp_path: Path) -> None:
+    manifest = made(clip, tmp_path / "auto", tolerance=0.3)
+    assert gone(manifest) and made(clip, tmp_path / "auto", tolerance=0.3, resume=True) == manifest
+    with pytest.raises(Exception, match=r"asked.tolerance"):
+        made(clip, tmp_path / "auto", tolerance=0.2, resume=True)
+
+
+class Pipe(io.RawIOBase):
+    """A pipe whose reads come in pieces of some size."""
+
+    def __init__(self, data: bytes, piece: int):
+        self.buffer, self._data, self._piece = self, io.BytesIO(data), piece
+
+    def isatty(self) -> bool:
+        return False
+
+    def readable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        return self._data.read(self._piece if size < 0 else min(size, self._piece))
+
+
+@pytest.fixture
+def piped(clip: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Puts the clip into standard input, as Y4M."""
+    pictures = (np.minimum(np.load(clip), 1.0) * 255).astype(np.uint8)
+    head = f"YUV4MPEG2 W{SIZE[0]} H{SIZE[1]} F200:1 Ip A1:1 Cmono\n".encode()
+    data = head + b"".join(b"FRAME\n" + picture.tobytes() for picture in pictures)
+    return lambda piece: monkeypatch.setattr(sys, "stdin", Pipe(data, piece))
+
+
+@pytest.mark.parametrize("held", [SOME, planning.HELD])
+def test_a_pipe_is_planned_if_it_ends_while_it_is_held(
+    piped: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: int
+) -> None:
+    """Whatever the pieces that it comes in."""
+    monkeypatch.setattr(planning, "HELD", held)
+    options: dict[str, Any] = {"fps": None, "transfer": "linear", "tolerance": 0.5}
+    manifests = []
+    for piece in (1 << 20, 997):
+        piped(piece)
+        manifests.append(made(Path("-"), tmp_path / f"{piece}", **options))
+    piped(1 << 20)
+    made(Path("-"), tmp_path / "all", **options | {"effects": "all"})
+    assert same_events(tmp_path / f"{1 << 20}", tmp_path / "997")
+    assert manifests[0]["plan"] == manifests[1]["plan"]
+    if held == SOME:
+        assert gone(manifests[0]) == [] and same_events(tmp_path / "997", tmp_path / "all")
+        assert "passes once" in manifests[0]["plan"][""]["rows"][0]["why"]
+    else:
+        assert gone(manifests[0]) == ["photoreceptor", "follower"]
+        sides = [events_of(tmp_path / name) for name in ("997", "all")]
+        assert 0 < distance(*sides, SIZE) <= manifests[0]["plan"][""]["distance"] <= 0.5
+
+
+def test_an_array_that_passes_once_is_read_once(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = []
+
+    class Once(ArrayStack):
+        rewindable = False
+
+        def frames(self, start: int = 0) -> Any:
+            assert not opened, "read again"
+            opened.append(start)
+            return super().frames(start)
+
+    made(clip, tmp_path / "all", effects="all")
+    monkeypatch.setattr("vid2ev.sources.arrays.ArrayStack", Once)
+    for held in (planning.HELD, SOME):
+        monkeypatch.setattr(planning, "HELD", held)
+        opened.clear()
+        manifest = made(clip, tmp_path / f"{held}", tolerance=0.3)
+        sides = [events_of(tmp_path / name) for name in (f"{held}", "all")]
+        assert distance(*sides, SIZE) <= manifest["plan"][""]["distance"] <= 0.3
+        assert bool(gone(manifest)) == (held != SOME)

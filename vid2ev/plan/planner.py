@@ -1,0 +1,166 @@
+"""`Planner`: the plans of a recording, made while it is made.
+
+Light is made once, for both the look at it and the sensors.  What the cameras see at first is held until it is some
+`HELD`; its plans, within a share of the tolerance, are what the recording begins with.  Each later instant is measured
+as it goes by, and the same plans are asked for again, of all that was seen so far: now and then, and at the end.  If
+what is left out is no longer within the tolerance, the plans leave out less, the recording begins again, and light is
+not measured twice.  What is kept once is kept, and a camera of which all is kept is not looked at any more.
+
+**It is sound**: a recording is made by one plan from its beginning to its end, and in the end that plan's bounds hold
+for the scene of the whole clip, as if it had been looked at first.
+
+**It can be repeated**: what is decided, and where, follows from the light alone.  `looked` says how far; of a recording
+that is taken up again, so much is looked at again, and the decisions are the same.
+
+**Sources that pass once** are planned only if they end while they are held; else all is kept.  Effects cannot come
+and go while a recording is made, not even if each chunk of light is measured before the sensors see it.  Where
+thresholds differ from pixel to pixel or crossing to crossing, as in all real sensors, two recordings of a pixel that
+disagree about one event go on with other levels, and an effect that comes back does not bring them together
+(`stream.scene`: echo).  Let the chance of that be q > 0 in some pixel, however few events it has had: if from then on
+that pixel alone sees light that changes, the distance of the whole tends, with probability q, to that of recordings
+with nothing in common, though nothing is left out any more.  So no bound on what was is one on the whole, unless q is 0
+in every pixel.  Of an effect that costs something a chunk can show that of the refractory period alone, which costs
+less than measuring does.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import replace
+
+from vid2ev.instants import Instant, instants
+from vid2ev.plan.plan import Plan, check_tolerance
+from vid2ev.plan.recordings import PASSES, Look, left_of, plans_unseen
+from vid2ev.recipe import Recipe
+
+HELD = 1 << 27  # bytes of light, at least an instant
+SPARE = 0.5  # share of the tolerance for the first plans: what comes may be worse
+REVISIONS = 2  # after so many all is kept: each costs the recording so far
+
+
+class Planner:
+    """The plans of a recipe's cameras within a tolerance of the distance: `begin`, then go through `instants` and show
+    each to `see`; after the last, `finish`.  Where these return True the recording has to begin again by new `plans`.
+
+    `threads` measure, and change nothing but the time it takes.
+    """
+
+    def __init__(self, recipe: Recipe, tolerance: float, threads: int = 1):
+        check_tolerance(tolerance)
+        self.recipe, self.tolerance = recipe, tolerance
+        self.plans: dict[str, Plan] = {}
+        self.looked, self.ended = 0, False  # instants, from the first on; and whether the last of them was the last
+        self._look, self._looking = Look(recipe, threads), {mount.name for mount in recipe.mounts}
+        self._bytes, self._due, self._revisions = 0, 2 * HELD, 0
+        self._held: deque[Instant] = deque()
+        self._rest: Generator[Instant] | None = None
+
+    @property
+    def left(self) -> Recipe:
+        """The recipe with what the plans leave of the sensors."""
+        return left_of(self.recipe, self.plans)
+
+    def begin(self, looked: int = 0, ended: bool = False) -> None:
+        """Make the first plans; those at which another planner was that had looked so far."""
+        if self.plans:
+            return
+        self._rest = instants(self.recipe)
+        more = self._hold(self._rest)
+        if not self.looked or (more and not self.recipe.source.rewindable):
+            self.plans = plans_unseen(self.recipe, PASSES, "auto", self.tolerance)
+        else:
+            self._decide(SPARE if more else 1.0)
+        if not more or not self.recipe.source.rewindable:
+            self._looking.clear()
+        if self._looking and looked > self.looked:
+            self._catch_up(self._rest, looked)
+        if ended:
+            self.finish()
+            self._let_go()
+
+    def instants(self, frame: int = 0) -> Generator[Instant]:
+        """What the cameras see at source frame `frame`, and after it."""
+        if frame > 0:
+            self._let_go()
+        held, rest, self._held, self._rest = self._held, self._rest, deque(), None
+        rest = rest or instants(self.recipe, frame)
+        with closing(rest):
+            while held:
+                yield held.popleft()
+            yield from rest
+
+    def see(self, instant: Instant, index: int) -> bool:
+        """Look at an instant, the one after so many of the recording; returns whether there are new plans."""
+        if not self._looking or index < self.looked:
+            return False
+        self._measure(instant)
+        if self._bytes < self._due:
+            return False
+        self._due *= 2
+        return self._revise()
+
+    def finish(self) -> bool:
+        """After the last instant: the plans of all that was seen; returns whether they are new."""
+        self.ended = True
+        return bool(self._looking) and self._revise()
+
+    def _hold(self, coming: Generator[Instant]) -> bool:
+        """Look at the first instants and keep them; returns whether there may be more."""
+        for instant in coming:
+            self._held.append(instant)
+            self._measure(instant)
+            if self._bytes >= HELD:
+                return True
+        return False
+
+    def _catch_up(self, coming: Generator[Instant], looked: int) -> None:
+        """Look at as many instants as were looked at."""
+        for instant in coming:
+            self.see(instant, self.looked)
+            if not self._looking or self.looked >= looked:
+                break
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Drop what is held."""
+        if self._rest is not None:
+            self._rest.close()
+        self._held, self._rest = deque(), None
+
+    def _measure(self, instant: Instant) -> None:
+        self._look.see(instant)
+        self._bytes += sum(frame.light.nbytes for frame in instant.frames)
+        self.looked += 1
+
+    def _decide(self, share: float) -> None:
+        found = self._look.plans("auto", share * self.tolerance)
+        self.plans = {name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()}
+        self._keep_looking()
+
+    def _revise(self) -> bool:
+        """Make the plans again, of no more than they leave out; returns whether any of them is another."""
+        among: dict[str, Sequence[str]] = {name: self.plans[name].gone for name in self._looking}
+        found = self._look.plans("auto", self.tolerance, among)
+        new = [name for name, plan in found.items() if plan.spec != self.plans[name].spec]
+        if new:
+            self._revisions += 1
+            for name in new:
+                among[name] = _steady(self.plans[name], found[name]) if self._revisions < REVISIONS else ()
+            found = self._look.plans("auto", self.tolerance, among)
+        self.plans |= found
+        self._keep_looking()
+        return bool(new)
+
+    def _keep_looking(self) -> None:
+        """Only at what cameras see of which something is left out."""
+        for name in [name for name in self._looking if not self.plans[name].gone]:
+            self._look.forget(name)
+            self._looking.discard(name)
+
+
+def _steady(plan: Plan, later: Plan) -> list[str]:
+    """What a plan leaves out whose place is taken by the same in a later one."""
+    took = {row.effect: row.omission for row in plan.rows if row.effect in plan.gone}
+    return [row.effect for row in later.rows if row.effect in took and row.omission.replace == took[row.effect].replace]
