@@ -15,6 +15,7 @@ from against.clips import clean
 
 from vid2ev import convert, read_events
 from vid2ev.instants import instants
+from vid2ev.plan import measure as measuring
 from vid2ev.plan import planner as planning
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import plans_of
@@ -28,6 +29,19 @@ SIZE = (40, 30)
 SPEC = clean(photoreceptor_tau_us=300, follower_tau_us=100, random_phase=True)
 QUIET: dict[str, Any] = {"upsample": "none", "preview": False, "fps": 200, "cuts": "keep"}
 SOME = 10 * SIZE[0] * SIZE[1] * 4  # bytes of ten frames
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Has so many bytes of light held, of clips whose measuring is free."""
+
+    def hold(count: int) -> None:
+        monkeypatch.setattr(planning, "HELD", count)
+        monkeypatch.setattr(planning, "SPARE", 0.5)
+        monkeypatch.setattr(measuring, "LOOK_NS", 0.0)
+        monkeypatch.setattr(measuring, "PUSHED_NS", 0.0)
+
+    return hold
 
 
 @pytest.fixture
@@ -71,10 +85,10 @@ def test_a_clip_that_is_held_is_planned_as_a_whole(clip: Path, tmp_path: Path) -
 
 
 def test_what_turns_out_to_matter_comes_back_from_the_beginning(
-    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    clip: Path, tmp_path: Path, held: Callable[[int], None]
 ) -> None:
     """The second pole is left out for the ramp; the recording of all of it has it from its first event on."""
-    monkeypatch.setattr(planning, "HELD", SOME)
+    held(SOME)
     first = Planner(recipe(clip), 0.02)
     first.begin()
     assert first.plans[""].gone == ("follower",)
@@ -86,11 +100,11 @@ def test_what_turns_out_to_matter_comes_back_from_the_beginning(
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
-@pytest.mark.parametrize("held", [1, SOME, 7 * SOME])
+@pytest.mark.parametrize("count", [1, SOME, 7 * SOME])
 def test_bounds_hold_for_the_whole_clip_however_much_is_held(
-    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tolerance: float, held: int
+    clip: Path, tmp_path: Path, tolerance: float, count: int, held: Callable[[int], None]
 ) -> None:
-    monkeypatch.setattr(planning, "HELD", held)
+    held(count)
     manifest = made(clip, tmp_path / "auto", tolerance=tolerance)
     made(clip, tmp_path / "all", effects="all")
     plan = manifest["plan"][""]
@@ -103,9 +117,9 @@ def test_bounds_hold_for_the_whole_clip_however_much_is_held(
 
 
 def test_light_is_made_once_where_the_first_plans_hold(
-    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    clip: Path, tmp_path: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(planning, "HELD", SOME)
+    held(SOME)
     times = []
 
     def counted(*arguments: Any) -> Any:
@@ -117,25 +131,40 @@ def test_light_is_made_once_where_the_first_plans_hold(
     assert gone(made(clip, tmp_path / "none", tolerance=0.0)) == [] and len(times) == 2
 
 
-def test_of_a_camera_of_which_all_is_kept_no_more_is_measured(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planning, "HELD", SOME)
+def test_of_a_camera_of_which_all_is_kept_no_more_is_measured(clip: Path, held: Callable[[int], None]) -> None:
+    held(SOME)
     planner = Planner(recipe(clip), 0.0)
     planner.begin()
     seen = [planner.see(instant, index) for index, instant in enumerate(planner.instants())]
     assert len(seen) == 100 and not any(seen) and not planner.finish() and planner.looked == 10
 
 
-def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
-    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("pushed_ns", "left_out"), [(5.0, True), (20.0, False)])
+def test_of_what_goes_on_nothing_is_left_out_that_saves_less_than_measuring_takes(
+    clip: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch, pushed_ns: float, left_out: bool
 ) -> None:
-    monkeypatch.setattr(planning, "HELD", SOME)
+    """On the ramp the second pole takes 0.5 ns per pixel and frame, and 10 ns for each of 0.27 events."""
+    held(SOME)
+    whole = Planner(recipe(clip), 0.02)
+    whole.begin()
+    monkeypatch.setattr(measuring, "PUSHED_NS", pushed_ns * 0.27)
+    planner = Planner(recipe(clip), 0.02)
+    planner.begin()
+    assert whole.plans[""].gone and bool(planner.plans[""].gone) == left_out
+    assert left_out or planner.plans[""].distance == 0.0
+
+
+def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
+    clip: Path, tmp_path: Path, held: Callable[[int], None]
+) -> None:
+    held(SOME)
     asked = iter([False] * 37 + [True] + [False] * 500)
     manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda *_: next(asked))
     assert manifest["counts"]["frames"] == 39 and gone(manifest) == []
 
 
-def test_a_rig_is_planned_camera_by_camera(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planning, "HELD", SOME)
+def test_a_rig_is_planned_camera_by_camera(clip: Path, tmp_path: Path, held: Callable[[int], None]) -> None:
+    held(SOME)
     rig = tmp_path / "rig.toml"
     rig.write_text('[[camera]]\nname = "one"\nkind = "dvs"\n[[camera]]\nname = "two"\nkind = "cis"\n')
     manifest = made(clip, tmp_path / "auto", rig=rig, cis="phone", sensor="paper", tolerance=0.02)
@@ -178,12 +207,12 @@ def piped(clip: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     return lambda piece: monkeypatch.setattr(sys, "stdin", Pipe(data, piece))
 
 
-@pytest.mark.parametrize("held", [SOME, planning.HELD])
+@pytest.mark.parametrize("count", [SOME, planning.HELD])
 def test_a_pipe_is_planned_if_it_ends_while_it_is_held(
-    piped: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: int
+    piped: Callable[[int], None], tmp_path: Path, held: Callable[[int], None], count: int
 ) -> None:
     """Whatever the pieces that it comes in."""
-    monkeypatch.setattr(planning, "HELD", held)
+    held(count)
     options: dict[str, Any] = {"fps": None, "transfer": "linear", "tolerance": 0.5}
     manifests = []
     for piece in (1 << 20, 997):
@@ -193,7 +222,7 @@ def test_a_pipe_is_planned_if_it_ends_while_it_is_held(
     made(Path("-"), tmp_path / "all", **options | {"effects": "all"})
     assert same_events(tmp_path / f"{1 << 20}", tmp_path / "997")
     assert manifests[0]["plan"] == manifests[1]["plan"]
-    if held == SOME:
+    if count == SOME:
         assert gone(manifests[0]) == [] and same_events(tmp_path / "997", tmp_path / "all")
         assert "passes once" in manifests[0]["plan"][""]["rows"][0]["why"]
     else:
@@ -202,7 +231,9 @@ def test_a_pipe_is_planned_if_it_ends_while_it_is_held(
         assert 0 < distance(*sides, SIZE) <= manifests[0]["plan"][""]["distance"] <= 0.5
 
 
-def test_an_array_that_passes_once_is_read_once(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_array_that_passes_once_is_read_once(
+    clip: Path, tmp_path: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     opened = []
 
     class Once(ArrayStack):
@@ -215,10 +246,10 @@ def test_an_array_that_passes_once_is_read_once(clip: Path, tmp_path: Path, monk
 
     made(clip, tmp_path / "all", effects="all")
     monkeypatch.setattr("vid2ev.sources.arrays.ArrayStack", Once)
-    for held in (planning.HELD, SOME):
-        monkeypatch.setattr(planning, "HELD", held)
+    for count in (planning.HELD, SOME):
+        held(count)
         opened.clear()
-        manifest = made(clip, tmp_path / f"{held}", tolerance=0.3)
-        sides = [events_of(tmp_path / name) for name in (f"{held}", "all")]
+        manifest = made(clip, tmp_path / f"{count}", tolerance=0.3)
+        sides = [events_of(tmp_path / name) for name in (f"{count}", "all")]
         assert distance(*sides, SIZE) <= manifest["plan"][""]["distance"] <= 0.3
-        assert bool(gone(manifest)) == (held != SOME)
+        assert bool(gone(manifest)) == (count != SOME)

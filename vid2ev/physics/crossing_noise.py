@@ -11,6 +11,7 @@ Source: the paper, section II.A: time-variant Gaussian noise, drawn "at each pot
 from __future__ import annotations
 
 import math
+from functools import cache
 from statistics import NormalDist
 from typing import Any
 
@@ -22,6 +23,8 @@ from vid2ev.physics.mismatch import FLOOR, clipped
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import CROSSING, normal_pair, philox
 from vid2ev.stream.scene import Omission, Scene
+
+STEPS = 256  # pixels that stand for all
 
 
 class CrossingNoise(BaseModel, frozen=True, extra="forbid"):
@@ -44,19 +47,29 @@ def chances_below(level: float, mean: float, spec: Any) -> np.ndarray:
     """The share of the thresholds of a pixel, of this mean [nat], that are at or below a level [nat]: of 256 pixels
     that stand for all, as often as their thresholds ask for."""
 
-    def clip(mean: float, sigma: float, z: float) -> float:
-        limit = min(4.0, (1.0 - FLOOR) * mean / sigma) if sigma > 0 else 0.0
-        return mean + sigma * min(max(z, -limit), limit)
+    if level < 0.0:
+        return np.zeros(STEPS)
+    pixels = _limited(np.full(STEPS, mean), spec.mismatch, _deviates())
+    reached = level >= _limited(pixels, spec.crossing_noise, np.full(STEPS, -np.inf))
+    chances = reached.astype(np.float64)
+    if spec.crossing_noise > 0:
+        normal = NormalDist()
+        for k in np.flatnonzero(reached):
+            chances[k] = normal.cdf((level - pixels[k]) / spec.crossing_noise)
+    return np.minimum(chances * np.maximum(mean / pixels, 1.0), 1.0)
 
-    normal, steps = NormalDist(), 256
-    chances = np.zeros(steps)
-    for k in range(steps):
-        pixel = clip(mean, spec.mismatch, normal.inv_cdf((k + 0.5) / steps) if k else -math.inf)
-        least = clip(pixel, spec.crossing_noise, -math.inf)
-        if level >= least:
-            chances[k] = normal.cdf((level - pixel) / spec.crossing_noise) if spec.crossing_noise > 0 else 1.0
-            chances[k] = min(chances[k] * max(mean / pixel, 1.0), 1.0)
-    return chances
+
+def _limited(means: np.ndarray, sigma: float, z: np.ndarray) -> np.ndarray:
+    """Means + sigma z, as `clipped` has it."""
+    limits = np.minimum(4.0, (1.0 - FLOOR) * means / sigma) if sigma > 0 else np.zeros(STEPS)
+    return means + sigma * np.clip(z, -limits, limits)
+
+
+@cache
+def _deviates() -> np.ndarray:
+    """Standard normal numbers that stand for all, the least first."""
+    normal = NormalDist()
+    return np.array([-np.inf, *(normal.inv_cdf((k + 0.5) / STEPS) for k in range(1, STEPS))])
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

@@ -20,6 +20,7 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.scene import DISTANCE_TAU_S, OF_TILES, SPREAD, Scene
 
 BRIGHTNESS_EVERY = 8  # frames
+LOOK_NS, PUSHED_NS = 1.1, 12.0  # of one thread: per pixel and frame, and for one that is pushed, more
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 
 
@@ -85,6 +86,12 @@ class Measure:
             brightness=self._brightness.copy(),
             **dict(zip(OF_TILES, self._found.tiles.T.copy(), strict=True)),
         )
+
+    def costs(self) -> tuple[float, float]:
+        """What measuring takes [ns per pixel and frame, of one thread], and how many events a sensor sends in that."""
+        scene = self.scene()
+        pushed = float(scene.pushed_s.sum()) / max(scene.seconds * scene.pixels, 1e-300)
+        return LOOK_NS + PUSHED_NS * pushed, scene.events / (scene.pixels * scene.frames)
 
     def _advance(self, light: np.ndarray, dt_s: float) -> None:
         delay, slowest = sum(self._taus_s), max(self._taus_s, default=0.0)

@@ -4,7 +4,10 @@ Light is made once, for both the look at it and the sensors.  What the cameras s
 `HELD`; its plans, within a share of the tolerance, are what the recording begins with.  Each later instant is measured
 as it goes by, and the same plans are asked for again, of all that was seen so far: now and then, and at the end.  If
 what is left out is no longer within the tolerance, the plans leave out less, the recording begins again, and light is
-not measured twice.  What is kept once is kept, and a camera of which all is kept is not looked at any more.
+not measured twice.
+
+What is kept once is kept, and a camera of which all is kept is not looked at any more.  So it is at once if what would
+be left out saves no more than measuring on would take: a bound on the whole clip asks for all of it to be measured.
 
 **It is sound**: a recording is made by one plan from its beginning to its end, and in the end that plan's bounds hold
 for the scene of the whole clip, as if it had been looked at first.
@@ -35,8 +38,8 @@ from vid2ev.plan.plan import Plan, check_tolerance
 from vid2ev.plan.recordings import PASSES, Look, left_of, plans_unseen
 from vid2ev.recipe import Recipe
 
-HELD = 1 << 27  # bytes of light, at least an instant
-SPARE = 0.5  # share of the tolerance for the first plans: what comes may be worse
+HELD = 1 << 26  # bytes of light, at least an instant
+SPARE = 0.1  # share of the tolerance for the first plans: what comes may be worse, and to begin again is dear
 REVISIONS = 2  # after so many all is kept: each costs the recording so far
 
 
@@ -71,7 +74,7 @@ class Planner:
         if not self.looked or (more and not self.recipe.source.rewindable):
             self.plans = plans_unseen(self.recipe, PASSES, "auto", self.tolerance)
         else:
-            self._decide(SPARE if more else 1.0)
+            self._decide(more)
         if not more or not self.recipe.source.rewindable:
             self._looking.clear()
         if self._looking and looked > self.looked:
@@ -134,8 +137,12 @@ class Planner:
         self._bytes += sum(frame.light.nbytes for frame in instant.frames)
         self.looked += 1
 
-    def _decide(self, share: float) -> None:
-        found = self._look.plans("auto", share * self.tolerance)
+    def _decide(self, more: bool) -> None:
+        """The first plans; there may be `more` to see."""
+        found = self._look.plans("auto", self.tolerance * (SPARE if more else 1.0))
+        if more and any(plan.gone for plan in found.values()):
+            among = {name: plan.gone if self._look.pays(name, plan) else () for name, plan in found.items()}
+            found = self._look.plans("auto", self.tolerance * SPARE, among)
         self.plans = {name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()}
         self._keep_looking()
 
