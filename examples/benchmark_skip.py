@@ -33,7 +33,8 @@ from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
 from vid2ev.stream import Events
-from vid2ev.stream.still import Still, still_strips
+from vid2ev.stream.still import Still
+from vid2ev.upsample.stillness import still_strips
 
 PRESETS = ("ideal", "v2e-clean", "paper", "v2e-noisy")
 FRAME_NS = 1_000_000

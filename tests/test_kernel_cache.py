@@ -21,3 +21,14 @@ def test_two_processes_that_compile_at_once_never_get_each_others_code(tmp_path,
         assert mine.load("one variant") in ("its code", None)
         assert mine.load("another variant") in ("other code", None)
     assert mine.load("one variant") == "its code"
+
+
+def test_a_kernel_that_cannot_be_kept_runs_all_the_same(tmp_path, monkeypatch):
+    cache = IndexDataCacheFile(str(tmp_path), "walk", "stamp")
+
+    def full(*_):
+        raise OSError(27, "File too large")
+
+    monkeypatch.setattr(cache, "_save_data", full)
+    cache.save("a variant", "its code")
+    assert cache.load("a variant") is None

@@ -24,6 +24,7 @@ from vid2ev.sight import Sight, Stage, arriving
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.still import Still
 from vid2ev.truth import Truth, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
@@ -82,7 +83,7 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
     sight = Sight(recipe.rig.source, [mount], recipe.plane_m)
     if recipe.source.dense and not sight.free:
         stage = Stage(recipe.source, [mount])
-        seen = ((t_ns, stage.pictures(t_ns)[0].light) for t_ns in stage.instants_ns)
+        seen = ((t_ns, stage.pictures(t_ns)[0][0].light) for t_ns in stage.instants_ns)
     else:
         seen = ((frame.t_ns, sight.views(frame)[0].light) for frame in recipe.source.frames())
     for t_ns, light in seen:
@@ -110,12 +111,20 @@ def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
     """What each camera sees of a scene."""
     stage, wanted = Stage(recipe.source, recipe.mounts), recipe.truth
     due = with_next(stage.instants_ns, wanted) if wanted else {}
+    before: tuple[Frame, ...] = ()
     for t_ns in stage.instants_ns[start:]:
-        seen, truth = stage.pictures(t_ns), tuple[Truth, ...]()
+        (seen, stills), truth = zip(*stage.pictures(t_ns), strict=True), tuple[Truth, ...]()
         if wanted and t_ns in due:
             truth = wanted.of_pictures(stage.world, t_ns, due[t_ns], seen, recipe.mounts)
         lights = [picture.light for picture in seen]
-        yield Instant(arriving(Frame(lights[0], t_ns), lights, recipe.mounts, recipe.bayer), t_ns, truth=truth)
+        frames = arriving(Frame(lights[0], t_ns), lights, recipe.mounts, recipe.bayer)
+        if before:  # (what reaches a pixel is a function of the light there)
+            frames = tuple(
+                replace(frame, still=None if still is None else Still(last.light, still))
+                for frame, last, still in zip(frames, before, stills, strict=True)
+            )
+        yield Instant(frames, t_ns, truth=truth)
+        before = frames
 
 
 def _light(recipe: Recipe, start: int) -> Generator[tuple[Frame, int, float | None]]:

@@ -15,17 +15,28 @@ import contextlib
 import hashlib
 import uuid
 from pathlib import Path
+from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
-_COMPILED = ("physics", "kernels", "scenes/rays")
+_COMPILED = ("physics", "kernels", "scenes/rays", "stream", "upsample")
 _MARK = uuid.uuid4().hex[:8]
 
 
+_save = IndexDataCacheFile.save
+
+
 def mark_our_kernels() -> None:
-    """Let this process's compiled kernels have names that no other process writes."""
+    """Let this process's compiled kernels have names that no other process writes; where they cannot be written, as on
+    a full disk, they are compiled again the next time."""
     IndexDataCacheFile._data_name = lambda cache, number: f"{Path(cache._index_name).stem}.{_MARK}.{number}.nbc"  # type: ignore[method-assign]
+    IndexDataCacheFile.save = _save_if_possible  # type: ignore[method-assign]
+
+
+def _save_if_possible(cache: IndexDataCacheFile, key: Any, data: Any) -> None:
+    with contextlib.suppress(OSError):
+        _save(cache, key, data)
 
 
 def drop_stale_kernels() -> None:

@@ -78,14 +78,15 @@ class Stage:
         self._reels: dict[tuple[object, ...], Reel] = {}
         self.instants_ns = scene.instants_between(*(source.ends_ns() if isinstance(source, Cut) else (None, None)))
 
-    def pictures(self, t_ns: int) -> list[Picture]:
-        """What each camera sees at an instant; cameras with the same view share it."""
-        seen: dict[tuple[object, ...], Picture] = {}
+    def pictures(self, t_ns: int) -> list[tuple[Picture, np.ndarray | None]]:
+        """What each camera sees at an instant, and which strips have not changed since the last one that was asked for
+        (`scenes.reel`); cameras with the same view share it."""
+        seen: dict[tuple[object, ...], tuple[Picture, np.ndarray | None]] = {}
         keys = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in self._mounts]
         for key, mount in zip(keys, self._mounts, strict=True):
             if key not in seen:
                 reel = self._reels.setdefault(key, Reel(self.world, mount.intrinsics, mount.pose))
-                seen[key], _ = reel.picture(t_ns)
+                seen[key] = reel.picture(t_ns)
         return [seen[key] for key in keys]
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from vid2ev import load_sensor
 from vid2ev.sensors.dvs import Dvs, DvsSpec
-from vid2ev.stream.still import Still, still_strips
+from vid2ev.stream.still import Still
+from vid2ev.upsample.stillness import still_strips
 
 SIZE = (96, 70)  # three blocks of eight strips, two strips and a part of one
 VIDEOS = Path(__file__).parents[2] / ".." / "shared" / "data" / "videos"

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_any_world import TEXTURES, point, surfaces, things, turn, worlds
 
+from vid2ev.instants import instants
+from vid2ev.recipe import Recipe
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.reel import Reel
@@ -17,9 +19,41 @@ from vid2ev.scenes.render import render
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.snapshot import Lamp, Shape, Snapshot, Surface, Thing
 from vid2ev.scenes.world import World
-from vid2ev.stream.still import still_strips
+from vid2ev.upsample.stillness import still_strips
 
 CAMERA = Intrinsics.of_field((150, 70), 80)
+RIG = """
+[[camera]]
+name = "left"
+kind = "dvs"
+sensor = "ideal"
+
+[[camera]]
+name = "right"
+kind = "cis"
+translation_mm = [12, 0, 0]
+"""
+BALL = """
+[scene]
+duration_s = 0.02
+ambient = 1
+
+[camera]
+size = [320, 96]
+
+[[objects]]
+name = "wall"
+kind = "plane"
+size_m = 20
+trajectory = { kind = "fixed", position_m = [0, 0, 5] }
+
+[[objects]]
+name = "ball"
+kind = "sphere"
+size_m = 0.3
+colour = [0.2, 0.4, 0.1]
+trajectory = { kind = "straight", position_m = [0.2, 0.1, 4], velocity_m_s = [2, 0, 0] }
+"""
 HOME = Pose.of((0, 0, 0), (0, 0, 0))
 nudge = st.tuples(*[st.floats(-0.3, 0.3)] * 3)
 
@@ -141,3 +175,20 @@ def test_a_picture_stays_as_it_is_when_the_next_is_painted():
     kept = [plane.copy() for plane in one]
     reel.render(moved(first, 3, (0.1, 0, 0), (0, 0, 0)), HOME)
     assert all(np.array_equal(plane, copy) for plane, copy in zip(one, kept, strict=True))
+
+
+@pytest.mark.parametrize(("rig", "bayer"), [(None, None), (RIG, None), (RIG, "RGGB")])
+def test_every_camera_is_told_what_stands_still(rig, bayer, tmp_path):
+    (tmp_path / "rig.toml").write_text(rig or "")
+    (tmp_path / "ball.toml").write_text(BALL)
+    rig = {"rig": tmp_path / "rig.toml"} if rig else {}
+    recipe = Recipe.of(f"scene:{tmp_path / 'ball.toml'}", "paper", (), bayer=bayer, **rig)
+    before, told = None, 0
+    for instant in instants(recipe):
+        for k, frame in enumerate(instant.frames):
+            if before is not None:
+                assert frame.still is not None and frame.still.before is before[k].light
+                assert not (frame.still.strips & ~still_strips(before[k].light, frame.light)).any()
+                told += frame.still.strips.sum()
+        before = instant.frames
+    assert told > 0

@@ -113,14 +113,17 @@ def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, 
 @inner
 def open_eyes(block, scratch, light, lut, planes, p0, size, naps, flags, num, iv, tally):
     """Light of what is awake of a block into the scratch; returns how many of its strips sleep."""
-    if not naps.wanted or naps.told.size == 0:
+    told, asleep = naps.wanted and naps.told.size > 0, 0
+    if not told:
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
-    asleep = 0
     if naps.wanted and len(flags.noise) == 0:
         asleep = doze(block, scratch, p0, size, planes.theta, naps, flags, num, iv)
+    if told and asleep == 0:
+        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+    elif told:
         first, last = 0, 0
-        while naps.told.size > 0 and last < size:
-            first, last = next_run(last, p0, size, naps.wanted, naps.state)
+        while last < size:
+            first, last = next_run(last, p0, size, True, naps.state)
             read_light(scratch[first:], light, lut, planes.shade, p0 + first, last - first, flags, tally)
     return asleep
 

@@ -42,6 +42,7 @@ F = np.float32
 SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
 ROOM = NOISE0  # a plane of the scratch: where pixels sleep there is no noise
+FEW = 32  # pixels
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
 
 
@@ -104,6 +105,15 @@ def settle_down(block, scratch, strip, n, theta, naps, flags, num, iv):
 @inner
 def is_seen(seen, at, light, begin, n, flags, num):
     """Whether n pixels of light from `begin` on are those that were seen, from `at` on."""
+    few = min(n, FEW)  # (where anything changes, it mostly shows in a few)
+    if not are_seen(seen, at, light, begin, few, flags, num):
+        return False
+    return are_seen(seen, at + few, light, begin + few, n - few, flags, num)
+
+
+@inner
+def are_seen(seen, at, light, begin, n, flags, num):
+    """The same, looking at all of them."""
     # (offsets in place of slices: each slice is counted, which takes longer than to look at a strip)
     differ = np.uint32(0)
     for i in range(n):

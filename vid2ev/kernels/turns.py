@@ -55,7 +55,8 @@ def start_turns(turns, guesses, count, b):
     for k in range(count):
         lo, hi, a = guesses[G_LO + k], guesses[G_HI + k], guesses[G_A + k]
         k1, k2, rise = guesses[G_K1 + k], guesses[G_K2 + k], guesses[G_RISE + k]
-        late = balance(k1 if a < slower else k2, rise, min(a, slower), lo, hi)
+        first = (a < slower) | (slower == F(0.0))  # (the only pole, or the slower one)
+        late = balance(k1 if first else k2, rise, a if first else slower, lo, hi)
         early = balance(k2, -k1, slower - a, lo, hi)
         guesses[G_ROOT + k] = late if late > lo else (early if early > lo else F(0.5) * (lo + hi))
 

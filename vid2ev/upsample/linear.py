@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.still import Still, still_strips
+from vid2ev.stream.still import Still
 from vid2ev.upsample import Interval
+from vid2ev.upsample.stillness import still_strips
 from vid2ev.upsample.subframes import instants
 
 
