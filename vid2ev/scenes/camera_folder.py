@@ -29,6 +29,7 @@ from vid2ev.recording.pose_text import HEADER, pose_lines
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.picture_writing import writer_of
+from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.world import World
 
 TRUTH = {"depth": ("npy", "exr", "png"), "flow": ("npz", "flo", "png"), "poses": ("txt",)}  # the first by default
@@ -78,6 +79,7 @@ class CameraFolder:
     ):
         self.folder, self.world, self.contents = folder, world, contents
         self.camera = intrinsics or world.intrinsics, pose_in_rig
+        self._reel = Reel(world, *self.camera)
         self.count = 0
         self._write, self._suffix = writer_of(contents.frames)
         self._open = ExitStack()
@@ -103,7 +105,7 @@ class CameraFolder:
 
     def add(self, t_ns: int, next_ns: int | None) -> None:
         """Render and write what is seen at an instant, and the flow to the next one, if there is one."""
-        picture, number, truth = self.world.render(t_ns, *self.camera), f"{self.count:06d}", self.contents.formats
+        (picture, _), number, truth = self._reel.picture(t_ns), f"{self.count:06d}", self.contents.formats
         self._write(picture.light, self.folder / f"{number}{self._suffix}")
         self._times.write(f"{t_ns}\n")
         if "poses" in truth:
