@@ -57,7 +57,7 @@ def clip(tmp_path: Path) -> Path:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-@pytest.mark.parametrize(("tolerance", "reports", "killed_at"), [(0.02, 38 + 69, (7, 25, 60, 101)), (0.8, 69, (50,))])
+@pytest.mark.parametrize(("tolerance", "reports", "killed_at"), [(0.01, 38 + 69, (7, 25, 60, 101)), (0.8, 69, (50,))])
 def test_it_plans_on_after_a_kill_to_the_same_bytes(
     clip: Path, tmp_path: Path, tolerance: float, reports: int, killed_at: tuple[int, ...]
 ) -> None:

@@ -42,7 +42,42 @@ SCENES = {  # how much of them [s]
     "specular": 0.4,
     "spinning-shapes": 0.15,
 }
-SMALL = Rig(cameras=(Camera(name="dvs", kind="dvs", size=(120, 90)),))
+
+
+def small(width: int, height: int) -> Rig:
+    """One small event camera."""
+    return Rig(cameras=(Camera(name="dvs", kind="dvs", size=(width, height)),))
+
+
+SMALL = small(120, 90)
+DATA = VIDEOS.parent
+TINY = {"size": "96x72"}
+UNSEEN: dict[str, dict] = {  # other parts, sizes and speeds, other seeds, photographs in motion
+    "juggle, slow": {"video": VIDEOS / REAL["juggle"][0], "start": 5, "stop": 6, "size": "128x96", "slowdown": 3},
+    "cups, part": {"video": VIDEOS / REAL["cups"][0], "start": 4, "stop": 5, "crop": "640x480+300+100", **TINY},
+    "karma, fast": {"video": VIDEOS / REAL["karma"][0], "start": 7, "stop": 8, "size": "128x72", "slowdown": 0.5},
+    "cars, later": {"video": VIDEOS / REAL["cars"][0], "start": 12, "stop": 14.4, "size": "128x72"},
+    "bottles, slow": {"video": VIDEOS / REAL["bottles"][0], "start": 20, "stop": 21.2, "size": "112x63", "slowdown": 2},
+    "again, slow": {"video": VIDEOS / REAL["again"][0], "start": 1, "stop": 2, "size": "128x96", "slowdown": 4},
+    "rocket, later": {"video": VIDEOS / REAL["rocket"][0], "start": 6, "stop": 7.5, "size": "128x72"},
+    "toy": {"video": DATA / "hybrid/toy.png", "motion": "saccade", "stop": 0.3, **TINY},
+    "keyboard": {"video": DATA / "hybrid/keyboard.png", "motion": "pan:speed=60,duration_s=0.6", **TINY},
+    "stereo": {"video": DATA / "stereo/motorcycle_left.png", "motion": "pan:speed=200,duration_s=0.3", **TINY},
+    "still life": {"video": DATA / "hdr/StillLife.exr", "motion": "pan:speed=40,duration_s=0.8", **TINY},
+    "candle": {"video": DATA / "hdr/CandleGlass.exr", "motion": "zoom", "stop": 0.5, **TINY},
+    "night": {"video": DATA / "hdr/st_peters_square_night_1k.hdr", "motion": "saccade", "stop": 0.3, **TINY},
+    "flying-shapes 7": {"video": "scene:flying-shapes,seed=7", "stop": 0.12, "rig": small(96, 72)},
+    "spinning-shapes 3": {"video": "scene:spinning-shapes,seed=3", "stop": 0.12, "rig": small(96, 72)},
+    "low-light 5": {"video": "scene:low-light,seed=5", "stop": 0.25, "rig": small(96, 72)},
+    "parallax 9": {"video": "scene:parallax,seed=9", "stop": 0.2, "rig": small(96, 72)},
+    "sine, fast": {"video": "synthetic:sine,size=64x48,duration_s=0.5,frequency_hz=31"},
+}
+
+
+def is_there(name: str) -> bool:
+    """Whether a clip can be made: made ones always, real ones where the data are."""
+    video = UNSEEN[name]["video"] if name in UNSEEN else VIDEOS if name in REAL else ""
+    return isinstance(video, str) or video.exists()
 
 
 @cache
@@ -54,13 +89,15 @@ def clip(name: str) -> tuple[tuple[int, int], list[Frame]]:
         options = {"video": VIDEOS / file, "stop": stop, "size": SIZE}
     elif name in SCENES:
         options |= {"stop": SCENES[name], "rig": SMALL}
+    elif name in UNSEEN:
+        options = UNSEEN[name]
     recipe = Recipe.of(sensor="ideal", **options)
     return recipe.mounts[0].size, [instant.frames[0] for instant in instants(recipe)]
 
 
-def sent(spec: DvsSpec, size: tuple[int, int], frames: list[Frame]) -> Events:
+def sent(spec: DvsSpec, size: tuple[int, int], frames: list[Frame], seed: int = 0) -> Events:
     """All events of a sensor."""
-    return Events.concatenate(list(Dvs(spec, size).run(frames)))
+    return Events.concatenate(list(Dvs(spec, size, seed=seed).run(frames)))
 
 
 def distance(a: Events, b: Events, size: tuple[int, int]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from against.clips import clean
 from vid2ev.errors import UsageError
 from vid2ev.plan.measure import Measure, scene_of
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import QUARTER_EDGES, SPREAD, Scene
+from vid2ev.stream.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
+from vid2ev.stream.still import Still, still_strips, strip_count
 
 from .clips import clip, sent
 
@@ -107,9 +109,19 @@ def fields(scene: Scene) -> dict[str, np.ndarray]:
     return {each.name: np.asarray(getattr(scene, each.name)) for each in dataclasses.fields(scene)}
 
 
+MORE: list[dict[str, Any]] = [
+    {},
+    {"refractory": "track", "refractory_us": 2000.0},
+    {"shading": (-0.3, -0.5), "dark_level": 0.1},
+    {"bandwidth": "light"},
+    {"refractory": "track", "refractory_us": 2000.0, "shading": (-0.3, -0.5), "dark_level": 0.1, "bandwidth": "light"},
+]
+
+
+@pytest.mark.parametrize("more", MORE)
 @pytest.mark.parametrize("threads", [2, 3])
-def test_threads_change_no_bit(threads: int) -> None:
-    size, spec = (160, 90), clean(photoreceptor_tau_us=3000, follower_tau_us=1000)
+def test_threads_change_no_bit(threads: int, more: dict[str, Any]) -> None:
+    size, spec = (160, 90), clean(photoreceptor_tau_us=3000, follower_tau_us=1000, **more)
     draws = np.random.default_rng(7)
     lights = np.exp(np.cumsum(draws.normal(0, 0.2, (20, *size[::-1])), axis=0)).astype(np.float32)
     lights[5:9, :40] = lights[5, :40]
@@ -122,10 +134,11 @@ def test_threads_change_no_bit(threads: int) -> None:
         assert value.tobytes() == fields(several.scene())[name].tobytes(), name
 
 
+@pytest.mark.parametrize("more", MORE)
 @pytest.mark.parametrize("way", ["before", "after"])
-def test_what_is_left_alone_while_it_is_still_is_measured_like_what_is_not(way: str) -> None:
+def test_what_is_left_alone_while_it_is_still_is_measured_like_what_is_not(way: str, more: dict[str, Any]) -> None:
     """Beside a pixel that flickers, too little to be pushed, no strip is left alone."""
-    spec = clean(filter=way, photoreceptor_tau_us=9000, follower_tau_us=100)
+    spec = clean(filter=way, photoreceptor_tau_us=9000, follower_tau_us=100, **more)
     frames = walk(6)
     still = [
         dataclasses.replace(frame, light=frames[10].light if 10 <= k < 17 else frame.light)
@@ -143,6 +156,35 @@ def test_what_is_left_alone_while_it_is_still_is_measured_like_what_is_not(way: 
         assert left[name] == pytest.approx(walked[name], rel=2e-6), name
     for name in SPREAD:  # (what is beside an edge of two quarters may fall to either)
         assert left[name][1].sum() == pytest.approx(walked[name][1].sum(), rel=1e-5), name
+    for name in OF_BARE:
+        assert left[name] == pytest.approx(walked[name], rel=1e-5), name
+
+
+@pytest.mark.parametrize("more", MORE)
+def test_what_is_said_to_be_still_is_measured_to_the_same_bits(more: dict[str, Any]) -> None:
+    spec = clean(photoreceptor_tau_us=9000, follower_tau_us=100, **more)
+    lights = [frame.light for frame in walk(6)]
+    for k in (*range(10, 17), 22, 23):
+        lights[k] = lights[k].copy()
+        lights[k][: SIZE[1] // 2] = lights[k - 1][: SIZE[1] // 2]
+    looked, told, lied = (Measure(spec, SIZE) for _ in range(3))
+    for k, light in enumerate(lights):
+        frame = Frame(light, 1_000_000 * k)
+        before = lights[max(k - 1, 0)]
+        looked.see(frame)
+        told.see(dataclasses.replace(frame, still=Still(before, still_strips(before, light))))
+        lied.see(dataclasses.replace(frame, still=Still(before.copy(), np.ones(strip_count(*SIZE), np.bool_))))
+    for name, value in fields(looked.scene()).items():
+        assert value.tobytes() == fields(told.scene())[name].tobytes(), name
+        assert value.tobytes() == fields(lied.scene())[name].tobytes(), f"{name}: that was said of another frame"
+
+
+def test_what_is_said_to_be_still_is_not_looked_at() -> None:
+    measure = Measure(clean(), SIZE)
+    lights = [np.full(SIZE[::-1], light, np.float32) for light in (0.1, 0.9)]
+    measure.see(Frame(lights[0], 0))
+    measure.see(Frame(lights[1], 1_000_000, still=Still(lights[0], np.ones(strip_count(*SIZE), np.bool_))))
+    assert measure.scene().still
 
 
 def test_wrong_frames_are_refused() -> None:
@@ -159,6 +201,32 @@ def test_light_that_is_no_light_leaves_the_scene_finite() -> None:
     light[1, 0, :4] = np.nan, np.inf, -1, 1e38
     scene = scene_of(clean(), SIZE, [Frame(frame, k * 1_000_000) for k, frame in enumerate(light)])
     assert np.isfinite(scene.travel).all() and np.isfinite(scene.slope_max).all() and np.isfinite(scene.bend).all()
+
+
+def test_memories_that_jump_have_the_fewer_events() -> None:
+    """Travel is the threshold times the events of a pixel that is blind in between, too."""
+    frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 400_000_000, 1_000_000)]
+    blind = {"refractory": "track", "refractory_us": 5000.0}
+    spec = clean(filter="after", random_phase=True, dark_level=1e-12, threshold_on=0.2, threshold_off=0.2, **blind)
+    seen, plain = scene_of(spec, SIZE, frames), scene_of(spec.model_copy(update={"refractory_us": 0.0}), SIZE, frames)
+    assert len(sent(spec, SIZE, frames)) == pytest.approx(seen.events, rel=0.02)
+    assert seen.events == pytest.approx(plain.events * 0.2 / (0.2 + 0.005 * 30), rel=0.01)
+    assert not plain.by_stirs.any() and not plain.by_stirs_at_turns.any()
+
+
+def test_light_without_the_shading_is_measured_beside_that_with_it() -> None:
+    """Its travel is that of a sensor without shading, and from the same start; far above the dark they are the same."""
+    frames = walk(6)
+    dark, bright = clean(filter="after", dark_level=0.1), clean(filter="after", dark_level=1e-6)
+    shaded = {"shading": (-0.3, -0.5)}
+    for spec in (dark, bright):
+        seen = scene_of(spec.model_copy(update=shaded), SIZE, frames)
+        assert seen.bare_travel == pytest.approx(scene_of(spec, SIZE, frames).travel, rel=1e-4)
+    near = scene_of(bright.model_copy(update=shaded), SIZE, frames)
+    far = scene_of(dark.model_copy(update=shaded), SIZE, frames)
+    assert far.bare_frozen.sum() > 0.05 * far.travel.sum() and far.bare_travel.sum() > 1.02 * far.travel.sum()
+    assert near.bare_frozen.sum() < 1e-3 * near.travel.sum()
+    assert not scene_of(dark, SIZE, frames).bare_travel.any()
 
 
 def test_a_clip_with_subframes_has_the_events_of_its_sensor() -> None:

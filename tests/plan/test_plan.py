@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from functools import cache
 
 import numpy as np
@@ -10,16 +11,19 @@ import pytest
 from against.clips import clean
 
 from vid2ev.errors import UsageError
+from vid2ev.physics.photoreceptor import reach_of_follower
 from vid2ev.plan.measure import scene_of
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import Scene, added, at_least, at_most, delayed, off_by, surely, together
+from vid2ev.stream.bounds import added, at_least, at_most, delayed, off_by, surely, together, unlike
+from vid2ev.stream.scene import Scene
 
 from .clips import clip, distance, sent, without
 
 QUIET = {"mismatch": 0.0, "crossing_noise": 0.0}
+NO_POLES = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0}
 POLES = DvsSpec(**QUIET, refractory_us=0)
 
 
@@ -113,6 +117,67 @@ def test_a_still_scene_needs_no_poles() -> None:
     plan = plan_of(scene_of(spec, (8, 8), frames), spec, 0.0)
     assert plan.spec.pole_taus_us == () and plan.spec.delay_us == 0 and plan.spec.shot_rate_hz == 10
     assert isinstance(plan, Plan) and plan.distance == 0.0
+
+
+def test_where_nothing_moves_the_leak_still_sends_events_that_move_with_the_thresholds() -> None:
+    frames = [Frame(np.full((8, 8), 0.3, np.float32), k * 100_000_000) for k in range(20)]
+    spec = DvsSpec(mismatch=0.02, leak_rate_hz=3.0, refractory_us=0, crossing_noise=0, **NO_POLES)
+    bound = EFFECTS["mismatch"].omission(scene_of(spec, (8, 8), frames), spec).distance
+    left = without(spec, "mismatch", EFFECTS["mismatch"].omission(scene_of(spec, (8, 8), frames), spec))
+    assert 0.2 < distance(sent(spec, (8, 8), frames), sent(left, (8, 8), frames), (8, 8)) <= bound
+
+
+def test_by_what_is_argued_of_memories_that_jump_nothing_is_left_out() -> None:
+    """Whatever noise there is; the refractory period's own bound is how dense events are, and no estimate."""
+    for noise in (0.0, 0.03):
+        spec = DvsSpec(mismatch=0, crossing_noise=noise, refractory="track", shot_rate_hz=0.1, leak_rate_hz=0.1)
+        plan = plan_of(scene("edge", spec), spec, 0.5)
+        kinds = {row.effect: row.omission.kind for row in plan.rows}
+        assert {kinds[name] for name in ("follower", "photoreceptor", "leak", "shot")} == {"estimate"}
+        assert plan.gone == () and plan.distance == 0.0 and kinds["refractory"] == "99.9 % bound"
+
+
+def test_errors_of_memories_that_jump_stay_what_share_of_a_cycle_they_are() -> None:
+    """Two pixels on one signal, a little apart, when the slope changes: on average over even phases the error grows as
+    the way from event to event does, theta + R slope."""
+    threshold, blind, before, after, start, bend = 0.2, 5e-4, 300.0, 900.0, 0.0, 0.02
+
+    def crossing(level: np.ndarray) -> np.ndarray:
+        return np.where(level < bend * before, level / before, bend + (level - bend * before) / after)
+
+    def signal(t_s: np.ndarray) -> np.ndarray:
+        return np.where(t_s < bend, before * t_s, before * bend + after * (t_s - bend))
+
+    way = threshold + blind * before
+    memories = np.linspace(start, start + way, 200_000, endpoint=False)[:, None] + np.array([0.0, 1e-6])
+    for _ in range(60):  # (events, well beyond the bend)
+        memories = signal(crossing(memories + threshold) + blind)
+    grown = float(np.abs(memories[:, 1] - memories[:, 0]).mean()) / 1e-6
+    assert grown == pytest.approx((threshold + blind * after) / way, rel=0.01)
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.03, 0.1, 0.3, 1.001, 3.0])
+def test_a_turn_is_rounded_off_by_the_second_pole_no_more_than_is_said(ratio: float) -> None:
+    """The peak of a signal that turns from slope r to -r', behind both poles and behind the first, delayed."""
+    tau1, tau2 = 1.0, ratio
+    t = np.linspace(0, 20 * max(tau1, tau2), 400_001)
+    kept = [np.exp(-t / tau1), (tau1 * np.exp(-t / tau1) - tau2 * np.exp(-t / tau2)) / (tau1 - tau2)]
+    early = [np.concatenate([[0.0], np.cumsum(1.0 - (k[1:] + k[:-1]) / 2) * t[1]]) for k in kept]  # E (t - D)+
+    spec = DvsSpec(**QUIET, photoreceptor_tau_us=1e4 * tau1, follower_tau_us=1e4 * tau2)
+    reach = float(reach_of_follower(scene("edge", spec), spec)[0]) / 1e-2
+    for share in np.geomspace(1e-4, 0.9999, 50):
+        short = [
+            (share * (mean - t + each) + (1 - share) * each).min()
+            for mean, each in zip((tau1, tau1 + tau2), early, strict=True)
+        ]
+        turned = min(1.0, math.e * math.sqrt(share * (1 - share)))
+        assert short[1] - short[0] <= reach * turned * 1.001
+
+
+def test_recordings_with_nothing_in_common_are_no_further_apart_than_by_their_density() -> None:
+    seen = scene("edge")
+    assert unlike(seen, 0.0) == pytest.approx(seen.bunched) and unlike(seen) == pytest.approx(2 * seen.bunched)
+    assert unlike(seen, 0.0) < unlike(seen, 1e-4) <= unlike(seen, 1.0) <= unlike(seen)
 
 
 def test_laws_of_the_bounds() -> None:

@@ -89,11 +89,11 @@ def test_what_turns_out_to_matter_comes_back_from_the_beginning(
 ) -> None:
     """The second pole is left out for the ramp; the recording of all of it has it from its first event on."""
     held(SOME)
-    first = Planner(recipe(clip), 0.02)
+    first = Planner(recipe(clip), 0.01)
     first.begin()
     assert first.plans[""].gone == ("follower",)
     reports: list[int] = []
-    manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda _, done: reports.append(done.frames))
+    manifest = made(clip, tmp_path / "auto", tolerance=0.01, report=lambda _, done: reports.append(done.frames))
     made(clip, tmp_path / "all", effects="all")
     assert gone(manifest) == [] and reports.count(10) == 2 and reports[-1] == 100
     assert same_events(tmp_path / "auto", tmp_path / "all")
@@ -145,10 +145,10 @@ def test_of_what_goes_on_nothing_is_left_out_that_saves_less_than_measuring_take
 ) -> None:
     """On the ramp the second pole takes 0.5 ns per pixel and frame, and 10 ns for each of 0.27 events."""
     held(SOME)
-    whole = Planner(recipe(clip), 0.02)
+    whole = Planner(recipe(clip), 0.01)
     whole.begin()
     monkeypatch.setattr(measuring, "PUSHED_NS", pushed_ns * 0.27)
-    planner = Planner(recipe(clip), 0.02)
+    planner = Planner(recipe(clip), 0.01)
     planner.begin()
     assert whole.plans[""].gone and bool(planner.plans[""].gone) == left_out
     assert left_out or planner.plans[""].distance == 0.0
@@ -159,7 +159,7 @@ def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
 ) -> None:
     held(SOME)
     asked = iter([False] * 37 + [True] + [False] * 500)
-    manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda *_: next(asked))
+    manifest = made(clip, tmp_path / "auto", tolerance=0.01, report=lambda *_: next(asked))
     assert manifest["counts"]["frames"] == 39 and gone(manifest) == []
 
 

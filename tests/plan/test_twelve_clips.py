@@ -1,23 +1,21 @@
 """Plans are held to measured changes on clips of all kinds: every effect in use is left out, one at a time.
 
 `pytest -m slow -s tests/plan/test_twelve_clips.py` prints a line for each clip: what `auto` changes, and of each effect
-the measured change / its bound, and what `auto` does with it (k kept, d dropped, r replaced; ? kept in vain).
+the measured change / its bound, and what `auto` does with it (k kept, d dropped, r replaced; ? kept in vain, ! beyond
+its bound, ~ an estimate); and at the end the table of all.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from statistics import median
-from typing import NamedTuple
-
 import pytest
+from numpy import median
 
-from vid2ev.plan.measure import scene_of
-from vid2ev.plan.plan import ASKED_FOR, EFFECTS, TOLERANCE, plan_of
+from vid2ev.plan.plan import EFFECTS
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sensors.spec import DvsSpec
 
-from .clips import MADE, REAL, SCENES, VIDEOS, clip, distance, sent, without
+from .clips import MADE, REAL, SCENES, UNSEEN, is_there
+from .trials import drawn, hold, table, tried
 
 PAPER = DvsSpec().model_dump()
 SENSORS = {
@@ -31,85 +29,68 @@ ALL = [*MADE, *REAL, *SCENES]
 SOME = ["edge", "juggle", "karma", "book", "cups", "rocket", "parallax", "specular"]
 CLIPS = {"paper": ALL, "v2e-noisy": ALL, "davis346": ALL, "quiet": SOME, "faint": SOME, "imx636": SOME[:4]}
 CLIPS["v2e-clean"] = SOME[:4]
-MATTERS = TOLERANCE / 5
-LOOSE = {"shading": 100}  # (its bound is that of the darkest and the brightest light of a tile)
+DRAWN = 12
+OF_DRAWN = ["juggle, slow", "karma, fast", "rocket, later", "candle", "parallax 9", "sine, fast"]
 
 
-class Trial(NamedTuple):
-    """An effect left out of a sensor that sees a clip."""
-
-    effect: str
-    measured: float
-    bound: float
-    fate: str
-
-    @property
-    def in_vain(self) -> bool:
-        """Whether it costs something, changes next to nothing, and stays."""
-        effect = EFFECTS[self.effect]
-        costs = effect.ns_per_pixel > 0 or effect.ns_per_event > 0
-        return costs and self.effect not in ASKED_FOR and self.fate == "kept" and self.measured < MATTERS
-
-    def __str__(self) -> str:
-        return f"{self.effect} {self.measured:.2g}/{self.bound:.2g}{self.fate[0]}{'?' * self.in_vain}"
-
-
-class Outcome(NamedTuple):
-    """A sensor that sees a clip: each effect left out, and what all that `auto` leaves out changes together."""
-
-    trials: list[Trial]
-    changed: float
-    frames: int
-
-
-def tried(name: str, sensor: str) -> Outcome:
-    if name in REAL and not VIDEOS.is_dir():
-        pytest.skip(f"{VIDEOS} is not there")
-    (size, frames), spec = clip(name), SENSORS[sensor]
-    plan, full = plan_of(scene_of(spec, size, frames), spec), sent(spec, size, frames)
-    trials = []
-    for row in plan.rows:
-        assert row.omission.sure and row.omission.distance is not None
-        measured = distance(full, sent(without(spec, row.effect, row.omission), size, frames), size)
-        trials.append(Trial(row.effect, measured, row.omission.distance, row.fate))
-    changed = distance(full, sent(plan.spec, size, frames), size)
-    print(f"{sensor:10}{name:16}{changed:8.2g}  {'  '.join(map(str, trials))}", flush=True)
-    return Outcome(trials, changed, len(frames))
-
-
-def hold(outcome: Outcome) -> None:
-    """No change beyond its bound, nor all that auto leaves out beyond the tolerance."""
-    assert outcome.frames >= 30
+@pytest.mark.parametrize(
+    ("name", "sensor"),
+    [("edge", "poles"), ("sine", "poles"), ("rocket", "poles"), ("edge", "davis346"), ("karma, fast", "davis346")],
+)
+def test_a_few_clips_stay_within_their_bounds(name: str, sensor: str) -> None:
+    """And within their estimates."""
+    outcome = tried(name, sensor, SENSORS[sensor])
+    hold(outcome)
     assert not [str(trial) for trial in outcome.trials if trial.measured > trial.bound]
-    assert outcome.changed <= TOLERANCE
 
 
-@pytest.mark.parametrize("name", ["edge", "sine", "rocket"])
-def test_three_clips_stay_within_their_bounds(name: str) -> None:
-    hold(tried(name, "poles"))
+@pytest.mark.parametrize("name", ["edge", "rocket, later"])
+def test_a_shading_stays_within_a_bound_that_is_near(name: str) -> None:
+    outcome = tried(name, "quiet", SENSORS["quiet"], seed=3)
+    hold(outcome)
+    shading = next(trial for trial in outcome.trials if trial.effect == "shading")
+    assert shading.measured > 0 and shading.bound < 10 * shading.measured
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_all_clips() -> None:
-    """Bounds hold; where the effect matters they are within a factor of 10, in the median, of sensors whose
-    levels lie anywhere and stay where they are; and `auto` leaves out what changes next to nothing on two clips of
-    three of the paper's sensor."""
-    ratios, clean = defaultdict(list), defaultdict(list)
-    for sensor, names in CLIPS.items():
-        for name in names:
-            outcome = tried(name, sensor)
-            hold(outcome)
-            for trial in outcome.trials:
-                if trial.measured > MATTERS:
-                    ratios[sensor, trial.effect].append(trial.bound / trial.measured)
-            clean[sensor].append(not any(trial.in_vain for trial in outcome.trials))
-    for (sensor, effect), each in ratios.items():
-        print(f"{sensor:10}{effect:20} bound/measured: median {median(each):.1f}, most {max(each):.1f}, of {len(each)}")
-    for sensor, each in clean.items():
-        print(f"{sensor:10}nothing kept in vain on {sum(each)} of {len(each)} clips")
-    known = [sensor for sensor, spec in SENSORS.items() if spec.random_phase and spec.refractory == "quantised"]
+    """Bounds hold; where the effect matters they are within a factor of 10, in the median, of sensors whose levels lie
+    anywhere; and `auto` leaves out what changes next to nothing on two clips of three of the paper's sensor.  Of one
+    whose memory jumps to the signal there are estimates only, which hold, too."""
+    outcomes = [tried(name, sensor, SENSORS[sensor]) for sensor, names in CLIPS.items() for name in names]
+    ratios = table(outcomes)
+    for outcome in outcomes:
+        hold(outcome)
+        assert outcome.sensor != "davis346" or not [str(t) for t in outcome.trials if t.measured > t.bound]
     for effect in EFFECTS:
-        found = [ratio for sensor in known for ratio in ratios.get((sensor, effect), [])]
-        assert not found or median(found) <= LOOSE.get(effect, 10), effect
-    assert sum(clean["paper"]) >= 2 / 3 * len(clean["paper"])
+        found = [r for (sensor, name), each in ratios.items() if name == effect for r in _known(sensor, each)]
+        assert not found or median(found) <= 10, effect
+    for sensor in CLIPS:
+        clean = [not any(trial.in_vain for trial in each.trials) for each in outcomes if each.sensor == sensor]
+        print(f"{sensor:10}nothing kept in vain on {sum(clean)} of {len(clean)} clips")
+        assert sensor != "paper" or sum(clean) >= 2 / 3 * len(clean)
+
+
+def _known(sensor: str, ratios: list[float]) -> list[float]:
+    return ratios if SENSORS[sensor].random_phase else []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("sensor", ["davis346", "imx636", "faint", "quiet", "paper", "v2e-noisy", "v2e-clean"])
+def test_clips_that_nothing_was_tuned_on(sensor: str) -> None:
+    outcomes = [tried(name, sensor, SENSORS[sensor], seed=3) for name in UNSEEN if is_there(name)]
+    table(outcomes)
+    for outcome in outcomes:
+        hold(outcome)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seed", range(DRAWN))
+def test_sensors_that_were_drawn(seed: int) -> None:
+    outcomes = [tried(name, f"drawn {seed}", drawn(2000 + seed), seed=5) for name in OF_DRAWN if is_there(name)]
+    table(outcomes)
+    for outcome in outcomes:
+        hold(outcome)

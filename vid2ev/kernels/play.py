@@ -13,12 +13,13 @@ from vid2ev.kernels.layout import PITCH
 from vid2ev.physics.elementary import bits_32, expm1_32
 
 F = np.float32
-# Planes of the state of a block, in units of PITCH.
-LIGHT, LEVEL, SLOPE, PLAY, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH = range(10)
-PLANES = 10
-# Planes of the scratch: light now, the level and the smoothed slope before, bend, the bend as it counts at a turn.
-SEEN, BEFORE, SMOOTHED, BENT, IF_TURNED = (k * PITCH for k in range(5))
-SCRATCH = 5 * PITCH
+# Planes of the state of a block, in units of PITCH; the last two are of memories that jump to the signal.
+LIGHT, LEVEL, SLOPE, PLAY, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH, STIRS, STIRS_AT_TURNS = range(12)
+PLANES = 12
+# Planes of the scratch: light now, the level and the smoothed slope before, bend, all bends as they count at a turn and
+# as they are felt, the greater of the slopes beside the bend.
+SEEN, BEFORE, SMOOTHED, BENT, IF_TURNED, FELT, STEEPER, BARE_BEFORE = (k * PITCH for k in range(8))
+SCRATCH = 8 * PITCH
 # Planes of the lanes: what is taken from a pixel, and what is found for it.
 AT_LEVEL, AT_PLAY, FROM, AT_SLOPE, AT_SMOOTH, AT_LIGHT = (k * PITCH for k in range(6))
 PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(6, 14))
@@ -26,10 +27,12 @@ LANES = 14 * PITCH
 TRAVELLED, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(3, 9)  # sums of a block, after its extremes
 FIGURES = 9
 # How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
-BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT = range(4)
+BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT, BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS = range(7)
+BY_ALL, BY_JUMPS = 4, 7  # how many there are, without and with memories that jump
 QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
 STEPS = 6  # of an interval, whose slopes differ
 SMALL_NAT = 0.1  # what goes no further than this is taken at its greatest slope
+PER_MS2 = F(1e-6)  # of 1/s^2, so that sums are within the quarters
 
 
 @inner
@@ -52,26 +55,34 @@ def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
     half, dt = F(num.half), num.dt_s
     for k in range(count):
         i, pushed = np.uintp(hits[k]), lanes[k + PUSHED]
-        way, bend = own[WAY * PITCH + i], own[BENDS * PITCH + i]
-        if way != F(0.0):
-            bend = scratch[BENT + i]
-            if pushed != way:
-                turned = scratch[IF_TURNED + i]
-                turns += 1.0
-                turn_bends += turned
-                own[TURNS * PITCH + i] += F(1.0)
-                own[TURNED_BENDS * PITCH + i] += turned
+        way = own[WAY * PITCH + i]
+        bend = scratch[FELT + i] if way == F(0.0) else scratch[BENT + i]
         bends += bend
+        if len(num.tracks):
+            own[STIRS * PITCH + i] += PER_MS2 * bend * scratch[STEEPER + i] / (half + half)
+        if way != F(0.0) and pushed != way:
+            turned = scratch[IF_TURNED + i]
+            turns += 1.0
+            turn_bends += turned
+            own[TURNS * PITCH + i] += F(1.0)
+            own[TURNED_BENDS * PITCH + i] += turned
+            if len(num.tracks):
+                note(spread, BY_STIRS_AT_TURNS, own[STIRS * PITCH + i], half + half)
+                own[STIRS_AT_TURNS * PITCH + i] += own[STIRS * PITCH + i]
         own[WAY * PITCH + i] = pushed
         if pushed == F(0.0):
             continue
         moved, gone, lost = lanes[MOVED + k], lanes[GONE + k], lanes[LOST + k]
+        here_s = dt * lanes[SHARE + k]
         own[PLAY * PITCH + i] = own[LEVEL * PITCH + i] - pushed * half
         own[TRAVEL * PITCH + i] += moved
         travelled += moved
-        pushed_s += dt * lanes[SHARE + k]
+        pushed_s += here_s
         note(spread, BY_TURNS, own[TURNS * PITCH + i], lost)
         note(spread, BY_BENDS, own[TURNED_BENDS * PITCH + i], lost)
+        if len(num.tracks):
+            note(spread, BY_STIRS, F(own[STIRS * PITCH + i] * here_s / max(moved, F(1e-30))), moved)
+            note(spread, BY_STIRS_BEFORE, own[STIRS_AT_TURNS * PITCH + i], lost)
         if gone > F(SMALL_NAT):
             dense += pace(i, moved, gone, floor, num, own, spread, scratch)
             continue
@@ -100,19 +111,19 @@ def gather(count, hits, own, scratch, lanes):
 def push(count, floor, num, lanes):
     """How far and which way each is pushed, and what follows from that if it is not far."""
     half, dt, tau, smooth_s = F(num.half), F(num.dt_s), F(num.tau_s), F(num.smooth_s)
-    before_log, black, reach_of = num.before_log, F(floor), F(num.tau_s / (num.dt_s * 2.0 * num.half))
+    before_log, black, blind = num.before_log, F(floor), F(num.blind_s / (num.dt_s * 2.0 * num.half))
     whole, first, kept = F(1.0 + 2.0 * num.tau_s / num.dt_s), num.decays[0], num.decays[STEPS]
     for k in range(count):
         level, play = lanes[AT_LEVEL + k], lanes[AT_PLAY + k]
         pushed = F(level - half > play) - F(level + half < play)
         gone = abs(level - lanes[FROM + k])
         moved = abs(level - pushed * half - play) if pushed != F(0.0) else F(0.0)
+        share = min(moved / max(gone, F(1e-30)), F(1.0))
+        if len(num.tracks):
+            sent = F(1.0) / (F(1.0) + gone * blind)  # (events are theta + the blind time's way apart)
+            moved, share = moved * sent, share * sent
         lanes[PUSHED + k], lanes[MOVED + k], lanes[GONE + k] = pushed, moved, gone
-        lanes[SHARE + k] = min(moved / max(gone, F(1e-30)), F(1.0))
-        # What two events that should be one cost, if one is anywhere up to a threshold after the other: the mean of
-        # 1 - exp(-x / (slope tau)), x from 0 to theta, at the least slope of an interval that goes so many nats.
-        reach = -expm1_32(-gone) * reach_of
-        lanes[LOST + k] = moved * (F(1.0) + reach * expm1_32(F(-1.0) / max(reach, F(1e-3))))
+        lanes[SHARE + k], lanes[LOST + k] = share, moved * apart(gone, num)
         slope, light1 = lanes[AT_SLOPE + k], lanes[AT_LIGHT + k]
         smooth0 = slope + (lanes[AT_SMOOTH + k] - slope) * first
         smooth1, light0 = slope + (smooth0 - slope) * kept, light1
@@ -126,6 +137,14 @@ def push(count, floor, num, lanes):
         steep = max(abs(smooth0) / near0, abs(smooth1) / near1)
         lanes[STEEP + k], lanes[DIMMEST + k] = steep, max(min(light0, light1), F(0.0))
         lanes[BUNCHED + k] = min(F(2.0) * tau * steep, gone * whole)
+
+
+@inner
+def apart(gone, num):
+    """What two events that should be one cost at most, if between them there is a share of the gap from event to event
+    and the rest to the next: 1 - exp(-gap / (2 tau)), at the least slope of an interval that goes so many nats."""
+    slope = max(-expm1_32(-gone) / F(num.dt_s), F(1e-12))
+    return -expm1_32(F(-0.5 / num.tau_s) * (F(2.0 * num.half) / slope + F(num.blind_s)))
 
 
 @inner
@@ -155,8 +174,8 @@ def pace(i, moved, gone, floor, num, own, spread, scratch):
 
 @inner
 def note(spread, of, number, counted):
-    """Add a travel to the quarter of an octave that a number >= 0 has, spread [4, QUARTERS, 2]: what is counted of it,
-    and that times the number."""
+    """Add a travel to the quarter of an octave that a number >= 0 has, of spread [..., QUARTERS, 2]: what is
+    counted of it, and that times the number."""
     quarter = np.uintp(min(max(np.int64(bits_32(number) >> np.int32(21)) - LOWEST, 0), QUARTERS - 1))
     spread[of, quarter, 0] += counted
     spread[of, quarter, 1] += counted * number

@@ -21,9 +21,10 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.omission import light_events
+from vid2ev.physics.omission import kind_of, light_events
 from vid2ev.physics.random import HOT_MAP, philox, unit
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
+from vid2ev.stream.bounds import added, at_most, surely
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
 class BadPixels(BaseModel, frozen=True, extra="forbid"):
@@ -53,7 +54,7 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
     bunched = 1.0 + 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S
     distance = added(light_events(scene, spec), extra, surely(scene, spec.hot_probability)) * bunched
     figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
-    return Omission(distance, "99.9 % bound", figure, f"{extra:.0f} events at most")
+    return Omission(distance, kind_of(spec), figure, f"{extra:.0f} events at most")
 
 
 def omission_of_cold(scene: Scene, spec: Any) -> Omission:

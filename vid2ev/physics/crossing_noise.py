@@ -76,4 +76,4 @@ def omission(scene: Scene, spec: Any) -> Omission:
     """The noise at crossings: the level that a pixel reaches after k events is off by a walk of k steps."""
     figure = f"{spec.crossing_noise / scene.threshold:.2g} of the threshold at each event"
     walk_nat = math.sqrt(scene.most_events) * spec.crossing_noise
-    return omitted(scene, spec, displaced(scene, walk_nat), figure, "every event moves")
+    return omitted(scene, spec, displaced(scene, spec, walk_nat), figure, "every event moves")

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.stream.bounds import surely, unlike
 from vid2ev.stream.events import Events
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, surely, unlike
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 FIELDS = ("t", "x", "y", "p", "label")
 

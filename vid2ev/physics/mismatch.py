@@ -68,4 +68,6 @@ def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
 def omission(scene: Scene, spec: Any) -> Omission:
     """The mismatch: the level that a pixel reaches after k events is off by up to k draws."""
     figure = f"{spec.mismatch / scene.threshold:.2g} of the threshold in each pixel"
-    return omitted(scene, spec, displaced(scene, scene.most_events * spec.mismatch), figure, "every pixel is another")
+    return omitted(
+        scene, spec, displaced(scene, spec, scene.most_events * spec.mismatch), figure, "every pixel is another"
+    )

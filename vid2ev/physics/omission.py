@@ -16,36 +16,67 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, at_least, at_most, off_by, surely, unlike
+from vid2ev.stream.bounds import at_least, at_most, off_by, surely, unlike
+from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 
 DEVIATIONS = 4.0  # that thresholds are at most from their mean
 
 
+def tracks(spec: Any) -> bool:
+    """Whether the memory jumps to the signal after each event."""
+    return bool(spec.refractory_us > 0 and spec.refractory == "track")
+
+
 def echoes(spec: Any) -> bool:
     """Whether two recordings of a pixel that disagree about one event go on with other levels: thresholds are not all
-    the same."""
-    return bool(spec.mismatch > 0 or spec.crossing_noise > 0 or spec.threshold_on != spec.threshold_off)
+    the same, or memories jump to the signal."""
+    return bool(tracks(spec) or spec.mismatch > 0 or spec.crossing_noise > 0 or spec.threshold_on != spec.threshold_off)
+
+
+def kind_of(spec: Any) -> Kind:
+    """What kind of statement a distance is that counts events of light, or follows levels.
+
+    Where memories jump to the signal it is an estimate.  That phases are even is so for slopes that stay the same, and
+    only nearly so where they change from cycle to cycle (`stream/scene.py`): noise brings phases back to even, but by
+    how much is not proven.
+    """
+    return "estimate" if tracks(spec) else "99.9 % bound"
 
 
 def obstacle(spec: Any) -> str:
     """Why the bounds by levels do not hold for a sensor; "" where they do."""
-    if spec.refractory_us > 0 and spec.refractory == "track":
-        return "the memory jumps to the signal after each event, so errors add up"
     if not spec.random_phase and not (spec.mismatch > 0 or spec.crossing_noise > 0):
         return "all pixels start in step, so nothing is known of how far their levels are"
     return ""
 
 
-def crowding(spec: Any) -> float:
-    """How much nearer than anywhere levels may be to where they matter, at least 1; infinite if all are in step."""
+def crowding(spec: Any, scene: Scene) -> float:
+    """How much nearer than anywhere levels may be to where they matter, at least 1; infinite if all are in step.
+
+    Shot noise sets levels a threshold from the signal, and so does a memory that jumps to the signal as it comes to
+    rest: of the pixels that these may reach, levels are spread as those of pixels in step are.
+    """
     spread = math.hypot(spec.mismatch, spec.crossing_noise)
-    if spec.random_phase:
-        return 1.0
-    return (
-        max(min(spec.threshold_on, spec.threshold_off) / (spread * math.sqrt(2.0 * math.pi)), 1.0)
-        if spread
-        else math.inf
-    )
+    if spread == 0.0:
+        return 1.0 if spec.random_phase else math.inf
+    in_step = max(min(spec.threshold_on, spec.threshold_off) / (spread * math.sqrt(2.0 * math.pi)), 1.0)
+    if not spec.random_phase:
+        return in_step
+    return 1.0 + min(reset(scene, spec) + _at_rest(scene, spec), 1.0) * (in_step - 1.0)
+
+
+def _at_rest(scene: Scene, spec: Any) -> float:
+    """The share of pixels, at most, that are blind as the signal turns or comes to rest, and see again there."""
+    if not tracks(spec) or scene.still:
+        return 0.0
+    blind_nat = spec.refractory_us * 1e-6 * QUARTER_EDGES[1:]
+    shares = blind_nat / (scene.threshold + blind_nat)
+    return 2.0 * float(np.dot(scene.by_slope[0], shares)) / float(scene.by_slope[0].sum())
+
+
+def reset(scene: Scene, spec: Any) -> float:
+    """The share of pixels, at most, whose levels shot noise has set anew before an event, on average."""
+    return -math.expm1(-spec.shot_rate_hz * scene.seconds)
 
 
 def tau_at(light: np.ndarray, spec: Any) -> np.ndarray:
@@ -62,13 +93,14 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def light_events(scene: Scene, spec: Any) -> float:
-    """How many events of light there are at least, on average: what the poles round off at turns is missing; none where
-    levels are not known."""
-    if not spec.random_phase or obstacle(spec):
-        return 0.0
+    """How many events of light there are at least, on average: what the poles round off at turns is missing;
+    of pixels in step, up to one for each time that they are pushed."""
     _, slowest_us = taus_of(scene, spec)
     reach_s = 0.5e-6 * np.hypot(slowest_us, spec.follower_tau_us)
-    return max(scene.events - 2.0 * float(np.dot(reach_s, scene.bend_at_turns)) / scene.threshold, 0.0)
+    missing = 2.0 * float(np.dot(reach_s, scene.bend_at_turns)) / scene.threshold
+    if not spec.random_phase:
+        missing += float(scene.turns.sum()) + scene.moving
+    return max(scene.events - missing, 0.0)
 
 
 def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
@@ -100,23 +132,35 @@ def omitted(
     figure: str,
     why: str,
     replace: tuple[tuple[str, Any], ...] = (),
-    beside: float = 0.0,
+    lag_s: np.ndarray | float = 0.0,
 ) -> Omission:
     """The 99.9 % bound from one on the mean distance of events of light, which levels anywhere would make; infinite
-    where nothing is known but how dense events are, and that up to so many are `beside` them in one recording."""
-    if scene.still and not beside:
+    where nothing is known but how dense events are.  Signals are no further apart than by lag_s.  Events of the leak
+    are other ones, too, and those of noise that a pixel is blind to.
+
+    Where memories jump to the signal, it is an estimate (`kind_of`), unless it is how dense events are that counts.
+    """
+    kind: Kind = "99.9 % bound"
+    spread = math.hypot(spec.mismatch, spec.crossing_noise)
+    if scene.still and not spec.leak_rate_hz:
         return Omission(0.0, "99.9 % bound", figure, why, replace)
-    noise, _ = noise_events(scene, spec)
-    many = min(crowding(spec), 1e9) * scene.events + beside
+    noise, most = noise_events(scene, spec)
+    leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
+    light = min(crowding(spec, scene), 1e9) * scene.events
+    swallowed = light * spec.refractory_us * 1e-6 * (most - leaked) / max(scene.pixels * scene.seconds, 1e-9)
+    many = light + leaked + min(swallowed, noise)
     share = many / (many + noise)
-    distance = max(unlike(scene), 2.0) * share
+    distance = max(unlike(scene, lag_s), 1.0) * share
     if not obstacle(spec) and math.isfinite(mean):
-        distance = min(distance, mean * many / max(light_events(scene, spec) + noise, 1e-9))
-    return Omission(surely(scene, distance / share) * share, "99.9 % bound", figure, why, replace)
+        mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
+        near = mean * light / max(light_events(scene, spec) + noise, 1e-9)
+        distance, kind = (near, kind_of(spec)) if near < distance else (distance, kind)
+    return Omission(surely(scene, distance / share) * share, kind, figure, why, replace)
 
 
-def displaced(scene: Scene, rms_nat: float) -> float:
-    """Bound on the mean distance where levels are off by an rms of up to rms_nat in any pixel."""
-    if rms_nat * DEVIATIONS >= scene.threshold:
+def displaced(scene: Scene, spec: Any, rms_nat: float) -> float:
+    """Bound on the mean distance where levels are off by an rms of up to rms_nat in any pixel; infinite where the leak
+    sends events that move with them."""
+    if rms_nat * DEVIATIONS >= scene.threshold or spec.leak_rate_hz > 0:
         return math.inf
     return off_by(scene, np.full(len(scene.travel), rms_nat), echoes=False)

@@ -7,7 +7,8 @@ What leaving it out changes: none is lost if the signal cannot go a threshold fa
 
     refractory_us slope_max < least threshold
 
-and else at most the share of thresholds that are so low; the memory moves alike (`quantised`).
+and else at most the share of thresholds that are so low; the memory moves alike (`quantised`).  Events of noise come
+within the period of others as often as their rate says.
 
 Sources: the paper, algorithm step 2e; `track` as the reset of the differencing amplifier in Lichtsteiner et al. 2008.
 """
@@ -15,14 +16,16 @@ Sources: the paper, algorithm step 2e; `track` as the reset of the differencing 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
 from vid2ev.physics.crossing_noise import chances_below
-from vid2ev.physics.omission import light_events, omitted
+from vid2ev.physics.omission import crowding, light_events, noise_events, omitted
 from vid2ev.physics.photoreceptor import slopes_of, steepest
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, at_most, surely, unlike
+from vid2ev.stream.bounds import at_most
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
 class Refractory(BaseModel, frozen=True, extra="forbid"):
@@ -44,7 +47,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
     if spec.refractory == "track":
         return omitted(scene, spec, math.inf, figure, "the memory jumps to the signal when the period ends")
-    if spec.photoreceptor_noise > 0 or spec.shot_rate_hz > 0 or spec.hot_probability > 0:
+    if spec.photoreceptor_noise > 0:
         return omitted(scene, spec, math.inf, figure, "events of noise may come at any time")
     leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
     most = 4.0 * (scene.bunched - 1.0) + 2.0  # others within tau
@@ -54,14 +57,33 @@ def omission(scene: Scene, spec: Any) -> Omission:
             chance, chance_again = _swallowed(slope * spec.refractory_us * 1e-6 + leaked, spec)
             swallowed += chance * travel
             cost += chance * travel * (1.0 + min(2.0 * DISTANCE_TAU_S * slope / scene.threshold, most) * chance_again)
-    if swallowed == 0.0:
+    noise = _swallowed_with_noise(scene, spec)
+    if swallowed == 0.0 and noise == 0.0:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
     total = float(scene.travel.sum())
-    why = f"a share of {swallowed / total:.2g} of the crossings may be swallowed"
-    together = cost / swallowed
-    lost = together * at_most(swallowed / scene.threshold / together)
-    distance = lost * together / max(2.0 * light_events(scene, spec) - lost, 1e-9)
-    return Omission(min(distance, surely(scene, unlike(scene))), "99.9 % bound", figure, why)
+    why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
+    why += f", and {noise:.2g} by noise" if noise else ""
+    together = cost / swallowed if swallowed else 1.0
+    crossings, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
+    others = light_events(scene, spec) + noise_events(scene, spec)[0]
+    rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
+    dense = 1.0 + 2.0 * DISTANCE_TAU_S * rate_hz * min(rate_hz * spec.refractory_us * 1e-6, 1.0)
+    both = max(2.0 * others - crossings - noisy, 1e-9)
+    said = omitted(scene, spec, math.inf, figure, why)
+    of_light = crossings * together / both
+    of_light = of_light if scene.still else min(of_light, said.distance or math.inf)
+    return replace(said, distance=of_light + noisy * dense / both)
+
+
+def _swallowed_with_noise(scene: Scene, spec: Any) -> float:
+    """How many events, at most, follow one of noise, or are of noise and follow another, within the period: on average,
+    of events of noise at their greatest rate."""
+    blind_s, light = spec.refractory_us * 1e-6, min(crowding(spec, scene), 1e9) * scene.events
+    hot = spec.hot_probability * spec.hot_rate_hz
+    rate_hz, squared = spec.shot_rate_hz + hot, (spec.shot_rate_hz**2 + hot * (spec.hot_rate_hz + spec.shot_rate_hz))
+    leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
+    pairs = 2.0 * (light + leaked) * rate_hz + squared * scene.pixels * scene.seconds
+    return blind_s * pairs
 
 
 def _swallowed(way_nat: float, spec: Any) -> tuple[float, float]:

@@ -2,9 +2,13 @@
 
     gain(r) = 1 + c1 r + c2 r^2 + ...,   r = distance from the image centre / image width,   gain >= 0
 
-What leaving it out changes: on ln(light + dark) nothing but
+What leaving it out changes: ln(light + dark) by
 
-    h = ln((light + dark) / (gain light + dark)),   from its least to its greatest in the range of light of a pixel
+    h = ln((light + dark) / (gain light + dark)) - h at the beginning
+
+which is nothing far above the dark level.  Signals with and without it are measured side by side, whatever the curve
+(`kernels/measure_bare.py`); events are otherwise late, too, where the bandwidth depends on light, and there are other
+ones of shot noise.
 
 On a frame camera: light by (1 - gain), which is looked at in every value of every exposure.
 
@@ -13,7 +17,7 @@ Source: the paper, section II.A: a polynomial of the distance from the centre re
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,9 +25,11 @@ from pydantic import BaseModel, Field
 
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
-from vid2ev.physics.omission import echoes, omitted
+from vid2ev.physics.omission import echoes, light_events, omitted, reset
+from vid2ev.physics.photoreceptor import lag_s, otherwise_late
+from vid2ev.stream.bounds import added, at_most, bare
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
-from vid2ev.stream.scene import Omission, Scene, off_by
+from vid2ev.stream.scene import Omission, Scene
 
 
 class Shading(BaseModel, frozen=True, extra="forbid"):
@@ -48,18 +54,21 @@ def omission_of_levels(seen: Exposed, spec: Any) -> LevelChange:
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The shading; the scene's light is what arrives behind it."""
-    gains = [float(np.polynomial.polynomial.polyval(r, (1.0, *spec.shading))) for r in np.linspace(0.0, 1.0, 65)]
-    reason = ""
-    if spec.log_curve != "offset":
-        reason = f"of the curve {spec.log_curve} the contrast changes with light"
-    elif (spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0) or spec.shot_rate_hz > 0:
-        reason = "bandwidth or shot noise depend on light, too"
-    gain = min(gains)
-    figure = f"light x {max(gain, 0.0):.2g} at a distance of one width"
-    if reason or gain <= 0.0 or max(gains) > 1.0:
-        return omitted(scene, spec, math.inf, figure, reason or "the gain is not between 0 and 1")
-    dark, least, most = spec.dark_level, scene.light_min, scene.light_max
-    error = np.log((most / gain + dark) / (most + dark)) - np.log((least / gain + dark) / (least + dark))
-    mean, figure = off_by(scene, np.abs(error), echoes=echoes(spec)), f"{np.abs(error).max():.2g} nat"
-    return omitted(scene, spec, mean, figure, "a constant gain does not change the log")
+    """The shading; the scene's light is what arrives behind it, and that before it was measured beside it."""
+    gains = np.maximum(np.polynomial.polynomial.polyval(np.linspace(0.0, 1.0, 65), (1.0, *spec.shading)), 1e-6)
+    figure = f"light x {gains.min():.2g} to {gains.max():.2g} up to a width from the centre"
+    mean = bare(scene, echoes=echoes(spec))
+    if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
+        mean += otherwise_late(scene, spec, tuple(gains))
+    said = omitted(scene, spec, mean, figure, "a constant gain does not change the log", lag_s=lag_s(scene, spec))
+    extra = added(light_events(scene, spec), _other_shots(scene, spec, gains), reset(scene, spec))
+    return replace(said, distance=(said.distance or 0.0) + 2.0 * extra)
+
+
+def _other_shots(scene: Scene, spec: Any, gains: np.ndarray) -> float:
+    """How many more or less events of shot noise there are at most where light is not shaded."""
+    octaves = np.exp2(np.arange(len(scene.brightness)) - 19.0)  # (their upper ends)
+    shaded, pixels = np.minimum(octaves, 1.0), scene.brightness / max(float(scene.brightness.sum()), 1.0) * scene.pixels
+    change = max(float(np.dot(pixels, np.abs(np.minimum(octaves / gain, 1.0) - shaded))) for gain in gains)
+    change = max(change, float(np.dot(pixels, shaded)) * (1.0 - 1.0 / max(gains.max(), 1.0)))
+    return at_most(spec.shot_rate_hz * (1.0 - spec.shot_light_factor) * change * scene.seconds)

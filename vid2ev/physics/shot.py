@@ -21,8 +21,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.omission import light_events
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene, added, at_most, surely
+from vid2ev.physics.omission import kind_of, light_events
+from vid2ev.stream.bounds import added, at_most, surely
+from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 CELL_NS = 1_000_000
 
@@ -49,4 +50,4 @@ def omission(scene: Scene, spec: Any) -> Omission:
     bunched = 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S
     distance = added(light_events(scene, spec), extra, touched) * bunched
     why = f"{extra:.0f} events at most, and their pixels' levels"
-    return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)
+    return Omission(distance, kind_of(spec), f"{rate_hz:.3g} events/pixel/s", why)

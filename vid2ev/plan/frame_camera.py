@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
 from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, names_of, without
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.stream.bounds import together
 from vid2ev.stream.exposed import ROUNDING, Exposed, LevelChange
-from vid2ev.stream.scene import together
 
 
 class FrameEffect(NamedTuple):

@@ -8,27 +8,32 @@ from collections.abc import Iterable
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
-from vid2ev.kernels.measure import LEAST, STRIPS, Pace, Seen, measure_blocks, settle_measure
-from vid2ev.kernels.play import FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, STEPS, TRAVEL
+from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
+from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
+from vid2ev.kernels.play import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, STEPS, TRAVEL
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
+from vid2ev.physics.omission import tracks
 from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.scene import DISTANCE_TAU_S, OF_TILES, SPREAD, Scene
+from vid2ev.stream.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, SPREAD, Scene
 
 BRIGHTNESS_EVERY = 8  # frames
 LOOK_NS, PUSHED_NS = 1.1, 12.0  # of one thread: per pixel and frame, and for one that is pushed, more
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
+NOT_TOLD = np.empty(0, np.uint8)
 
 
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 45 bytes a pixel.  `threads` change
-    nothing but the time it takes.
+    The light that is measured is that behind the sensor's lens shading.  Memory is 45 bytes a pixel, for a
+    shading 33 more, for memories that jump to the signal 12.  What frames say of what is still (`Frame.still`) is taken
+    for granted where it is about the last one.  `threads` change nothing but the time it takes.
     """
 
     def __init__(self, spec: DvsSpec, size: tuple[int, int], threads: int = 1):
@@ -43,16 +48,20 @@ class Measure:
             calm=np.zeros((blocks, STRIPS), np.uint8),
             owed=np.ones((blocks, STRIPS, 2), np.float32),
             tiles=np.zeros((blocks, FIGURES)),
-            spread=np.zeros((blocks, len(SPREAD), QUARTERS, 2)),
+            spread=np.zeros((blocks, BY_JUMPS if tracks(spec) else BY_ALL, QUARTERS, 2)),
+            bare=(_bare(blocks),) if spec.shading else (),
         )
         self._found.tiles[:, LEAST] = np.inf
         self._cut = Tiles(blocks, threads)
         self._work = [_scratch() for _ in range(self._cut.count)]
         self._brightness = np.zeros(LIGHTS)
-        self._taus_s = [tau * 1e-6 for tau in spec.pole_taus_us]
+        self._tau1_s, self._tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
+        self._by_light = spec.bandwidth == "light" and self._tau1_s > 0
+        self._blind_s = spec.refractory_us * 1e-6 if tracks(spec) else 0.0
         self._frames, self._ns = 0, 0
         self._t_ns: int | None = None
         self._dt_s = math.inf
+        self._last: np.ndarray | None = None  # the light of the last frame, as it was given
 
     def see(self, frame: Frame) -> None:
         """The next frame of luminance [H, W]; raises UsageError for another shape, or a time that is not later."""
@@ -66,25 +75,31 @@ class Measure:
             settle_measure(light, self._shade, self._curve, self._half, self._found)
             self._dt_s = math.inf
         else:
-            self._advance(light, (frame.t_ns - self._t_ns) * 1e-9)
+            told = frame.still is not None and frame.still.before is self._last
+            known = frame.still.strips.view(np.uint8) if frame.still is not None and told else NOT_TOLD
+            self._advance(light, known, (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
-        self._frames, self._t_ns = self._frames + 1, frame.t_ns
+        self._frames, self._t_ns, self._last = self._frames + 1, frame.t_ns, frame.light
 
     def scene(self) -> Scene:
         """What was seen so far."""
         travel = self._plane(TRAVEL)
+        bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
         return Scene(
             pixels=self.size[0] * self.size[1],
             frames=self._frames,
             seconds=self._ns * 1e-9,
             threshold=2 * self._half,
+            moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
             by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
-            **dict(zip(SPREAD, np.moveaxis(self._found.spread.sum(axis=0), 1, 2).copy(), strict=True)),
+            **dict(zip(SPREAD, _spread(self._found.spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
             **dict(zip(OF_TILES, self._found.tiles.T.copy(), strict=True)),
+            **dict(zip(OF_BARE, bare.tiles.T.copy(), strict=True)),
+            by_bare=_spread(bare.spread, 1)[0],
         )
 
     def costs(self) -> tuple[float, float]:
@@ -93,24 +108,27 @@ class Measure:
         pushed = float(scene.pushed_s.sum()) / max(scene.seconds * scene.pixels, 1e-300)
         return LOOK_NS + PUSHED_NS * pushed, scene.events / (scene.pixels * scene.frames)
 
-    def _advance(self, light: np.ndarray, dt_s: float) -> None:
-        delay, slowest = sum(self._taus_s), max(self._taus_s, default=0.0)
-        smooth_s = slowest if self.spec.bandwidth == "constant" else 0.0
+    def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
+        smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
         steps = np.arange(STEPS + 1) * (dt_s / STEPS)
         pace = Pace(
             half=self._half,
             before_log=self.spec.filter == "before",
             dt_s=dt_s,
-            back_s=min(delay, self._dt_s),
-            ahead_s=min(4 * delay, dt_s),
-            keep=math.exp(-self._dt_s / slowest) if slowest else 0.0,
+            before_s=self._dt_s,
+            tau1_s=self._tau1_s,
+            tau2_s=self._tau2_s,
+            by_light=(0,) if self._by_light else (),
+            dark=self.spec.bandwidth_dark,
+            tracks=(0,) if self._blind_s else (),
+            blind_s=self._blind_s,
             smooth_s=smooth_s,
             decays=np.exp(-steps / smooth_s).astype(np.float32) if smooth_s else np.zeros(STEPS + 1, np.float32),
             tau_s=DISTANCE_TAU_S,
         )
         self._cut.each_blocks(
             lambda k, first, last: measure_blocks(
-                first, last, light, self._shade, self._curve, pace, self._found, self._work[k]
+                first, last, light, told, self._shade, self._curve, pace, self._found, self._work[k]
             )
         )
         self._dt_s = dt_s
@@ -122,6 +140,19 @@ class Measure:
     def _note_brightness(self, light: np.ndarray) -> None:
         octave = np.log2(np.maximum(light, 2.0**-20)) + 20
         self._brightness += np.bincount(np.clip(octave.astype(np.int64), 0, LIGHTS - 1), minlength=LIGHTS)
+
+
+def _bare(blocks: int, planes: int = BARE_PLANES) -> Bare:
+    """Nothing found yet beside a shading."""
+    state = np.zeros(blocks * planes * PITCH, np.float32)
+    return Bare(state, np.zeros((blocks, BARE_FIGURES)), np.zeros((blocks, 1, QUARTERS, 2)))
+
+
+def _spread(found: np.ndarray, count: int) -> np.ndarray:
+    """Sums over all blocks [count, 2, QUARTERS], of which the last may not have been taken."""
+    sums = np.zeros((count, 2, QUARTERS))
+    sums[: found.shape[1]] = np.moveaxis(found.sum(axis=0), 1, 2)
+    return sums
 
 
 def _scratch() -> tuple[np.ndarray, ...]:

@@ -6,8 +6,10 @@ distance is a metric, bounds b_1, b_2, ... are together
 
     (sqrt b_1 + sqrt b_2 + ...)^2 <= tolerance
 
-Estimates leave out nothing, and what costs nothing stays.  Of pixels that start in step, or whose memory jumps to the
-signal after each event (`refractory = "track"`), a bound says only how far apart recordings with nothing in common are.
+Estimates leave out nothing, and what costs nothing stays.  Of pixels whose memory jumps to the signal after each
+event (`refractory = "track"`) nearly all are estimates, so of these sensors hardly anything is left out.  Of pixels
+that start in step with thresholds that are all the same, a bound says only how far apart recordings with nothing in
+common are.
 Effects are tried in the order of their bounds; the second pole before both.
 
 Costs are of one thread at 1280x720, from the tables of the README and of the kernels' benchmark: nanoseconds per pixel
@@ -39,7 +41,8 @@ from vid2ev.physics import (
 from vid2ev.sensors.cis_spec import EFFECTS as OF_FRAMES
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream.scene import Omission, Scene, together
+from vid2ev.stream.bounds import together
+from vid2ev.stream.scene import Omission, Scene
 
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
 AnySpec = TypeVar("AnySpec", DvsSpec, CisSpec)

@@ -12,16 +12,30 @@ frozen until they come back.  The distance of two recordings is van Rossum's, ti
 
     distance = 2 sum D / (n_a + n_b),    D = 1/tau integral (H N)^2 dt,    H a high-pass of gain <= 1
 
-A stretch of N = 1 of length d costs 1 - exp(-d/tau) <= min(1, d/tau), stretches of both signs at most twice the sum.
-With n events that are pushed for the time A and turn C times, and signals that differ by e,
+A stretch of N = 1 of length d costs 1 - exp(-d/tau) <= min(1, d/tau), those of one sign at most the sum, and those of
+both signs at most 1 to 2 times the sum: 1 where they are rare (`bounds.py`).  With n events that are pushed for the
+time A and turn C times, and signals that differ by e,
 
-    distance <= 2 (e A / tau + e C) / (n theta)
+    distance <= (1 + min(1, 2 e/theta)) (e A / tau + e C) / (n theta)
 
 Where thresholds differ from pixel to pixel or crossing to crossing, two recordings of a pixel that disagree at a turn
 go on with other levels: each event after it is up to theta / |dy/dt| early or late (`echo`).
 
-Of recordings that need have nothing in common D is at most that of either by itself, twice (`unlike`): the events that
-are within tau of another in its pixel add up (`dense`), as many as |dy| there / theta.
+**Memories that jump to the signal** a blind time R after each event (`refractory = "track"`) follow each other by
+t -> t':  y(t') = y(t + R) +- theta.  Events are theta + R |dy/dt| of the signal apart, so travel is counted as that
+much less.  Let b = a + e.  From event to event the error of the memory grows by e(t + R) - e(t'), its share of a
+cycle stays as it is: a slope that has changed by the time that the pixel sees again stretches the error and the
+cycle alike, on average over phases that are even.  So errors do not add up but for what e changes by within cycles:
+that is 0 for a shift in time or level, and for a bend of the slope by r the chance that an event falls where it is
+still felt, twice (at t' and at t + R):
+
+    2 (|dy/dt| / theta) integral |e| dt  =  r |dy/dt| variance / theta    (`by_stirs`: the sum over all bends so far)
+
+That phases are even is argued, not proven: from one event to the next their density changes by the slope at t' over
+that at t + R.  So what follows from it is an estimate, and nothing is left out by it.
+
+Of recordings that need have nothing in common D is at most that of either by itself (`unlike`): the events that are
+within tau of another in its pixel add up (`dense`), as many as |dy| there / theta.
 
 Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001; M. Krasnoselskii and A. Pokrovskii,
 *Systems with Hysteresis*, Springer 1989, for play and relays; the bounds are ours.
@@ -29,18 +43,25 @@ Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 DISTANCE_TAU_S = 1e-3
-RARE = math.log(1000)  # a chance of 1 in 1000: what a 99.9 % bound leaves
 
 Kind = Literal["exact", "bound", "99.9 % bound", "estimate", "no bound yet"]
 OF_TILES = ("light_min", "light_max", "slope_max", "travel", "pushed_s", "turns", "bend", "bend_at_turns", "dense")
-SPREAD = ("by_slope", "by_turns", "by_bends", "by_light")
+OF_BARE = ("bare_apart", "bare_frozen", "bare_travel")
+SPREAD = (
+    "by_slope",
+    "by_turns",
+    "by_bends",
+    "by_light",
+    "by_stirs",
+    "by_stirs_before",
+    "by_stirs_at_turns",
+)
 QUARTER_EDGES = np.arange(103 << 2, (143 << 2) + 1, dtype=np.int32)
 QUARTER_EDGES = np.left_shift(QUARTER_EDGES, 21).view(np.float32).astype(np.float64)
 
@@ -85,6 +106,14 @@ class Scene:
     by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these; of travel
                               that which counts if levels are no longer the same
     by_light                  the same by the light there
+    by_stirs ...              of memories that jump to the signal, the same by what bends have left in them, the sum of
+                              bend x slope / threshold [nat/ms^2]: by it times the time that a nat takes; of the travel
+                              that counts by its sum at turns; and of the turns themselves
+    bare_apart, bare_frozen   [tiles] of light without the lens shading: |p_a - p_b| over the time that either is pushed
+                              [nat s], and where either turns [nat]
+    bare_travel               [tiles] its travel
+    by_bare                   the travel that counts, by the sum of |p_a - p_b| at turns before it
+    moving                    how many pixels have any travel
     busiest                   the travel of the pixel that has most [nat]
     by_pixel                  travel of the pixels that have 0, 1, ... whole events
     brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel, now and then
@@ -107,6 +136,14 @@ class Scene:
     by_turns: np.ndarray
     by_bends: np.ndarray
     by_light: np.ndarray
+    by_stirs: np.ndarray
+    by_stirs_before: np.ndarray
+    by_stirs_at_turns: np.ndarray
+    bare_apart: np.ndarray
+    bare_frozen: np.ndarray
+    bare_travel: np.ndarray
+    by_bare: np.ndarray
+    moving: int
     busiest: float
     by_pixel: np.ndarray
     brightness: np.ndarray
@@ -152,76 +189,3 @@ class Scene:
             "still_tiles": int(np.count_nonzero(self.travel == 0)),
             "tiles": len(self.travel),
         }
-
-
-def off_by(scene: Scene, error_nat: np.ndarray, *, echoes: bool) -> float:
-    """Bound on the mean distance where the comparator's input is off by up to error_nat [tiles]."""
-    if scene.still:
-        return 0.0
-    many = 1.0 + np.floor(error_nat / scene.threshold)  # levels that can be between the two signals
-    change = 2.0 * many * error_nat * (scene.pushed_s / DISTANCE_TAU_S + scene.turns)
-    change = np.minimum(change, 4.0 * many**2 * scene.travel)  # (each stretch begins with an event of either)
-    if echoes:
-        return float(change.sum() / scene.travel.sum()) + _echo(scene, scene.by_turns, float(error_nat.max()))
-    return float(change.sum() / scene.travel.sum())
-
-
-def delayed(scene: Scene, variance_s2: np.ndarray, reach_s: np.ndarray, *, echoes: bool) -> float:
-    """Bound on the mean distance where a low-pass gives way to its mean delay.
-
-    A bend of the slope by r is rounded off: the area between the two signals is r variance / 2, and their greatest
-    difference r reach, reach = E (D - E D)+ for a delay D that is distributed as the low-pass responds; of each tile.
-    """
-    if scene.still:
-        return 0.0
-    change = 2.0 * (0.5 * variance_s2 * scene.bend / DISTANCE_TAU_S + reach_s * scene.bend_at_turns)
-    mean = float(change.sum() / scene.travel.sum())
-    return mean + _echo(scene, scene.by_bends, float(reach_s.max())) if echoes else mean
-
-
-def unlike(scene: Scene) -> float:
-    """Bound on the mean distance whatever becomes of the levels and the times."""
-    return 0.0 if scene.still else 2.0 * scene.bunched
-
-
-def _echo(scene: Scene, spread: np.ndarray, per_number_nat: float) -> float:
-    """The share of the events that come after a disagreement in their pixel: no more than all of them."""
-    return float(np.minimum(spread[0], spread[1] * per_number_nat / scene.threshold).sum() / scene.travel.sum())
-
-
-def surely(scene: Scene, mean: float) -> float:
-    """The 99.9 % bound on a distance of this mean (Chernoff): pixels are independent, each event of light is as likely
-    to be the first that changes as any other, and what follows in its pixel changes with it.
-
-    For independent X_i, even on [0, m_i] with the chance 2 mu_i / m_i and else 0, and all l > 0,
-
-        P(sum X > t) <= exp(sum 2 mu_i ((exp(l m_i) - 1) / (l m_i) - 1) / m_i - l t)
-    """
-    if scene.still or mean == 0.0:
-        return mean
-    most = np.arange(len(scene.by_pixel)) + 2.0  # events
-    means = mean * scene.by_pixel / scene.threshold  # [events]
-    tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
-    sums = (2.0 * means * (np.expm1(tries * most) / (tries * most) - 1.0) / most).sum(axis=1)
-    return float(((sums + RARE) / tries[:, 0]).min()) / scene.events
-
-
-def added(events: float, extra: float, touched: float) -> float:
-    """Bound on the distance where up to `extra` events of noise [number] come or go beside at least so many others, and
-    up to a share `touched` of these comes after one of them in its pixel, and so from other levels."""
-    return touched + extra / (2.0 * events + extra) if extra > 0.0 else 0.0
-
-
-def at_most(mean: float) -> float:
-    """A number that one of Poisson's exceeds in less than 1 of 1000 cases."""
-    return mean + math.sqrt(2.0 * RARE * mean) + RARE / 1.5 if mean > 0 else 0.0
-
-
-def at_least(mean: float) -> float:
-    """A number that one of Poisson's falls short of in less than 1 of 1000 cases."""
-    return max(mean - math.sqrt(2.0 * RARE * mean), 0.0)
-
-
-def together(*distances: float) -> float:
-    """Bound on the distance of several changes made together: its root obeys the triangle inequality."""
-    return sum(math.sqrt(distance) for distance in distances) ** 2

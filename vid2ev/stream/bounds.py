@@ -1,0 +1,141 @@
+"""Bounds on the distance of two recordings, from what was measured of a scene; the theory is that of `scene.py`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vid2ev.stream.scene import DISTANCE_TAU_S, Scene
+
+RARE = math.log(1000)  # a chance of 1 in 1000: what a 99.9 % bound leaves
+PIXELS_DIFFER = 4.0  # how much more than the mean of its tile a pixel's signals may differ for, where that counts
+
+
+def off_by(scene: Scene, error_nat: np.ndarray, *, echoes: bool, one_way: bool = False) -> float:
+    """Bound on the mean distance where the comparator's input is off by up to error_nat [tiles]; one_way if it is
+    never above in one place and below in another, for then the sign of N is the same everywhere."""
+    if scene.still:
+        return 0.0
+    many = 1.0 + np.floor(error_nat / scene.threshold)  # levels that can be between the two signals
+    sides = 1.0 if one_way else _sides(error_nat / scene.threshold)
+    change = sides * many * error_nat * (scene.pushed_s / DISTANCE_TAU_S + scene.turns)
+    change = np.minimum(change, 4.0 * many**2 * scene.travel)  # (each stretch begins with an event of either)
+    if echoes:
+        return float(change.sum() / scene.travel.sum()) + _echo(scene, scene.by_turns, float(error_nat.max()))
+    return float(change.sum() / scene.travel.sum())
+
+
+def _sides(share: np.ndarray) -> np.ndarray:
+    """By how much stretches of either sign cost more than each by itself, where there is one for such a share of the
+    time: a stretch and one of the other sign that is a time t away share at most exp(-t/tau) of the shorter, so all
+    that are near it add up to twice their share, and never to more than itself."""
+    return 1.0 + np.minimum(2.0 * share, 1.0)
+
+
+def delayed(scene: Scene, variance_s2: np.ndarray, reach_s: np.ndarray, *, echoes: bool, stir_s2: float = 0.0) -> float:
+    """Bound on the mean distance where a low-pass gives way to its mean delay.
+
+    A bend of the slope by r is rounded off: the area between the two signals is r variance / 2, and their greatest
+    difference r reach, reach = E (D - E D)+ for a delay D that is distributed as the low-pass responds; of each tile.
+    Where memories jump to the signal, a bend leaves up to r slope stir_s2 / theta in them (`Scene`).
+    """
+    if scene.still:
+        return 0.0
+    area, frozen = 0.5 * variance_s2 * scene.bend, reach_s * scene.bend_at_turns
+    often = (area / np.maximum(scene.pushed_s, 1e-30) + frozen / np.maximum(scene.turns, 1.0)) / scene.threshold
+    change = _sides(PIXELS_DIFFER * often) * (area / DISTANCE_TAU_S + frozen)
+    mean = float(change.sum() / scene.travel.sum()) + _stirred(scene, stir_s2)
+    return mean + _echo(scene, scene.by_bends, float(reach_s.max())) if echoes else mean
+
+
+def later(scene: Scene, late_s: float) -> float:
+    """Bound on the mean distance where events are early or late, by so much on average."""
+    if scene.still:
+        return 0.0
+    often = late_s * float(scene.travel.sum()) / max(float(scene.pushed_s.sum()) * scene.threshold, 1e-30)
+    return float(_sides(np.array(PIXELS_DIFFER * often))) * late_s / DISTANCE_TAU_S
+
+
+def _stirred(scene: Scene, stir_s2: float) -> float:
+    """What bends have left in memories: events at other times, others at turns, and those after them."""
+    stir_ms2 = stir_s2 * 1e6
+    turns, numbers = scene.by_stirs_at_turns
+    share = numbers / np.maximum(turns, 1e-300) * (stir_ms2 / scene.threshold)  # of a cycle, in each quarter
+    sides = float(np.dot(_sides(share), numbers)) / max(float(numbers.sum()), 1e-300)
+    apart = _echo(scene, scene.by_stirs, stir_ms2 * scene.threshold / DISTANCE_TAU_S)
+    at_turns = _echo(scene, scene.by_stirs_at_turns, stir_ms2)
+    return sides * (apart + at_turns) + _echo(scene, scene.by_stirs_before, stir_ms2)
+
+
+def unlike(scene: Scene, lag_s: np.ndarray | float = math.inf) -> float:
+    """Bound on the mean distance whatever becomes of the levels, and of the times where signals are no further apart
+    than by lag_s, of all tiles or of each.
+
+    While both signals go one way, all events of both are of one sign, so D is at most that of either by itself, and of
+    one: what an event has near it, of its own recording or of the other, is what is dense there.  Only where they
+    turn are events of both signs near each other.
+    """
+    if scene.still:
+        return 0.0
+    turning = np.minimum(np.multiply(lag_s, np.maximum(scene.bend_at_turns, 1e-30)), scene.travel)
+    return (1.0 + float(turning.sum() / scene.travel.sum())) * scene.bunched
+
+
+def _echo(scene: Scene, spread: np.ndarray, per_number_nat: float) -> float:
+    """The share of the events that come after a disagreement in their pixel: no more than all of them."""
+    return float(np.minimum(spread[0], spread[1] * per_number_nat / scene.threshold).sum() / scene.travel.sum())
+
+
+def bare(scene: Scene, *, echoes: bool) -> float:
+    """Bound on the mean distance where the light is without the lens shading."""
+    if not scene.travel.any() and not scene.bare_travel.any():
+        return 0.0
+    mean_travel = 0.5 * float(scene.travel.sum() + scene.bare_travel.sum())
+    often = scene.bare_apart / np.maximum(scene.pushed_s, 1e-30) + scene.bare_frozen / np.maximum(scene.turns, 1.0)
+    change = _sides(PIXELS_DIFFER * often / scene.threshold) * (scene.bare_apart / DISTANCE_TAU_S + scene.bare_frozen)
+    echo = _echo(scene, scene.by_bare, 1.0) if echoes and not scene.still else 0.0
+    return float(np.minimum(change, 4.0 * (scene.travel + scene.bare_travel)).sum() / mean_travel) + echo
+
+
+def elsewhere(scene: Scene) -> float:
+    """What it costs an event, on average, if all levels are others."""
+    return float(scene.by_turns[0].sum() / scene.travel.sum()) if not scene.still else 0.0
+
+
+def surely(scene: Scene, mean: float) -> float:
+    """The 99.9 % bound on a distance of this mean (Chernoff): pixels are independent, each event of light is as likely
+    to be the first that changes as any other, and what follows in its pixel changes with it.
+
+    For independent X_i, even on [0, m_i] with the chance 2 mu_i / m_i and else 0, and all l > 0,
+
+        P(sum X > t) <= exp(sum 2 mu_i ((exp(l m_i) - 1) / (l m_i) - 1) / m_i - l t)
+    """
+    if scene.still or mean == 0.0:
+        return mean
+    most = np.arange(len(scene.by_pixel)) + 2.0  # events
+    means = mean * scene.by_pixel / scene.threshold  # [events]
+    tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
+    sums = (2.0 * means * (np.expm1(tries * most) / (tries * most) - 1.0) / most).sum(axis=1)
+    return float(((sums + RARE) / tries[:, 0]).min()) / scene.events
+
+
+def added(events: float, extra: float, touched: float) -> float:
+    """Bound on the distance where up to `extra` events of noise [number] come or go beside at least so many others, and
+    up to a share `touched` of these comes after one of them in its pixel, and so from other levels."""
+    return touched + extra / (2.0 * events + extra) if extra > 0.0 else 0.0
+
+
+def at_most(mean: float) -> float:
+    """A number that one of Poisson's exceeds in less than 1 of 1000 cases."""
+    return mean + math.sqrt(2.0 * RARE * mean) + RARE / 1.5 if mean > 0 else 0.0
+
+
+def at_least(mean: float) -> float:
+    """A number that one of Poisson's falls short of in less than 1 of 1000 cases."""
+    return max(mean - math.sqrt(2.0 * RARE * mean), 0.0)
+
+
+def together(*distances: float) -> float:
+    """Bound on the distance of several changes made together: its root obeys the triangle inequality."""
+    return sum(math.sqrt(distance) for distance in distances) ** 2
