@@ -15,9 +15,8 @@ SIZE = (40, 30)
 RUN = """
 import json, os, signal, sys
 from vid2ev import convert
-from vid2ev.plan import measure, planner
+from vid2ev.plan import planner
 
-planner.SPARE, measure.LOOK_NS, measure.PUSHED_NS = 0.5, 0.0, 0.0
 planner.HELD, last, seen = 10 * 40 * 30 * 4, int(sys.argv[1]), 0
 
 def report(*_):

@@ -15,7 +15,6 @@ from against.clips import clean
 
 from vid2ev import convert, read_events
 from vid2ev.instants import instants
-from vid2ev.plan import measure as measuring
 from vid2ev.plan import planner as planning
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import plans_of
@@ -33,13 +32,10 @@ SOME = 10 * SIZE[0] * SIZE[1] * 4  # bytes of ten frames
 
 @pytest.fixture
 def held(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
-    """Has so many bytes of light held, of clips whose measuring is free."""
+    """Has so many bytes of light held."""
 
     def hold(count: int) -> None:
         monkeypatch.setattr(planning, "HELD", count)
-        monkeypatch.setattr(planning, "SPARE", 0.5)
-        monkeypatch.setattr(measuring, "LOOK_NS", 0.0)
-        monkeypatch.setattr(measuring, "PUSHED_NS", 0.0)
 
     return hold
 
@@ -139,19 +135,17 @@ def test_of_a_camera_of_which_all_is_kept_no_more_is_measured(clip: Path, held: 
     assert len(seen) == 100 and not any(seen) and not planner.finish() and planner.looked == 10
 
 
-@pytest.mark.parametrize(("pushed_ns", "left_out"), [(5.0, True), (20.0, False)])
-def test_of_what_goes_on_nothing_is_left_out_that_saves_less_than_measuring_takes(
-    clip: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch, pushed_ns: float, left_out: bool
-) -> None:
-    """On the ramp the second pole takes 0.5 ns per pixel and frame, and 10 ns for each of 0.27 events."""
+def test_what_is_kept_for_what_is_to_come_says_so(clip: Path, tmp_path: Path, held: Callable[[int], None]) -> None:
+    """Of the ramp both poles are within the tolerance, and one of them within the half that is not spared."""
+    np.save(clip, np.load(clip)[:25])
     held(SOME)
-    whole = Planner(recipe(clip), 0.01)
-    whole.begin()
-    monkeypatch.setattr(measuring, "PUSHED_NS", pushed_ns * 0.27)
-    planner = Planner(recipe(clip), 0.01)
-    planner.begin()
-    assert whole.plans[""].gone and bool(planner.plans[""].gone) == left_out
-    assert left_out or planner.plans[""].distance == 0.0
+    manifest = made(clip, tmp_path / "auto", tolerance=0.012)
+    whys = {row["effect"]: row["why"] for row in manifest["plan"][""]["rows"]}
+    assert gone(manifest) == ["follower"] and plans_of(recipe(clip), "auto", 0.012)[""].gone == (
+        "photoreceptor",
+        "follower",
+    )
+    assert planning.SPARED in whys["photoreceptor"] and planning.SPARED not in whys["follower"]
 
 
 def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(

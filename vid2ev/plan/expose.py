@@ -39,8 +39,6 @@ from vid2ev.stream.frames import Frame
 
 WITHOUT: dict[str, dict[str, Any]] = {"exposure": {"blur": False}, "rolling_shutter": {"line_us": 0.0}}
 
-EXPOSURE_NS, SUMS_NS = 0.35, 1.0  # of one thread: a frame of light in an exposure, and the sums of one, per value
-
 
 class Expose:
     """What a frame camera of `size` (width, height) sees: `see` each frame of light, then ask for `exposed`."""
@@ -76,10 +74,6 @@ class Expose:
             for name, sums in self._changes.items():
                 add_change(lights[""], lights[name], self._shade, *self._ends, sums)
             self._exposures += 1
-
-    def costs(self) -> tuple[float, float]:
-        """What looking takes [ns per value of an exposure, of one thread], and how many events there are: none."""
-        return SUMS_NS + EXPOSURE_NS * len(self._cameras) * max(self.exposed().frames_each, 1.0), 0.0
 
     def exposed(self, speed_px_per_s: float | None = None) -> Exposed:
         """What was seen so far; the speed of what moves in the source, where that is known."""

@@ -23,7 +23,6 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, SPREAD, Scene
 
 BRIGHTNESS_EVERY = 8  # frames
-LOOK_NS, PUSHED_NS = 1.1, 12.0  # of one thread: per pixel and frame, and for one that is pushed, more
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 NOT_TOLD = np.empty(0, np.uint8)
 
@@ -101,12 +100,6 @@ class Measure:
             **dict(zip(OF_BARE, bare.tiles.T.copy(), strict=True)),
             by_bare=_spread(bare.spread, 1)[0],
         )
-
-    def costs(self) -> tuple[float, float]:
-        """What measuring takes [ns per pixel and frame, of one thread], and how many events a sensor sends in that."""
-        scene = self.scene()
-        pushed = float(scene.pushed_s.sum()) / max(scene.seconds * scene.pixels, 1e-300)
-        return LOOK_NS + PUSHED_NS * pushed, scene.events / (scene.pixels * scene.frames)
 
     def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)

@@ -18,8 +18,8 @@ and frame, and per event.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from pydantic import ValidationError
@@ -122,9 +122,15 @@ class Plan:
         """The effects that are left out or replaced."""
         return tuple(row.effect for row in self.rows if row.effect in KNOWN and row.fate != "kept")
 
-    def saved_ns(self, events: float) -> float:
-        """What leaving out saves, at so many events per pixel and frame [ns per pixel and frame, of one thread]."""
-        return sum(row.ns_per_pixel + events * row.ns_per_event for row in self.rows if row.effect in self.gone)
+    def kept_for(self, names: Collection[str], why: str) -> Plan:
+        """The plan in which rows of these effects that are kept say why, too."""
+        rows = tuple(
+            replace(row, omission=replace(row.omission, why=f"{row.omission.why}; {why}"))
+            if row.effect in names and row.fate == "kept"
+            else row
+            for row in self.rows
+        )
+        return replace(self, rows=rows)
 
     def describe(self) -> dict[str, Any]:
         """The plan, ready for JSON."""

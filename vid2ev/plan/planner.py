@@ -6,8 +6,10 @@ as it goes by, and the same plans are asked for again, of all that was seen so f
 what is left out is no longer within the tolerance, the plans leave out less, the recording begins again, and light is
 not measured twice.
 
-What is kept once is kept, and a camera of which all is kept is not looked at any more.  So it is at once if what would
-be left out saves no more than measuring on would take: a bound on the whole clip asks for all of it to be measured.
+What is kept once is kept, and a camera of which all is kept is not looked at any more.  What is kept although it would
+be within the tolerance, for the sake of what is still to come, says so in the plan.
+
+**Cost**: the plan is what was asked for, whether it pays or not.
 
 **It is sound**: a recording is made by one plan from its beginning to its end, and in the end that plan's bounds hold
 for the scene of the whole clip, as if it had been looked at first.
@@ -39,7 +41,8 @@ from vid2ev.plan.recordings import PASSES, Look, left_of, plans_unseen
 from vid2ev.recipe import Recipe
 
 HELD = 1 << 26  # bytes of light, at least an instant
-SPARE = 0.1  # share of the tolerance for the first plans: what comes may be worse, and to begin again is dear
+SPARE = 0.5  # share of the tolerance for the first plans: what comes may be worse, and to begin again is dear
+SPARED = "kept, as the first plan spares half of the tolerance for what was still to come"
 REVISIONS = 2  # after so many all is kept: each costs the recording so far
 
 
@@ -57,6 +60,7 @@ class Planner:
         self.looked, self.ended = 0, False  # instants, from the first on; and whether the last of them was the last
         self._look, self._looking = Look(recipe, threads), {mount.name for mount in recipe.mounts}
         self._bytes, self._due, self._revisions = 0, 2 * HELD, 0
+        self._spared: dict[str, frozenset[str]] = {}
         self._held: deque[Instant] = deque()
         self._rest: Generator[Instant] | None = None
 
@@ -139,12 +143,11 @@ class Planner:
 
     def _decide(self, more: bool) -> None:
         """The first plans; there may be `more` to see."""
-        found = self._look.plans("auto", self.tolerance * (SPARE if more else 1.0))
-        if more and any(plan.gone for plan in found.values()):
-            among = {name: plan.gone if self._look.pays(name, plan) else () for name, plan in found.items()}
-            found = self._look.plans("auto", self.tolerance * SPARE, among)
-        self.plans = {name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()}
-        self._keep_looking()
+        found = self._look.plans("auto", self.tolerance)
+        if more:
+            whole, found = found, self._look.plans("auto", self.tolerance * SPARE)
+            self._spared = {name: frozenset(whole[name].gone) - {*plan.gone} for name, plan in found.items()}
+        self._take({name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()})
 
     def _revise(self) -> bool:
         """Make the plans again, of no more than they leave out; returns whether any of them is another."""
@@ -156,12 +159,12 @@ class Planner:
             for name in new:
                 among[name] = _steady(self.plans[name], found[name]) if self._revisions < REVISIONS else ()
             found = self._look.plans("auto", self.tolerance, among)
-        self.plans |= found
-        self._keep_looking()
+        self._take(found)
         return bool(new)
 
-    def _keep_looking(self) -> None:
-        """Only at what cameras see of which something is left out."""
+    def _take(self, found: dict[str, Plan]) -> None:
+        """Go by these plans, and look only at what cameras see of which something is left out."""
+        self.plans |= {name: plan.kept_for(self._spared.get(name, ()), SPARED) for name, plan in found.items()}
         for name in [name for name in self._looking if not self.plans[name].gone]:
             self._look.forget(name)
             self._looking.discard(name)

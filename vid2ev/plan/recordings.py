@@ -57,11 +57,6 @@ class Look:
             if mount.name in self._cameras:
                 self._cameras[mount.name].see(frame)
 
-    def pays(self, name: str, plan: Plan) -> bool:
-        """Whether a plan of a camera saves more than looking on at what it sees would take."""
-        look_ns, events = self._cameras[name].costs()
-        return plan.saved_ns(events) > look_ns
-
     def forget(self, name: str) -> None:
         """Look no longer at what a camera sees; there are no more plans for it."""
         del self._cameras[name]
