@@ -11,7 +11,7 @@ import pytest
 from against.clips import clean
 
 from vid2ev.errors import UsageError
-from vid2ev.physics.photoreceptor import reach_of_follower
+from vid2ev.physics.photoreceptor_omission import reach_of_follower
 from vid2ev.plan.measure import scene_of
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names

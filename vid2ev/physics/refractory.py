@@ -23,7 +23,7 @@ from pydantic import BaseModel, Field
 
 from vid2ev.physics.crossing_noise import chances_below
 from vid2ev.physics.omission import crowding, light_events, noise_events, omitted
-from vid2ev.physics.photoreceptor import slopes_of, steepest
+from vid2ev.physics.photoreceptor_omission import slopes_of, steepest
 from vid2ev.stream.bounds import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 

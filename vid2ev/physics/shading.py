@@ -26,7 +26,7 @@ from pydantic import BaseModel, Field
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.omission import echoes, light_events, omitted, reset
-from vid2ev.physics.photoreceptor import lag_s, otherwise_late
+from vid2ev.physics.photoreceptor_omission import lag_s, otherwise_late
 from vid2ev.stream.bounds import added, at_most, bare
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 from vid2ev.stream.scene import Omission, Scene

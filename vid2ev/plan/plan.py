@@ -32,8 +32,8 @@ from vid2ev.physics import (
     fixed_rate,
     leak,
     mismatch,
-    photoreceptor,
     photoreceptor_noise,
+    photoreceptor_omission,
     refractory,
     shading,
     shot,
@@ -60,9 +60,9 @@ class Effect(NamedTuple):
 
 EFFECTS = {
     "shading": Effect(shading.omission, {"shading": ()}, 0.03, 0),
-    "photoreceptor": Effect(photoreceptor.omission, {"photoreceptor_tau_us": 0.0}, 0.6, 20),
-    "follower": Effect(photoreceptor.omission_of_follower, {"follower_tau_us": 0.0}, 0.5, 10),
-    "bandwidth": Effect(photoreceptor.omission_of_bandwidth, {"bandwidth": "constant"}, 0.6, 5),
+    "photoreceptor": Effect(photoreceptor_omission.omission, {"photoreceptor_tau_us": 0.0}, 0.6, 20),
+    "follower": Effect(photoreceptor_omission.omission_of_follower, {"follower_tau_us": 0.0}, 0.5, 10),
+    "bandwidth": Effect(photoreceptor_omission.omission_of_bandwidth, {"bandwidth": "constant"}, 0.6, 5),
     "photoreceptor_noise": Effect(photoreceptor_noise.omission, {"photoreceptor_noise": 0.0}, 0.9, 0),
     "mismatch": Effect(mismatch.omission, {"mismatch": 0.0}, 0, 0),
     "crossing_noise": Effect(crossing_noise.omission, {"crossing_noise": 0.0}, 0, 12),
