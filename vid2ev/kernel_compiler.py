@@ -25,6 +25,8 @@ from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import RewriteSemanticConstants
 
+from vid2ev.kernel_flags import Numba, fold_flags
+
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
 
@@ -55,11 +57,7 @@ class FlagsAreConstants(FunctionPass):
         FunctionPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        func_ir, changed = state.func_ir, False
-        left = [stmt for block in func_ir.blocks.values() for stmt in block.find_insts(ir.Assign)]
-        while folded := [stmt for stmt in left if _fold(stmt, func_ir, state.args)]:
-            left, changed = [stmt for stmt in left if stmt not in folded], True
-        return changed
+        return fold_flags(state.func_ir, state.args, Numba(ir, types, guard, get_definition))
 
 
 class InnerLibrary(JITCodeLibrary):
@@ -120,37 +118,3 @@ class KernelCompiler(CompilerBase):
         passes.add_pass_after(CallableByKernels, NativeLowering)
         passes.finalize()
         return [passes]
-
-
-def _fold(stmt: Any, func_ir: Any, argument_types: tuple) -> bool:
-    """Make the value of an assignment a constant where it is one."""
-    value, constant = stmt.value, None
-    if not isinstance(value, ir.Expr):
-        return False
-    if value.op == "call":
-        constant = _flag_length(value, func_ir, argument_types)
-    elif value.op == "binop":
-        sides = [guard(get_definition, func_ir, side) for side in (value.lhs, value.rhs)]
-        if all(isinstance(side, ir.Const) for side in sides):
-            constant = value.fn(*(side.value for side in sides))
-    if constant is None:
-        return False
-    definitions = func_ir._definitions[stmt.target.name]
-    stmt.value = ir.Const(constant, stmt.loc)
-    definitions[definitions.index(value)] = stmt.value
-    return True
-
-
-def _flag_length(call: Any, func_ir: Any, argument_types: tuple) -> int | None:
-    """n for `len(argument.field)`, where the field is a tuple of length n."""
-    function, field = guard(get_definition, func_ir, call.func), None
-    if isinstance(function, ir.Global) and function.value is len:
-        field = guard(get_definition, func_ir, call.args[0])
-    if not (isinstance(field, ir.Expr) and field.op == "getattr"):
-        return None
-    argument = guard(get_definition, func_ir, field.value)
-    whole: Any = argument_types[argument.index] if isinstance(argument, ir.Arg) else None
-    if not isinstance(whole, (types.NamedTuple, types.NamedUniTuple)) or field.attr not in whole.fields:
-        return None
-    part = whole.types[whole.fields.index(field.attr)]
-    return len(part) if isinstance(part, types.BaseTuple) else None

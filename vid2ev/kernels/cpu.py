@@ -5,29 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernels.crossing import AT, LEVEL_ON, cross, fresh_thresholds, leave_levels, load_thresholds
+from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
-from vid2ev.kernels.layout import (
-    BLOCK,
-    HIGH,
-    INPUT,
-    LAG1,
-    LANE_COUNT,
-    LOW,
-    PITCH,
-    STRIP,
-    last_light,
-    place_of,
-    stride_of,
-)
+from vid2ev.kernels.layout import BLOCK, HIGH, LANE_COUNT, LOW, PITCH, STRIP, stride_of
 from vid2ev.kernels.naps import give_back
 from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
+from vid2ev.kernels.settle import settle_pixel, shift_pixel
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.sleep import doze, next_run, stir
 from vid2ev.kernels.slow import climb, load
-from vid2ev.physics.comparator import initial_phase
-from vid2ev.physics.log_curve import log_level, log_level_32
 
 _ADD_BYTES = np.uint64(0x0101010101010101)
 
@@ -202,10 +189,7 @@ def take_general(block, work, count, p0, keys, chance, forced, planes, flags, nu
 @compiled
 def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_phase, planes, flags, num, work, tally):
     """The state after a long time in this light: no lags, levels about the signal."""
-    poles = len(flags.poles)
-    stride = stride_of(flags)
-    scratch, one_lane, one_pixel, first_lane = work.scratch, work.one_lane, work.one_pixel, work.live
-    first_lane[0] = 0
+    stride, scratch = stride_of(flags), work.scratch
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
@@ -216,43 +200,11 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
         block[LOW * PITCH : LOW * PITCH + BLOCK] = -np.inf
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
         for i in range(size):
-            pixel = p0 + i
-            u = scratch[NEW + i]
-            if len(flags.light_bandwidth):
-                block[last_light(flags) + i] = u
-            level = log_level(np.float64(u), num.curve)
-            if len(flags.log_input):
-                u = log_level_32(u, num.curve)
-                level = np.float64(u)
-            block[INPUT * PITCH + i] = u
-            if len(flags.noise):
-                block[(LAG1 + poles + 2) * PITCH + i] = level
-            one_pixel[0] = pixel
-            one_lane[AT] = level
-            fresh_thresholds(one_lane, one_pixel, first_lane, 1, planes, flags, num)
-            leave_levels(one_lane, one_pixel, 1, planes, flags, num)
-            if random_phase:
-                phase = initial_phase(num.seed, num.camera, pixel)
-                planes.memory[pixel] = level - (1.0 - phase) * (one_lane[LEVEL_ON] - level)
-                load_thresholds(one_lane, one_pixel, 1, planes, flags, num)
-                leave_levels(one_lane, one_pixel, 1, planes, flags, num)
-            if len(flags.labels) and len(flags.leak):
-                # Nothing but leak has lifted a settled signal above its memory.
-                lifted = level - planes.memory[pixel]
-                planes.t_reset[pixel] = t_ns - np.int64(lifted / num.leak_nat_per_ns)
-            if bad[pixel]:
-                block[HIGH * PITCH + i], block[LOW * PITCH + i] = np.inf, -np.inf
+            settle_pixel(block, scratch[NEW + i], i, p0 + i, t_ns, bad, random_phase, planes, flags, num, work)
 
 
 @compiled
 def shift_levels(pixels, by, planes, flags, num, work):
     """Lower all memories by `by` nats: what the leak has risen since its reference is taken into them."""
-    stride = stride_of(flags)
-    lanes, pixel = work.one_lane, work.one_pixel
     for p in range(pixels):
-        pixel[0] = p
-        at = place_of(p, stride)
-        planes.memory[p] -= by
-        if abs(planes.fast[at + HIGH * PITCH]) < np.inf:  # a bad or a blind pixel keeps its sign
-            load_thresholds(lanes, pixel, 1, planes, flags, num)
-            leave_levels(lanes, pixel, 1, planes, flags, num)
+        shift_pixel(p, by, planes, flags, num, work)

@@ -13,6 +13,7 @@ import numpy as np
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
+from vid2ev.kernels.sink import put, room
 from vid2ev.physics.crossing_noise import noisy_thresholds
 from vid2ev.physics.mismatch import FLOOR
 
@@ -104,17 +105,6 @@ def leave_levels(lanes, pixels, count, planes, flags, num):
 
 
 @inner
-def room(out, n, more):
-    """`out`, or a copy of at least twice the length where `more` keys after n would not fit."""
-    if n + more <= out.size:
-        return out
-    longer = np.empty(max(2 * out.size, n + more), np.uint64)
-    for i in range(n):  # (a slice would compile numpy's broadcasting, and its words for errors)
-        longer[i] = out[i]
-    return longer
-
-
-@inner
 def key_of(when_ns, pixel, polarity, label, iv):
     """The key of an event `when_ns` after t0: its time is the nearest microsecond in (t0, t1]."""
     k = np.int64((iv.offset_ns + when_ns) * 1e-3 + 0.5)
@@ -139,14 +129,14 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
             if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], pixel, planes, flags, num):
                 label = np.int64(LEAK)
             t_reset[pixel] = t_ns
-        out[n] = key_of(when_ns, pixel, polarity, label, iv)
+        key = key_of(when_ns, pixel, polarity, label, iv)
         if len(flags.refractory):
             blind = t_ns - t_last[pixel] < num.refractory_ns
             t_last[pixel] = t_last[pixel] if blind else t_ns
             tally[SWALLOWED] += np.int64(blind)
-            n += np.int64(not blind)
+            n = put(out, n, key, not blind)
         else:
-            n += 1
+            n = put(out, n, key, True)
     return out, n
 
 

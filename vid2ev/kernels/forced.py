@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
-from vid2ev.kernels.layout import BLOCK, INPUT, PITCH
+from vid2ev.kernels.layout import INPUT, PITCH
 from vid2ev.kernels.order import first_from
 from vid2ev.kernels.scan import NEW
 from vid2ev.physics.elementary import log64
 from vid2ev.physics.log_curve import light_at
 from vid2ev.physics.random import HOT, SHOT, philox, unit
-from vid2ev.physics.shot import CELL_NS, shot_share
+from vid2ev.physics.shot import CELL_NS, CELL_PIXELS, shot_share
 
-_LOCAL = np.int64(52)  # bit at which the pixel stands in the key that orders candidates
+LOCAL = np.int64(52)  # bit at which the pixel stands in the key that orders candidates
 
 
 @inner
@@ -30,31 +30,31 @@ def longer(keys, chance, n):
 
 
 @inner
-def _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
+def shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
     """Add the shots of a cell; returns how many candidates there are then, or -1 if the buffers are too short.
 
     Arrivals in a cell are equally likely anywhere in (pixels of the block) x (time): a walk of exponential gaps.
     """
-    per_block = BLOCK * num.shot_rate_hz * CELL_NS * 1e-9
+    per_block = CELL_PIXELS * num.shot_rate_hz * CELL_NS * 1e-9
     place, k, last = 0.0, 0, iv.t0_ns + np.int64(iv.dt_ns)
     while True:
-        words = philox(num.seed, SHOT + 256 * num.camera, np.int64(p0 // BLOCK) | (k << 15), cell)
+        words = philox(num.seed, SHOT + 256 * num.camera, np.int64(p0 // CELL_PIXELS) | (k << 15), cell)
         place -= log64(unit(words[0])) / per_block
-        local = np.int64(place * BLOCK)
+        local = np.int64(place * CELL_PIXELS)
         if local >= pixels:
             return n
         if n == keys.size:
             return -1
         t_ns = cell * CELL_NS + 1 + np.int64(unit(words[1]) * CELL_NS)
-        keys[n] = (local << _LOCAL) | (t_ns - iv.t0_ns)
+        keys[n] = (local << LOCAL) | (t_ns - iv.t0_ns)
         chance[n] = (1.0 if words[3] & np.uint32(1) else -1.0) * unit(words[2])
         n += np.int64((t_ns > iv.t0_ns) & (t_ns <= last))
         k += 1
 
 
 @inner
-def _hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
-    """Add the events of a hot pixel in a cell; returns as `_shot_of_cell` does."""
+def hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
+    """Add the events of a hot pixel in a cell; returns as `shot_of_cell` does."""
     gap_ns, k, last = 1e9 / num.hot_rate_hz, 0, iv.t0_ns + np.int64(iv.dt_ns)
     place = 0.0
     while True:
@@ -65,7 +65,7 @@ def _hot_of_cell(keys, chance, n, p0, pixel, cell, num, iv):
         if n == keys.size:
             return -1
         t_ns = cell * CELL_NS + 1 + np.int64(place)
-        keys[n], chance[n] = ((pixel - p0) << _LOCAL) | (t_ns - iv.t0_ns), 0.0
+        keys[n], chance[n] = ((pixel - p0) << LOCAL) | (t_ns - iv.t0_ns), 0.0
         n += np.int64((t_ns > iv.t0_ns) & (t_ns <= last))
         k += 1
 
@@ -81,18 +81,18 @@ def candidates(keys, chance, p0, pixels, hot, num, iv):
     first, last = iv.t0_ns // CELL_NS, (iv.t0_ns + np.int64(iv.dt_ns) - 1) // CELL_NS
     if num.shot_rate_hz > 0.0:
         for cell in range(first, last + 1):
-            more = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
+            more = shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
             while more < 0:
                 keys, chance = longer(keys, chance, n)
-                more = _shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
+                more = shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv)
             n = more
     if num.hot_rate_hz > 0.0:
         for h in range(first_from(hot, p0), first_from(hot, p0 + pixels)):
             for cell in range(first, last + 1):
-                more = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
+                more = hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
                 while more < 0:
                     keys, chance = longer(keys, chance, n)
-                    more = _hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
+                    more = hot_of_cell(keys, chance, n, p0, np.int64(hot[h]), cell, num, iv)
                 n = more
     if n > 64:
         keys, chance = sorted_by_pixel(keys, chance, n)
@@ -108,14 +108,14 @@ def candidates(keys, chance, p0, pixels, hot, num, iv):
 @inner
 def sorted_by_pixel(keys, chance, n):
     """The first n candidates counted into the order of their pixels."""
-    start = np.zeros(BLOCK + 1, np.int64)
+    start = np.zeros(CELL_PIXELS + 1, np.int64)
     for i in range(n):
-        start[(keys[i] >> _LOCAL) + 1] += 1
-    for k in range(BLOCK):
+        start[(keys[i] >> LOCAL) + 1] += 1
+    for k in range(CELL_PIXELS):
         start[k + 1] += start[k]
     ordered, shares = np.empty(keys.size, np.int64), np.empty(keys.size, np.float64)
     for i in range(n):
-        k = keys[i] >> _LOCAL
+        k = keys[i] >> LOCAL
         ordered[start[k]], shares[start[k]] = keys[i], chance[i]
         start[k] += 1
     return ordered, shares
@@ -124,7 +124,7 @@ def sorted_by_pixel(keys, chance, n):
 @inner
 def place_of_candidate(key, iv):
     """(pixel of the block, fraction of the interval) of a candidate."""
-    return key >> _LOCAL, np.float64(key & ((np.int64(1) << _LOCAL) - 1)) / iv.dt_ns
+    return key >> LOCAL, np.float64(key & ((np.int64(1) << LOCAL) - 1)) / iv.dt_ns
 
 
 @inner

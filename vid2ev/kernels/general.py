@@ -31,11 +31,11 @@ from vid2ev.kernels.crossing import (
     key_of,
     leave_levels,
     load_thresholds,
-    room,
 )
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LOW, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
+from vid2ev.kernels.sink import put, room
 from vid2ev.physics.log_curve import Curve, log_level, log_slope
 from vid2ev.physics.photoreceptor import (
     response,
@@ -193,10 +193,10 @@ def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
 
 @inner
 def cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, out, n, tally):
-    """`cross` for one pixel: (c_on, c_off, out, n)."""
+    """`cross` for one pixel: (c_on, c_off, out, n).  The second of `pixels` is 0, the number of the only lane."""
     pixels[0] = pixel
     lanes[AT], lanes[WHEN], lanes[UP], lanes[LABEL] = at, s, 1.0 if up else 0.0, label
-    out, n = cross(lanes, pixels, np.zeros(1, np.int64), 1, planes, flags, num, iv, out, n, tally)
+    out, n = cross(lanes, pixels, pixels[1:], 1, planes, flags, num, iv, out, n, tally)
     return lanes[LEVEL_ON], lanes[LEVEL_OFF], out, n
 
 
@@ -247,7 +247,7 @@ def walk_pixel(
         s = stop
         if stop == blind_s:
             pixels[0], lanes[AT] = pixel, end
-            fresh_thresholds(lanes, pixels, np.zeros(1, np.int64), 1, planes, flags, num)
+            fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)
             leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
             blind_until = -1.0
@@ -285,8 +285,7 @@ def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, nu
         if not blind:
             planes.t_last[pixel % planes.t_last.size] = t_ns
             out = room(out, n, 1)
-            out[n] = key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv)
-            n += 1
+            n = put(out, n, key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv), True)
         return on, off, out, n
     if on == np.inf or (blind and len(flags.track)):
         return on, off, out, n

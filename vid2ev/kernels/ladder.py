@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
+from vid2ev.kernel_intrinsics import floor
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
 from vid2ev.kernels.layout import CAPPED, LANE_PITCH
 
@@ -30,7 +31,7 @@ def count_rungs(lanes, count, num, tally):
         up = end >= at + lanes[LEVEL_ON + j]
         step = lanes[LEVEL_ON + j] if up else -lanes[LEVEL_OFF + j]
         first = at + step
-        rungs = max(np.floor((end - first) / step) + 1.0, 0.0)
+        rungs = max(floor((end - first) / step) + 1.0, 0.0)
         last = first + (rungs - 1.0) * step
         # The quotient may round a rung away that the levels left behind would find at the next interval's start.
         further = last + step

@@ -15,14 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.kernels.widths import BLOCK, BLOCK_BITS, LANE_COUNT, LANE_PITCH, PITCH
 from vid2ev.physics.log_curve import Curve
-from vid2ev.stream.still import STRIP as STRIP  # pixels of a block that sleep or are awake together
+from vid2ev.stream.still import STRIP  # pixels of a block that sleep or are awake together
 
-BLOCK_BITS = 11  # larger, and the scratch leaves the cache; smaller, and each block starts too many streams
-BLOCK = 1 << BLOCK_BITS
-LANE_COUNT = 1024
-# Distances of planes: at a power of two apart they would fight for the same lines of the cache.
-PITCH, LANE_PITCH = BLOCK + 16, LANE_COUNT + 16
+__all__ = ["BLOCK", "BLOCK_BITS", "LANE_COUNT", "LANE_PITCH", "PITCH", "STRIP"]  # (and what is below)
+
 PIXEL_LIMIT = 1 << 25  # bits of the event key
 ON = (0,)
 OFF = ()

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_intrinsics import bits_32, float_32
 from vid2ev.kernels.calm import CALM, arriving, first_tau, left_of, next_run, rest
 from vid2ev.kernels.cpu import hits_of
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
@@ -38,7 +39,6 @@ from vid2ev.kernels.play import (
     WAY,
     follow,
 )
-from vid2ev.physics.elementary import bits_32, float_32
 from vid2ev.physics.log_curve import log_level_32
 
 F = np.float32

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.kernel_intrinsics import bits_32
 from vid2ev.kernels.layout import PITCH
-from vid2ev.physics.elementary import bits_32, expm1_32
+from vid2ev.physics.elementary import expm1_32
 
 F = np.float32
 # Planes of the state of a block, in units of PITCH; the last two are of memories that jump to the signal.

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
-from vid2ev.kernels.crossing import SIGNAL, UP, key_of, room
+from vid2ev.kernels.crossing import SIGNAL, UP, key_of
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
 from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
 from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, new_lag, old_lag
+from vid2ev.kernels.sink import put, put_two, replace_last, room
 from vid2ev.physics.log_curve import log_level
 
 START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * LANE_PITCH for k in range(4))
@@ -81,15 +82,14 @@ def send_lines(lanes, pixels, stamps, count, crossings, flags, num, iv, out, n):
         stamps[LANE_PITCH + j] = key_of(first + rung, pixels[j], polarity, SIGNAL, iv)
     for j in range(count):
         rungs = np.int64(lanes[RUNGS + j])
-        out[n], out[n + 1] = stamps[j], stamps[LANE_PITCH + j]
+        n = put_two(out, n, stamps[j], stamps[LANE_PITCH + j], rungs)
         if rungs > 2:
             polarity = np.int64(lanes[UP + j])
             first, rung = rung_times(lanes, j, flags, iv)
             for k in range(2, rungs):
-                out[n + k] = key_of(first + k * rung, pixels[j], polarity, SIGNAL, iv)
-        n += rungs
+                n = put(out, n, key_of(first + k * rung, pixels[j], polarity, SIGNAL, iv), True)
         if rungs > num.max_crossings:
-            out[n - 1] = key_of(iv.dt_ns, pixels[j], np.int64(lanes[UP + j]), SIGNAL, iv)
+            replace_last(out, n, key_of(iv.dt_ns, pixels[j], np.int64(lanes[UP + j]), SIGNAL, iv))
     return out, n
 
 

@@ -39,7 +39,7 @@ class Work(NamedTuple):
     turns: np.ndarray  # float64
     stamps: np.ndarray  # uint64, keys of events
     one_lane: np.ndarray  # float64, for a pixel by itself
-    one_pixel: np.ndarray  # int64
+    one_pixel: np.ndarray  # int64 [2], the pixel and 0, the number of its lane
     shot_lanes: np.ndarray  # float64
     shot_pixels: np.ndarray  # int64
     knots: np.ndarray  # float64
@@ -65,7 +65,7 @@ def new_work() -> Work:
         turns=aligned(TURNS, f64),
         stamps=aligned(2 * LANE_PITCH, np.uint64),
         one_lane=aligned(FREE, f64),
-        one_pixel=aligned(1, i64),
+        one_pixel=aligned(2, i64),
         shot_lanes=aligned(FREE, f64),
         shot_pixels=aligned(LANE_COUNT, i64),
         knots=aligned(KNOTS, f64),

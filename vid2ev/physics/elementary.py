@@ -13,37 +13,9 @@ exponentials by the Taylor series on |r| <= ln 2 / 2.  Measured errors: `log32` 
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.core.extending import intrinsic
 
 from vid2ev.kernel_compiler import compiled
-
-
-def _bitcast(source, target):
-    @intrinsic
-    def cast(typing_context, value):
-        def codegen(context, builder, signature, arguments):
-            return builder.bitcast(arguments[0], context.get_value_type(target))
-
-        return target(source), codegen
-
-    return cast
-
-
-@intrinsic
-def fma(typing_context, a, b, c):
-    """a * b + c, rounded once: the same bits on every machine, and one instruction on all but the oldest."""
-
-    def codegen(context, builder, signature, arguments):
-        return builder.fma(*arguments)
-
-    return a(a, a, a), codegen
-
-
-bits_32 = _bitcast(types.float32, types.int32)
-float_32 = _bitcast(types.int32, types.float32)
-_bits64 = _bitcast(types.float64, types.int64)
-_float64 = _bitcast(types.int64, types.float64)
+from vid2ev.kernel_intrinsics import bits_32, bits_64, float_32, float_64, fma
 
 F = np.float32
 _SQRT_HALF_32 = np.int32(0x3F3504F3)
@@ -95,10 +67,10 @@ def log32(x):
 @compiled
 def log64(x):
     """Natural logarithm of a positive normal float64."""
-    bits = _bits64(x)
+    bits = bits_64(x)
     biased = ((bits - _SQRT_HALF_64) + np.int64(1024 << 52)) >> np.int64(52)
-    m = _float64(np.int64(bits - ((biased - np.int64(1024)) << np.int64(52))))
-    k = _float64(np.int64(biased | np.int64(0x4330000000000000))) - 4503599627371520.0
+    m = float_64(np.int64(bits - ((biased - np.int64(1024)) << np.int64(52))))
+    k = float_64(np.int64(biased | np.int64(0x4330000000000000))) - 4503599627371520.0
     f = m - 1.0
     s = f / (2.0 + f)
     z = s * s
@@ -118,7 +90,7 @@ def _exp_parts(x):
     k = shifted - _ROUND_64
     r = fma(-k, _LN2_LO_64, fma(-k, _LN2_HI_64, x))
     # The low bits of `shifted` hold k as an integer; moved to the exponent's place they make 2**k.
-    scale = _float64(np.int64((_bits64(shifted) << np.int64(52)) + np.int64(0x3FF0000000000000)))
+    scale = float_64(np.int64((bits_64(shifted) << np.int64(52)) + np.int64(0x3FF0000000000000)))
     p = fma(r, 1.6059043836821613e-10, 2.08767569878681e-09)
     p = fma(r, fma(r, p, 2.505210838544172e-08), 2.755731922398589e-07)
     p = fma(r, p, 2.7557319223985893e-06)

@@ -32,7 +32,8 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, fma, log64
+from vid2ev.kernel_intrinsics import fma
+from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log64
 
 F = np.float32
 _APART = 1e-4

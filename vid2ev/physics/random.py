@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.elementary import fma, log64
+from vid2ev.kernel_intrinsics import floor, fma, sqrt
+from vid2ev.physics.elementary import log64
 
 PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE, READOUT, FIXED_PATTERN = range(10)
 
@@ -78,9 +79,9 @@ def unit(word):
 @compiled
 def normal_pair(first, second):
     """Two independent standard normal numbers from two words (Box and Muller 1958); |z| < 6.8."""
-    radius = np.sqrt(-2.0 * log64(unit(first)))
+    radius = sqrt(-2.0 * log64(unit(first)))
     quarter = unit(second) * 4.0
-    nearest = np.floor(quarter + 0.5)
+    nearest = floor(quarter + 0.5)
     a = (quarter - nearest) * 1.5707963267948966
     z = a * a
     sine = fma(z, fma(z, fma(z, fma(z, 2.7557319e-06, -1.984126984e-04), 8.333333333e-03), -0.16666666666666666), 1.0)

@@ -25,7 +25,7 @@ from vid2ev.physics.omission import kind_of, light_events
 from vid2ev.stream.bounds import added, at_most, surely
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
-CELL_NS = 1_000_000
+CELL_NS, CELL_PIXELS = 1_000_000, 2048
 
 
 class Shot(BaseModel, frozen=True, extra="forbid"):
