@@ -66,7 +66,7 @@ def tried(name: str, sensor: str, spec: DvsSpec, seed: int = 0) -> Outcome:
         if row.omission.distance is not None:
             left = sent(without(spec, row.effect, row.omission), size, frames, seed)
             said = row.omission
-            trials.append(Trial(row.effect, distance(full, left, size), said.distance or 0.0, row.fate, said.sure))
+            trials.append(Trial(row.effect, distance(full, left, size), float(said.distance), row.fate, said.sure))
     changed = distance(full, sent(plan.spec, size, frames, seed), size)
     print(f"{sensor:10}{name:18}{changed:8.2g}  {'  '.join(map(str, trials))}", flush=True)
     return Outcome(sensor, trials, changed, len(frames))

@@ -109,7 +109,8 @@ class Auto(click.ParamType):
 )  # fmt: skip
 @click.option(
     "--effects", default="all", show_default=True, metavar="all|auto|none|NAME[,NAME...]",
-    help="Effects to simulate; auto: those that the clip calls for, found while it is converted (`vid2ev plan`).",
+    help="Effects to simulate; auto: those that the clip calls for, found while it is converted (`vid2ev plan`)."
+    " That says what matters; it rarely saves time, and may take twice as long.",
 )  # fmt: skip
 @click.option(
     "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",

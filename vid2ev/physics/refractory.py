@@ -72,7 +72,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     said = omitted(scene, spec, math.inf, figure, why)
     of_light = crossings * together / both
     of_light = of_light if scene.still else min(of_light, said.distance or math.inf)
-    return replace(said, distance=of_light + noisy * dense / both)
+    return replace(said, distance=float(of_light + noisy * dense / both))
 
 
 def _swallowed_with_noise(scene: Scene, spec: Any) -> float:
