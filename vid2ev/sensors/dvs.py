@@ -104,7 +104,7 @@ class Dvs:
         if self._t_ns is None:
             return self.restart(light, t_ns)
         flat, table = self._light(light)
-        t_ns = self._later(t_ns)
+        t_ns = self._later(t_ns, self._t_ns)
         self._rebase_leak(t_ns)
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
@@ -115,11 +115,7 @@ class Dvs:
         self._t_ns, self._seen = t_ns, light
         self._step += 1
         self._fresh_noise = not interval.noise_resolved
-        if self._delayed is not None:
-            events = self._delayed.push(events, t_ns // 1000)
-        if self._frames is not None:
-            events = self._frames.push(events, t_ns // 1000)
-        return self._counted(events)
+        return self._passed_on(events, t_ns)
 
     def restart(self, light: np.ndarray, t_ns: int) -> Events:
         """Settle in a frame of light at t_ns [int, ns], as after a cut: the light before it is forgotten.
@@ -131,7 +127,7 @@ class Dvs:
         self._seen = light
         if self._t_ns is None and self._frames is not None:
             self._frames.origin_us = int(t_ns) // 1000
-        t_ns = self._later(t_ns)
+        t_ns = self._later(t_ns, self._t_ns)
         self._settle(flat, table, t_ns)
         if self._delayed is not None:
             self._delayed.forget()
@@ -222,23 +218,24 @@ class Dvs:
 
     # ------------------------------------------------------------------------------------------------- inside
 
-    def _later(self, t_ns: int) -> int:
+    def _later(self, t_ns: int, last_ns: int | None) -> int:
         """The time of a frame, which must be after the last one."""
         t_ns = int(t_ns)
-        if self._t_ns is not None and not self._t_ns < t_ns < self._t_ns + LONGEST_INTERVAL_NS:
+        if last_ns is not None and not last_ns < t_ns < last_ns + LONGEST_INTERVAL_NS:
             raise UsageError(
-                f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one, by at most 4.8 hours;"
+                f"frame time {t_ns} ns after {last_ns} ns: expected a later one, by at most 4.8 hours;"
                 " sort the frames and drop repeated times"
             )
         return t_ns
 
+    def _check_shape(self, shape: tuple[int, ...]) -> None:
+        width, height = self.size
+        if shape != (height, width):
+            raise UsageError(f"light of shape {shape}: expected ({height}, {width}), rows and columns of this sensor")
+
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         light = np.asarray(light)
-        width, height = self.size
-        if light.shape != (height, width):
-            raise UsageError(
-                f"light of shape {light.shape}: expected ({height}, {width}), rows and columns of this sensor"
-            )
+        self._check_shape(light.shape)
         if light.dtype.kind == "f":
             flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
             return flat.reshape(-1), np.empty(0, np.float32)
@@ -292,6 +289,14 @@ class Dvs:
         each(lambda k: order_keys(parts[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
         each(lambda k: unpack(keys, ends, k, count, self.size[0], interval.first_us, t, x, y, p, label))
         return Events(t, x, y, p, label if self.labels else None)
+
+    def _passed_on(self, events: Events, t_ns: int) -> Events:
+        """What of the events up to t_ns is sent by then, through all that comes behind the comparator."""
+        if self._delayed is not None:
+            events = self._delayed.push(events, t_ns // 1000)
+        if self._frames is not None:
+            events = self._frames.push(events, t_ns // 1000)
+        return self._counted(events)
 
     def _counted(self, events: Events) -> Events:
         on = int(np.count_nonzero(events.p))

@@ -1,0 +1,121 @@
+"""A sensor on a GPU is the sensor on a CPU: the same events, counts and state, to the bit.
+
+The GPU is numba's simulator: kernels are run thread by thread, and what they call is compiled for the CPU from the same
+text, for one pixel per thread.  Compiling that takes half a minute for a combination of effects, so most are slow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vid2ev.errors import UsageError
+from vid2ev.kernels.cuda.clips import Sent
+from vid2ev.kernels.cuda.memory import Simulated
+from vid2ev.sensors.batch import DvsBatch
+from vid2ev.sensors.devices import memory_of, missing_for_cuda
+from vid2ev.sensors.dvs import Dvs, DvsSpec
+from vid2ev.sensors.dvs_on_card import DvsOnCard
+from vid2ev.stream import Events
+
+from .combinations import COMPILED
+from .drawn_clips import SIZE, Clip, clips
+
+QUICK = ("paper", "everything")
+LABELS = {"paper": False, "everything": True}
+specs = pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COMPILED]
+)
+
+
+def assert_same(one: list[Events], other: list[Events]) -> None:
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        for field in ("t", "x", "y", "p", "label"):
+            np.testing.assert_array_equal(getattr(a, field), getattr(b, field), field)
+
+
+def assert_same_state(one: Dvs, other: Dvs) -> None:
+    ours, theirs = one.state(), other.state()
+    assert ours.keys() == theirs.keys()
+    for name, plane in ours.items():
+        np.testing.assert_array_equal(plane, theirs[name], name)
+
+
+def both(name: str, clip: Clip, **options) -> tuple[Dvs, DvsOnCard]:
+    options |= {"labels": LABELS.get(name, True), "transfer": "srgb"}
+    spec = COMPILED[name]
+    return Dvs(spec, SIZE, clip.seed, **options), DvsOnCard(spec, SIZE, clip.seed, memory=Simulated(), **options)
+
+
+def seen(dvs: Dvs, clip: Clip, first: int = 0) -> list[Events]:
+    return [dvs.step(clip.frames[k], int(clip.t_ns[k])) for k in range(first, len(clip.t_ns))]
+
+
+@specs
+@settings(max_examples=8, deadline=None)
+@given(data=st.data())
+def test_events_counts_and_state_are_those_of_the_walk_on_a_cpu(name, data):
+    clip = data.draw(clips(np.dtype(data.draw(st.sampled_from(["float32", "float64", "uint8"])))))
+    cpu, card = both(name, clip)
+    assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
+    assert cpu.counts == card.counts
+    assert_same_state(cpu, card)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_state_is_taken_up_by_the_other(name):
+    rng = np.random.default_rng(3)
+    frames = np.exp(rng.normal(0, 0.7, (9, *SIZE[::-1]))).astype(np.float32)
+    clip = Clip(np.cumsum(rng.integers(3e5, 4e6, 9)), frames, 5, 11)
+    cpu, card = both(name, clip)
+    first = clip._replace(t_ns=clip.t_ns[:5])
+    whole = seen(cpu, clip)
+    here, there = both(name, clip)
+    assert_same(seen(here, first), there.steps(frames[:5], clip.t_ns[:5]))
+    cpu.restore(there.state())
+    card.restore(here.state())
+    assert_same(seen(cpu, clip, 5), whole[5:])
+    assert_same(card.steps(frames[5:], clip.t_ns[5:]), whole[5:])
+    assert sum(map(len, whole[5:])) > 100 and card.counts == cpu.counts
+
+
+def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own():
+    rng, base = np.random.default_rng(4), COMPILED["everything"].model_dump()
+    changes = ({}, {"threshold_on": 0.3, "shot_rate_hz": 300.0}, {"follower_tau_us": 900.0, "random_phase": False})
+    sensors, seeds = [DvsSpec(**(base | change)) for change in changes], [5, 2**64 - 1, 0]
+    frames = np.exp(rng.normal(0, 0.7, (7, 3, *SIZE[::-1]))).astype(np.float32)
+    t_ns = np.cumsum(rng.integers(1e4, 4e6, (7, 3)), axis=0)
+    batch = DvsBatch(sensors, SIZE, seeds, memory=Simulated(), cameras=[0, 1, 2], labels=True)
+    batch.restart(frames[0], t_ns[0])
+    parts = [batch.steps(frames[1:4], t_ns[1:4]), batch.steps(frames[4:], t_ns[4:])]
+    for k, (spec, seed) in enumerate(zip(sensors, seeds, strict=True)):
+        alone = Dvs(spec, SIZE, seed, camera=k, labels=True)
+        each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(7)][1:]
+        assert sum(map(len, each)) > 50
+        assert_same(each, [part.of(k, j) for part in parts for j in range(3)])
+
+
+def test_events_that_find_no_room_are_walked_again():
+    rng = np.random.default_rng(5)
+    clip = Clip(np.arange(1, 9) * 10**6, rng.random((8, *SIZE[::-1])).astype(np.float32), 1, 3)
+    cpu, card = both("paper", clip)
+    card._card._sent = Sent(np.zeros(7, np.uint64), np.zeros(1, np.int64))
+    assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
+    assert len(card._card._sent.keys) > 7 and cpu.counts == card.counts
+    assert_same_state(cpu, card)
+
+
+def test_what_cannot_be_is_said():
+    with pytest.raises(UsageError, match="different effects"):
+        DvsBatch([COMPILED["paper"], COMPILED["nothing"]], SIZE, [1, 2], memory=Simulated())
+    with pytest.raises(UsageError, match="delay"):
+        DvsBatch([DvsSpec(delay_us=3.0)], SIZE, [1], memory=Simulated())
+    card = DvsOnCard(COMPILED["paper"], SIZE, 1, memory=Simulated())
+    with pytest.raises(UsageError, match="light of shape"):
+        card.steps(np.zeros((2, 3, 3), np.float32), [0, 1])
+    if missing_for_cuda():
+        with pytest.raises(UsageError, match=r"device cuda: .*; use device cpu"):
+            memory_of("cuda")

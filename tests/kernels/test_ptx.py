@@ -1,0 +1,109 @@
+"""The kernels of a GPU as machine code of NVIDIA's (PTX), which needs compilers, but no GPU.
+
+That code is what says whether arithmetic is that of the text: products and sums are rounded each by itself but where
+the text fuses them.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib.util import find_spec
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from against.clips import AFTER_TRACKING, EVERYTHING, clean
+
+from vid2ev.kernels.cuda.build import CARD, Build
+from vid2ev.kernels.cuda.clips import Candidates, Clips, Listed, Sent, Start, Totals
+from vid2ev.kernels.cuda.proposals import Proposals
+from vid2ev.kernels.layout import PITCH, Flags, Planes, stride_of
+from vid2ev.sensors.compiled import flags_of
+from vid2ev.sensors.spec import DvsSpec
+
+pytestmark = pytest.mark.skipif(
+    find_spec("numba_cuda") is None or find_spec("nvidia") is None,
+    reason="needs numba-cuda and NVIDIA's compilers: pip install 'vid2ev[cuda]'",
+)
+CAPABILITY = (9, 0)
+TWO_POLES = clean(photoreceptor_tau_us=300, follower_tau_us=100)
+SENSORS = {"two poles": TWO_POLES, "paper": DvsSpec(), "everything": EVERYTHING, "after, tracking": AFTER_TRACKING}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def a_card_to_compile_for():
+    """numba asks the GPU that is there for what it can do; none need be there."""
+    from numba.cuda import dispatcher
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dispatcher, "get_current_device", lambda: SimpleNamespace(compute_capability=CAPABILITY))
+        yield
+
+
+def arguments() -> dict[str, tuple]:
+    """Of each kernel, arguments of the types that it is launched with."""
+
+    def array(kind: Any, *shape: int) -> np.ndarray:
+        return np.zeros(shape or (1,), kind)
+
+    f4, f8, i8, u8, u1 = np.float32, np.float64, np.int64, np.uint64, np.uint8
+    planes = Planes(
+        array(f4), array(f4), array(f8), array(f4, 1, 2), array(f4, 1, 2), array(i8), array(np.uint32), array(i8),
+        array(i8), array(f4),
+    )  # fmt: skip
+    clips = Clips(
+        1, array(f4, 1, 1, 1), array(f8, 1, 1), array(i8, 1, 1), array(f8, 1, 1, 1), array(i8, 1, 1, 1),
+        array(u8, 1, 1), array(u1),
+    )  # fmt: skip
+    listed, totals = Listed(array(i8), array(np.int32), array(i8)), Totals(array(i8))
+    candidates = Candidates(array(i8), array(i8), array(f8), array(i8), array(f8))
+    asked = Proposals(
+        array(i8), array(f8), 1, 1, array(i8), array(i8, 1, 1), array(f8, 1, 1), array(i8), array(i8), array(i8)
+    )
+    return {
+        "glance": (clips, planes, listed, totals),
+        "walk": (clips, listed, candidates, planes, planes, Sent(array(u8), array(i8)), totals),
+        "settle": (clips, Start(array(i8), array(u1), array(u1)), planes, totals),
+        "undo": (listed, planes, planes),
+        "propose": (clips, asked),
+    }
+
+
+def ptx_of(flags: Flags, kernel: str) -> str:
+    from numba import cuda
+    from numba.cuda.typing.typeof import typeof
+
+    build = Build(CARD)
+    ours = build.module("vid2ev.kernels.layout").Flags(*flags)
+    kernels = build.module("vid2ev.kernels.cuda.kernels").kernels_of(ours, int(stride_of(flags)) // PITCH)
+    types = tuple(typeof(argument) for argument in arguments()[kernel])
+    function = getattr(kernels, kernel).py_func
+    return cuda.compile(function, types, device=False, abi="numba", cc=CAPABILITY, output="ptx")[0]
+
+
+def strictly(flags: Flags, kernel: str) -> str:
+    from vid2ev.kernels.cuda.strict import strict
+
+    with strict():
+        return ptx_of(flags, kernel)
+
+
+@pytest.mark.parametrize("kernel", ["glance", "walk", "settle", "undo", "propose"])
+@pytest.mark.parametrize("name", SENSORS)
+def test_kernels_compile_and_call_nothing(name, kernel):
+    ptx = strictly(flags_of(SENSORS[name], labels=True), kernel)
+    assert ".visible .entry" in ptx
+    assert not re.search(r"^\s*call", ptx, re.MULTILINE), "all is in one piece, nothing is left to a library"
+
+
+def test_a_product_and_a_sum_are_fused_only_where_the_text_says_so():
+    flags = flags_of(TWO_POLES, labels=False)
+    assert "fma.rn.f32" in ptx_of(flags, "glance")  # as numba compiles, which shows that this can be seen
+    strict = strictly(flags, "glance")
+    assert "fma" not in strict and "mul.rn.f32" in strict and "add.rn.f32" in strict
+
+
+def test_a_glance_at_a_pixel_is_in_registers():
+    for spec in SENSORS.values():
+        assert ".local" not in strictly(flags_of(spec, labels=False), "glance")

@@ -1,0 +1,13 @@
+"""Counters that threads share: simulated, where one thread runs at a time."""
+
+from __future__ import annotations
+
+from vid2ev.kernel_compiler import inner
+
+
+@inner
+def take(counter, place, some):
+    """Add `some` to an entry of a counter; returns what it was."""
+    before = counter[place]
+    counter[place] += some
+    return before

@@ -1,0 +1,18 @@
+"""In the place of `vid2ev.kernel_compiler` on a GPU: functions that its kernels call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import cuda
+
+INNER_OPTIONS: dict[str, Any] = {}
+
+
+def compiled(function: Callable) -> Any:
+    """A function that kernels call, or others that they call."""
+    return cuda.jit(device=True, lto=False)(function)
+
+
+inner = compiled

@@ -1,0 +1,151 @@
+"""Where arrays of a GPU are, and how its kernels are launched: a card through torch, or one that is simulated."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from vid2ev.kernels.cuda.build import CARD, SIMULATED, Build
+from vid2ev.kernels.layout import PITCH, Flags, stride_of
+
+THREADS = 128  # of a block
+_UNSIGNED = {"count": np.uint32, "bases": np.uint64, "keys": np.uint64}  # torch has int32 and int64 for them
+
+
+class Simulated:
+    """numba's simulator of a GPU: each thread a thread of Python, which calls code compiled for the CPU."""
+
+    name = "simulated"
+
+    def zeros(self, shape: Any, dtype: Any) -> Any:
+        """An array of zeros."""
+        return np.zeros(shape, dtype)
+
+    def put(self, array: np.ndarray) -> Any:
+        """A copy of an array, on the device."""
+        return np.array(array)
+
+    def get(self, array: Any) -> np.ndarray:
+        """A copy of a device's array, as one of numpy."""
+        return np.array(array)
+
+    def light(self, light: Any) -> Any:
+        """Light as contiguous float32."""
+        with np.errstate(over="ignore"):  # (beyond float32 is infinite, and mended)
+            return np.ascontiguousarray(light, np.float32)
+
+    def count_to(self, n: int) -> Any:
+        """0, 1, ... n - 1."""
+        return np.arange(n)
+
+    def order(self, numbers: Any) -> Any:
+        """Indices of numbers in ascending order, those of equals as they are."""
+        return np.argsort(numbers, kind="stable")
+
+    def ordered(self, keys: Any) -> Any:
+        """Keys, as int64, in order of what is above their lowest three bits, those of equals as they are."""
+        return keys[self.order(keys >> np.uint64(3))].view(np.int64)
+
+    def joined(self, parts: Any) -> Any:
+        """Arrays one after the other."""
+        return np.concatenate(parts)
+
+    def searchsorted(self, ascending: Any, numbers: Any) -> Any:
+        """How many of the ascending numbers are less than each of the others."""
+        return np.searchsorted(ascending, numbers)
+
+    def cast(self, array: Any, dtype: Any) -> Any:
+        """An array of another type."""
+        return array.astype(dtype)
+
+    def launch(self, kernel: Any, threads: int, *arguments: Any) -> None:
+        """Run a kernel with at least so many threads."""
+        if threads > 0:
+            kernel[-(-threads // THREADS), THREADS](*arguments)
+
+    def kernels(self, flags: Flags) -> Any:
+        """The kernels for a combination of effects."""
+        return _kernels("simulated", flags)
+
+
+class Card:
+    """A GPU of NVIDIA's, through torch: no copies between its tensors and the kernels."""
+
+    name = "cuda"
+
+    def __init__(self) -> None:
+        import torch
+
+        self.torch, self.device = torch, torch.device("cuda")
+
+    def zeros(self, shape: Any, dtype: Any) -> Any:
+        return self.put(np.zeros(0, dtype)).new_zeros(shape)
+
+    def put(self, array: np.ndarray) -> Any:
+        signed = {np.dtype(np.uint32): np.int32, np.dtype(np.uint64): np.int64}.get(array.dtype)
+        array = np.array(array) if signed is None else np.array(array).view(signed)
+        return self.torch.from_numpy(array).to(self.device)
+
+    def get(self, array: Any) -> np.ndarray:
+        return array.cpu().numpy()
+
+    def light(self, light: Any) -> Any:
+        return self.torch.as_tensor(light).to(self.device, self.torch.float32).contiguous()
+
+    def count_to(self, n: int) -> Any:
+        return self.torch.arange(n, device=self.device)
+
+    def order(self, numbers: Any) -> Any:
+        return self.torch.sort(numbers, stable=True).indices
+
+    def ordered(self, keys: Any) -> Any:
+        return keys[self.order(keys >> 3)]
+
+    def joined(self, parts: Any) -> Any:
+        return self.torch.cat(parts)
+
+    def searchsorted(self, ascending: Any, numbers: Any) -> Any:
+        return self.torch.searchsorted(ascending, numbers)
+
+    def cast(self, array: Any, dtype: Any) -> Any:
+        return array.to(getattr(self.torch, np.dtype(dtype).name))
+
+    def launch(self, kernel: Any, threads: int, *arguments: Any) -> None:
+        from numba import cuda
+
+        from vid2ev.kernels.cuda.strict import strict
+
+        if threads == 0:
+            return
+        stream = cuda.external_stream(self.torch.cuda.current_stream().cuda_stream)
+        with strict():  # (the first launch compiles)
+            kernel[-(-threads // THREADS), THREADS, stream](*(_seen(argument) for argument in arguments))
+
+    def kernels(self, flags: Flags) -> Any:
+        return _kernels("cuda", flags)
+
+
+def _seen(argument: Any, name: str = "") -> Any:
+    """An argument as a kernel takes it, without a copy."""
+    from numba import cuda
+
+    if hasattr(argument, "_fields"):
+        return type(argument)(*(_seen(part, name) for part, name in zip(argument, argument._fields, strict=True)))
+    if not hasattr(argument, "__cuda_array_interface__"):
+        return argument
+    array = cuda.as_cuda_array(argument)
+    return array.view(_UNSIGNED[name]) if name in _UNSIGNED else array
+
+
+@cache
+def _build(kind: str) -> Build:
+    return Build(SIMULATED if kind == "simulated" else CARD)
+
+
+@cache
+def _kernels(kind: str, flags: Flags) -> Any:
+    ours = _build(kind).module("vid2ev.kernels.layout")
+    stride = int(stride_of(flags)) // PITCH
+    return _build(kind).module("vid2ev.kernels.cuda.kernels").kernels_of(ours.Flags(*flags), stride)

@@ -1,0 +1,27 @@
+"""What the intervals of a sensor are counted from, one after the other."""
+
+from __future__ import annotations
+
+from vid2ev.kernels.layout import Flags, Interval, Numbers
+from vid2ev.sensors.compiled import interval_of
+
+LEAK_REBASE_NAT = 0.5  # a leak that has risen so far goes into the memories, as the scan compares levels in float32
+
+Step = tuple[Interval, float]  # and what the leak has risen before it that goes into the memories [nat]
+
+
+class Clock:
+    """The clock of a sensor that has settled at t_ns."""
+
+    def __init__(self, t_ns: int, step: int = 0, leak_since_ns: int | None = None, fresh_noise: bool = True):
+        self.t_ns, self.step, self.fresh_noise = t_ns, step, fresh_noise
+        self.leak_since_ns = t_ns if leak_since_ns is None else leak_since_ns
+
+    def step_to(self, t_ns: int, flags: Flags, num: Numbers) -> Step:
+        """The interval up to t_ns [int, ns], which must be after the last one."""
+        rate, risen = num.leak_nat_per_ns, 0.0
+        if rate * (t_ns - self.leak_since_ns) > LEAK_REBASE_NAT and self.t_ns > self.leak_since_ns:
+            risen, self.leak_since_ns = rate * (self.t_ns - self.leak_since_ns), self.t_ns
+        interval = interval_of(flags, num, self.t_ns, t_ns, self.leak_since_ns, self.step, self.fresh_noise)
+        self.t_ns, self.step, self.fresh_noise = t_ns, self.step + 1, not interval.noise_resolved
+        return interval, risen

@@ -1,0 +1,127 @@
+"""DvsOnCard: `Dvs` on a GPU, frame by frame or many frames at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.kernels.layout import PITCH, stride_of
+from vid2ev.sensors.card_walk import CardWalk
+from vid2ev.sensors.clock import Clock
+from vid2ev.sensors.dvs import STATE_PLANES, Dvs
+from vid2ev.sensors.inside import Inside
+from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream.events import Events
+from vid2ev.stream.still import Still
+
+FRAMES = 16  # at a time: the state of a pixel is read and written once for as many
+
+
+class DvsOnCard(Dvs):
+    """An event camera as `Dvs` is, with its pixels on a device: the same events, the same state.
+
+    memory    the device (`vid2ev.kernels.cuda.memory`)
+
+    Light may be a tensor of torch, on the device or not; it is then linear and floating point.
+    """
+
+    def __init__(
+        self,
+        spec: DvsSpec,
+        size: tuple[int, int],
+        seed: int = 0,
+        *,
+        memory: Any,
+        camera: int = 0,
+        labels: bool = False,
+        transfer: str | None = None,
+    ):
+        super().__init__(spec, size, seed, camera=camera, labels=labels, transfer=transfer, skip=False)
+        self._memory, self._of_fast = memory, int(stride_of(self._flags)) // PITCH
+        planes, phase = self._planes_of_pixels(), [spec.random_phase]
+        self._card = CardWalk(memory, self._flags, [self._numbers], self.size, planes, self._bad, phase)
+
+    def step(self, light: Any, t_ns: int, still: Still | None = None) -> Events:
+        """`Dvs.step`; light may be a tensor.  What is `still` saves nothing here: all pixels are glanced at."""
+        return self.steps(light[None], [t_ns])[0]
+
+    def steps(self, light: Any, t_ns: Sequence[int]) -> list[Events]:
+        """`step` for each frame of light [frames, height, width] at t_ns [frames], in a few launches of kernels."""
+        sent = []
+        if self._t_ns is None and len(t_ns) > 0:
+            sent.append(self.restart(light[0], t_ns[0]))
+        for first in range(len(sent), len(t_ns), FRAMES):
+            some = slice(first, first + FRAMES)
+            sent += self._some(light[some], [int(t) for t in t_ns[some]])
+        return sent
+
+    def _some(self, light: Any, t_ns: list[int]) -> list[Events]:
+        seen, _ = self._light(light)
+        assert self._t_ns is not None
+        clock, steps = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise), []
+        for t in t_ns:
+            steps.append(clock.step_to(self._later(t, clock.t_ns), self._flags, self._numbers))
+        sent = self._card.walk(seen, [steps])
+        self._t_ns, self._step, self._leak_since_ns = clock.t_ns, clock.step, clock.leak_since_ns
+        self._fresh_noise = clock.fresh_noise
+        return [self._passed_on(sent.of(0, k), t) for k, t in enumerate(t_ns)]
+
+    def state(self) -> dict[str, np.ndarray]:
+        """`Dvs.state`: a sensor on a CPU can take it up."""
+        self._download()
+        return super().state()
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """`Dvs.restore`: also of what a sensor on a CPU gave."""
+        super().restore(state)
+        self._card.upload(self._planes_of_pixels(), self._tallies[0])
+
+    def inside(self, pixels: np.ndarray) -> Inside:
+        """`Dvs.inside`."""
+        self._download()
+        return super().inside(pixels)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """`Dvs.counts`."""
+        self._tallies[0] = self._card.tallies()
+        return super().counts
+
+    def _light(self, light: Any) -> tuple[Any, np.ndarray]:
+        """Linear light on its way to the device; what is coded is looked up here."""
+        if not hasattr(light, "is_floating_point"):
+            light = np.asarray(light)
+            if light.dtype.kind == "f":
+                self._check_shape(light.shape[-2:])
+                return light, np.empty(0, np.float32)
+            frames = [super(DvsOnCard, self)._light(frame) for frame in light.reshape(-1, *light.shape[-2:])]
+            linear = [table[codes] if len(table) > 1 else codes.astype(np.float32) * table for codes, table in frames]
+            return np.reshape(linear, light.shape), frames[0][1]
+        self._check_shape(tuple(light.shape[-2:]))
+        if not light.is_floating_point():
+            raise UsageError(f"light of type {light.dtype}: expected a tensor of floating point, which is linear light")
+        return light, np.empty(0, np.float32)
+
+    def _settle(self, flat: Any, table: np.ndarray, t_ns: int) -> None:
+        self._card.settle(flat, [t_ns])
+        self._t_ns = self._leak_since_ns = t_ns
+        self._fresh_noise = True
+
+    def _planes_of_pixels(self) -> Any:
+        return pixel_planes([self._planes], self._flags, self._bad.size)
+
+    def _download(self) -> None:
+        """The state of the device into the planes of the walk on a CPU."""
+        planes = self._card.download()
+        planes["fast"] = fast_by_block(planes["fast"].reshape(-1, self._of_fast), self._of_fast)
+        if self._planes.rest.size:
+            planes["rest"] = by_block(planes["rest"].reshape(-1, 2), 2)
+        for name in STATE_PLANES:
+            plane = getattr(self._planes, name)
+            if plane.size:
+                plane[...] = planes[name].view(plane.dtype)
+        self._tallies[0] = self._card.tallies()
