@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""How fast and how right the event camera is on a GPU, against the same on the CPU.
+
+    python examples/benchmark_gpu.py                   parity and speed, three sizes, quiet and busy
+    python examples/benchmark_gpu.py --into README.md  and the table between its marks there
+    python examples/benchmark_gpu.py --simulated       parity alone, in numba's simulator, at a small size
+
+Parity: `DvsOnCard` and `Dvs` see the same frames; every event must be the same.  Speed: light is on the card, events
+stay there, 16 frames at a time; the median of some runs, the card awaited before and after each.
+
+    quiet   noise of 1 % of the light: two poles at work, next to no events
+    busy    a pattern that moves by half a pixel a frame
+
+The roofline is what must be moved of a pixel and frame: its light once (4 bytes), its state in and out once for 16
+frames; the share is that over the time, against a copy measured on the same card.
+Without a GPU it says so, in one line.  It has run in the simulator so far, and on no card.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+SIZES = {"346x260": (346, 260), "1280x720": (1280, 720), "3840x2160": (3840, 2160)}
+FRAMES, RUNS, FRAME_NS = 16, 7, 1_000_000
+BEGIN, END = "<!-- gpu: begin -->", "<!-- gpu: end -->"
+CLIPS, CLIP_FRAMES = 64, 256  # of training: 256x256, 9 frames of truth and 32 steps between each two
+
+
+def sensors() -> dict[str, Any]:
+    from vid2ev import DvsSpec
+
+    clean = {"mismatch": 0.0, "crossing_noise": 0.0, "refractory_us": 0.0, "random_phase": False}
+    return {"two poles": DvsSpec(**clean), "paper": DvsSpec()}
+
+
+def frames(kind: str, size: tuple[int, int], count: int, seed: int = 0) -> np.ndarray:
+    """Linear light [count, height, width]."""
+    rng, (width, height) = np.random.default_rng(seed), size
+    pattern = np.exp(0.6 * rng.standard_normal((height, width + count))).astype(np.float32)
+    if kind == "quiet":
+        still = pattern[:, :width]
+        return np.stack([still * (1 + 0.01 * rng.standard_normal(still.shape, np.float32)) for _ in range(count)])
+    both = [0.5 * (pattern[:, k // 2 : k // 2 + width] + pattern[:, (k + 1) // 2 :][:, :width]) for k in range(count)]
+    return np.stack(both).astype(np.float32)
+
+
+def parity(memory: Any, size: tuple[int, int], count: int) -> list[str]:
+    """A line for each sensor and kind of light; raises click.ClickException where an event differs."""
+    from vid2ev.sensors.dvs import Dvs
+    from vid2ev.sensors.dvs_on_card import DvsOnCard
+
+    lines, t_ns = [], [FRAME_NS * k for k in range(count)]
+    for name, spec in sensors().items():
+        for kind in ("quiet", "busy"):
+            light = frames(kind, size, count)
+            cpu, card = Dvs(spec, size, 1), DvsOnCard(spec, size, 1, memory=memory)
+            ours = card.steps(light, t_ns)
+            theirs = [cpu.step(frame, t) for frame, t in zip(light, t_ns, strict=True)]
+            off = [difference(a, b) for a, b in zip(ours, theirs, strict=True)]
+            lines.append(f"{name}, {kind}: {sum(map(len, theirs))} events, {sum(off)} differ")
+            if any(off):
+                raise click.ClickException("; ".join(lines))
+    return lines
+
+
+def difference(one: Any, other: Any) -> int:
+    """How many events are in one of two recordings and not in the other."""
+    if len(one) == len(other) and all((getattr(one, f) == getattr(other, f)).all() for f in "txyp"):
+        return 0
+    sets = [set(zip(*(getattr(part, f).tolist() for f in "txyp"), strict=True)) for part in (one, other)]
+    return max(len(sets[0] ^ sets[1]), 1)
+
+
+def seconds(torch: Any, work: Any) -> float:
+    """The median time of a few runs, the card awaited."""
+    work()
+    taken = []
+    for _ in range(RUNS):
+        torch.cuda.synchronize()
+        began = time.perf_counter()
+        work()
+        torch.cuda.synchronize()
+        taken.append(time.perf_counter() - began)
+    return statistics.median(taken)
+
+
+def bytes_per_step(spec: Any) -> float:
+    """Light once; state in and out, and the thresholds in, once for all frames of a launch."""
+    poles = len(spec.pole_taus_us)
+    return 4 + (4 * (3 + poles) * 2) / FRAMES
+
+
+def speed(torch: Any, memory: Any, name: str, spec: Any, size: tuple[int, int], kind: str, copied: float) -> dict:
+    """What one sensor does with one kind of light."""
+    from vid2ev.sensors.batch import DvsBatch
+
+    light = torch.from_numpy(frames(kind, size, FRAMES + 1)).cuda()[:, None]
+    there_and_back = light[1:], light[:-1].flip(0).contiguous()
+    batch, clock = DvsBatch([spec], size, [1], memory=memory), [0]
+    batch.restart(light[0], [0])
+    sent = []
+
+    def run() -> None:
+        t_ns = clock[0] + FRAME_NS * np.arange(1, FRAMES + 1)[:, None]
+        clock[0] = int(t_ns[-1, 0])
+        sent.append(len(batch.steps(there_and_back[len(sent) % 2], t_ns)))
+
+    taken, pixel_steps = seconds(torch, run), size[0] * size[1] * FRAMES
+    return {
+        "sensor": name, "size": f"{size[0]}x{size[1]}", "light": kind, "gpixel": pixel_steps / taken * 1e-9,
+        "mevents": statistics.median(sent[1:]) / taken * 1e-6,
+        "share": bytes_per_step(spec) * pixel_steps / taken / copied,
+    }  # fmt: skip
+
+
+def clips_per_second(torch: Any, memory: Any, spec: Any) -> float:
+    """Training clips of 256x256 and 256 steps that a card makes events of in a second."""
+    from vid2ev.sensors.batch import DvsBatch
+
+    one = torch.from_numpy(frames("busy", (256, 256), CLIP_FRAMES // 8 + 1)).cuda()
+    steps = torch.arange(CLIP_FRAMES, device="cuda") / 8  # (an eighth of the busy pattern's motion in each)
+    low = steps.long()
+    some = torch.lerp(one[low], one[low + 1], (steps - low)[:, None, None])
+    light = some[:, None].expand(CLIP_FRAMES, CLIPS, 256, 256).contiguous()
+    t_ns = np.repeat((FRAME_NS * np.arange(CLIP_FRAMES))[:, None], CLIPS, 1)
+
+    def run() -> None:
+        batch = DvsBatch([spec] * CLIPS, (256, 256), range(CLIPS), memory=memory)
+        batch.restart(light[0], t_ns[0])
+        for k in range(1, CLIP_FRAMES, FRAMES):
+            batch.steps(light[k : k + FRAMES], t_ns[k : k + FRAMES])
+
+    return CLIPS / seconds(torch, run)
+
+
+def copy_speed(torch: Any) -> float:
+    """Bytes a second that a copy moves, both ways counted."""
+    source = torch.zeros(1 << 28, device="cuda")
+    target = torch.empty_like(source)
+    return 2 * source.numel() * 4 / seconds(torch, lambda: target.copy_(source))
+
+
+def table(rows: list[dict], device: str, copied: float, clips: float) -> str:
+    head = f"{device}, a copy moves {copied * 1e-9:.0f} GB/s; training clips (256x256, 256 steps): {clips:.0f}/s\n\n"
+    lines = ["| sensor | size | light | Gpixel-steps/s | Mevents/s | of the roofline |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        numbers = f"{row['gpixel']:.2f} | {row['mevents']:.1f} | {100 * row['share']:.0f} %"
+        lines.append(f"| {row['sensor']} | {row['size']} | {row['light']} | {numbers} |")
+    return head + "\n".join(lines) + "\n"
+
+
+@click.command()
+@click.option("--into", type=click.Path(path_type=Path, exists=True), help="write the table between its marks there")
+@click.option("--simulated", is_flag=True, help="parity alone, in numba's simulator")
+def main(into: Path | None, simulated: bool) -> None:
+    """Parity and speed of the event camera on a GPU."""
+    from vid2ev.sensors.devices import memory_of, missing_for_cuda
+
+    if simulated:
+        click.echo("\n".join(parity(memory_of("simulated"), (23, 11), 6)))
+        return
+    if missing := missing_for_cuda():
+        click.echo(f"no GPU: {missing}; nothing is measured")
+        return
+    import torch
+
+    memory = memory_of("cuda")
+    click.echo("\n".join(parity(memory, SIZES["346x260"], 40)))
+    copied = copy_speed(torch)
+    rows = [
+        speed(torch, memory, name, spec, size, kind, copied)
+        for name, spec in sensors().items()
+        for size in SIZES.values()
+        for kind in ("quiet", "busy")
+    ]
+    text = table(rows, torch.cuda.get_device_name(), copied, clips_per_second(torch, memory, sensors()["paper"]))
+    click.echo(text)
+    if into is not None:
+        before, _, rest = into.read_text(encoding="utf-8").partition(BEGIN)
+        after = rest.partition(END)[2]
+        into.write_text(f"{before}{BEGIN}\n{text}{END}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
