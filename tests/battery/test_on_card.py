@@ -6,14 +6,18 @@ text, for one pixel per thread.  Compiling that takes half a minute for a combin
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cuda.clips import Sent
-from vid2ev.kernels.cuda.memory import Simulated
+from vid2ev.kernels.cuda.memory import UNSIGNED, Card, Simulated
+from vid2ev.kernels.layout import Flags
 from vid2ev.sensors.batch import DvsBatch
 from vid2ev.sensors.devices import memory_of, missing_for_cuda
 from vid2ev.sensors.dvs import Dvs, DvsSpec
@@ -24,6 +28,32 @@ from .combinations import COMPILED
 from .drawn_clips import SIZE, Clip, clips
 
 QUICK = ("paper", "everything")
+
+
+class Tensors(Card):
+    """A card's memory, with tensors of torch on the CPU, and the kernels of the simulator."""
+
+    def __init__(self) -> None:
+        super().__init__("cpu")
+
+    def kernels(self, flags: Flags) -> Any:
+        return Simulated().kernels(flags)
+
+    def launch(self, kernel: Any, threads: int, *arguments: Any) -> None:
+        Simulated().launch(kernel, threads, *(as_arrays(argument) for argument in arguments))
+
+
+def as_arrays(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
+    """Tensors as the arrays that kernels see, which share their memory."""
+    if hasattr(argument, "_fields"):
+        kind = type(argument)
+        return kind(*(as_arrays(getattr(argument, name), (kind.__name__, name)) for name in argument._fields))
+    if not isinstance(argument, torch.Tensor):
+        return argument
+    return argument.numpy().view(UNSIGNED.get(place, argument.numpy().dtype))
+
+
+memories = pytest.mark.parametrize("memory", [Simulated(), Tensors()], ids=["arrays", "tensors"])
 LABELS = {"paper": False, "everything": True}
 specs = pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COMPILED]
@@ -44,10 +74,10 @@ def assert_same_state(one: Dvs, other: Dvs) -> None:
         np.testing.assert_array_equal(plane, theirs[name], name)
 
 
-def both(name: str, clip: Clip, **options) -> tuple[Dvs, DvsOnCard]:
-    options |= {"labels": LABELS.get(name, True), "transfer": "srgb"}
-    spec = COMPILED[name]
-    return Dvs(spec, SIZE, clip.seed, **options), DvsOnCard(spec, SIZE, clip.seed, memory=Simulated(), **options)
+def both(name: str, clip: Clip, memory: Any = None) -> tuple[Dvs, DvsOnCard]:
+    spec, options = COMPILED[name], {"labels": LABELS.get(name, True), "transfer": "srgb"}
+    card = DvsOnCard(spec, SIZE, clip.seed, memory=memory or Simulated(), **options)
+    return Dvs(spec, SIZE, clip.seed, **options), card
 
 
 def seen(dvs: Dvs, clip: Clip, first: int = 0) -> list[Events]:
@@ -65,15 +95,16 @@ def test_events_counts_and_state_are_those_of_the_walk_on_a_cpu(name, data):
     assert_same_state(cpu, card)
 
 
+@memories
 @pytest.mark.parametrize("name", QUICK)
-def test_a_state_is_taken_up_by_the_other(name):
+def test_a_state_is_taken_up_by_the_other(name, memory):
     rng = np.random.default_rng(3)
     frames = np.exp(rng.normal(0, 0.7, (9, *SIZE[::-1]))).astype(np.float32)
     clip = Clip(np.cumsum(rng.integers(3e5, 4e6, 9)), frames, 5, 11)
-    cpu, card = both(name, clip)
+    cpu, card = both(name, clip, memory)
     first = clip._replace(t_ns=clip.t_ns[:5])
     whole = seen(cpu, clip)
-    here, there = both(name, clip)
+    here, there = both(name, clip, memory)
     assert_same(seen(here, first), there.steps(frames[:5], clip.t_ns[:5]))
     cpu.restore(there.state())
     card.restore(here.state())
@@ -82,13 +113,14 @@ def test_a_state_is_taken_up_by_the_other(name):
     assert sum(map(len, whole[5:])) > 100 and card.counts == cpu.counts
 
 
-def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own():
+@memories
+def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(memory):
     rng, base = np.random.default_rng(4), COMPILED["everything"].model_dump()
     changes = ({}, {"threshold_on": 0.3, "shot_rate_hz": 300.0}, {"follower_tau_us": 900.0, "random_phase": False})
     sensors, seeds = [DvsSpec(**(base | change)) for change in changes], [5, 2**64 - 1, 0]
     frames = np.exp(rng.normal(0, 0.7, (7, 3, *SIZE[::-1]))).astype(np.float32)
     t_ns = np.cumsum(rng.integers(1e4, 4e6, (7, 3)), axis=0)
-    batch = DvsBatch(sensors, SIZE, seeds, memory=Simulated(), cameras=[0, 1, 2], labels=True)
+    batch = DvsBatch(sensors, SIZE, seeds, memory=memory, cameras=[0, 1, 2], labels=True)
     batch.restart(frames[0], t_ns[0])
     parts = [batch.steps(frames[1:4], t_ns[1:4]), batch.steps(frames[4:], t_ns[4:])]
     for k, (spec, seed) in enumerate(zip(sensors, seeds, strict=True)):
@@ -98,11 +130,12 @@ def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own():
         assert_same(each, [part.of(k, j) for part in parts for j in range(3)])
 
 
-def test_events_that_find_no_room_are_walked_again():
+@memories
+def test_events_that_find_no_room_are_walked_again(memory):
     rng = np.random.default_rng(5)
     clip = Clip(np.arange(1, 9) * 10**6, rng.random((8, *SIZE[::-1])).astype(np.float32), 1, 3)
-    cpu, card = both("paper", clip)
-    card._card._sent = Sent(np.zeros(7, np.uint64), np.zeros(1, np.int64))
+    cpu, card = both("paper", clip, memory)
+    card._card._sent = Sent(memory.zeros(7, np.uint64), memory.zeros(1, np.int64))
     assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
     assert len(card._card._sent.keys) > 7 and cpu.counts == card.counts
     assert_same_state(cpu, card)

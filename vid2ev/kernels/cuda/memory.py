@@ -11,7 +11,8 @@ from vid2ev.kernels.cuda.build import CARD, SIMULATED, Build
 from vid2ev.kernels.layout import PITCH, Flags, stride_of
 
 THREADS = 128  # of a block
-_UNSIGNED = {"count": np.uint32, "bases": np.uint64, "keys": np.uint64}  # torch has int32 and int64 for them
+# What torch has as int32 or int64 for want of these, by the tuple that it is in, and its name there.
+UNSIGNED = {("Planes", "count"): np.uint32, ("Clips", "bases"): np.uint64, ("Sent", "keys"): np.uint64}
 
 
 class Simulated:
@@ -75,10 +76,10 @@ class Card:
 
     name = "cuda"
 
-    def __init__(self) -> None:
+    def __init__(self, device: str = "cuda") -> None:
         import torch
 
-        self.torch, self.device = torch, torch.device("cuda")
+        self.torch, self.device = torch, torch.device(device)
 
     def zeros(self, shape: Any, dtype: Any) -> Any:
         return self.put(np.zeros(0, dtype)).new_zeros(shape)
@@ -119,7 +120,8 @@ class Card:
 
         if threads == 0:
             return
-        stream = cuda.external_stream(self.torch.cuda.current_stream().cuda_stream)
+        ours = self.torch.cuda.current_stream().cuda_stream
+        stream = cuda.external_stream(ours) if ours else 0
         with strict():  # (the first launch compiles)
             kernel[-(-threads // THREADS), THREADS, stream](*(_seen(argument) for argument in arguments))
 
@@ -127,16 +129,17 @@ class Card:
         return _kernels("cuda", flags)
 
 
-def _seen(argument: Any, name: str = "") -> Any:
+def _seen(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
     """An argument as a kernel takes it, without a copy."""
     from numba import cuda
 
     if hasattr(argument, "_fields"):
-        return type(argument)(*(_seen(part, name) for part, name in zip(argument, argument._fields, strict=True)))
+        kind = type(argument)
+        return kind(*(_seen(getattr(argument, name), (kind.__name__, name)) for name in argument._fields))
     if not hasattr(argument, "__cuda_array_interface__"):
         return argument
     array = cuda.as_cuda_array(argument)
-    return array.view(_UNSIGNED[name]) if name in _UNSIGNED else array
+    return array.view(UNSIGNED[place]) if place in UNSIGNED else array
 
 
 @cache
