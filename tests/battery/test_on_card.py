@@ -131,6 +131,21 @@ def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(memory):
 
 
 @memories
+def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(memory):
+    rng, spec = np.random.default_rng(6), COMPILED["everything"]
+    frames = np.exp(rng.normal(0, 0.7, (5, 2, *SIZE[::-1]))).astype(np.float32)
+    t_ns = np.repeat(np.cumsum(rng.integers(1e4, 4e6, 5))[:, None], 2, axis=1)
+    batch = DvsBatch([spec, spec], SIZE, [8, 9], memory=memory, labels=True)
+    batch.restart(frames[0], t_ns[0])
+    parts = [batch.steps(frames[1:3], t_ns[1:3]), batch.steps(frames[3:], t_ns[3:])]
+    for k in range(2):
+        alone = Dvs(spec, SIZE, 8 + k, labels=True)
+        each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(5)][1:]
+        assert sum(map(len, each)) > 50
+        assert_same(each, [part.of(k, j) for part in parts for j in range(2)])
+
+
+@memories
 def test_events_that_find_no_room_are_walked_again(memory):
     rng = np.random.default_rng(5)
     clip = Clip(np.arange(1, 9) * 10**6, rng.random((8, *SIZE[::-1])).astype(np.float32), 1, 3)

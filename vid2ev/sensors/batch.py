@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.clock import Clock
+from vid2ev.sensors.clock import Clock, Step, pace_of
 from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
 from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.pixel_planes import pixel_planes
@@ -69,8 +70,17 @@ class DvsBatch:
         before = np.array([[clock.t_ns for clock in self._clocks]], np.int64)
         if (np.diff(np.concatenate([before, times]), axis=0) <= 0).any():
             raise UsageError("frame times of a batch: expected each after the one before; sort the frames")
-        steps = [
+        return self._walk.walk(light, self._steps(times))
+
+    def _steps(self, times: np.ndarray) -> list[list[Step]]:
+        """The steps of each clip; if all are the same, one list of them for all."""
+        first, same_times = self._clocks[0], bool((times[:, 0] == times.T).all())
+        same_pace = len({pace_of(num) for num in self._numbers}) == 1
+        if same_pace and same_times and all(clock == first for clock in self._clocks):
+            row = [first.step_to(int(t), self._flags, self._numbers[0]) for t in times[:, 0]]
+            self._clocks = [copy(first) for _ in self._clocks]
+            return [row] * len(self._clocks)
+        return [
             [clock.step_to(int(t), self._flags, num) for t in column]
             for clock, num, column in zip(self._clocks, self._numbers, times.T, strict=True)
         ]
-        return self._walk.walk(light, steps)

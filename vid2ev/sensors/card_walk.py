@@ -99,7 +99,8 @@ class CardWalk:
         return self._sent.keys[:taken]
 
     def _clips(self, light: Any, steps: list[list[Step]], bases: np.ndarray) -> Clips:
-        rows = [[interval_row(*step) for step in row] for row in steps]
+        alike = all(row is steps[0] for row in steps)  # (then one row of intervals is for all clips)
+        rows = [[interval_row(*step) for step in row] for row in (steps[:1] if alike else steps)]
         floats, ints = (np.array([[row[k] for row in each] for each in rows]) for k in range(2))
         put, forced = self.memory.put, self._total if self._flags.forced and rows else 1
         return Clips(

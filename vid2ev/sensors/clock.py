@@ -10,12 +10,21 @@ LEAK_REBASE_NAT = 0.5  # a leak that has risen so far goes into the memories, as
 Step = tuple[Interval, float]  # and what the leak has risen before it that goes into the memories [nat]
 
 
+def pace_of(num: Numbers) -> tuple[float, ...]:
+    """All that intervals have from a sensor: sensors of the same pace, clock and times have the same intervals."""
+    return num.tau1_ns, num.tau2_ns, num.leak_nat_per_ns, num.noise_rms, num.curve.dark
+
+
 class Clock:
     """The clock of a sensor that has settled at t_ns."""
 
     def __init__(self, t_ns: int, step: int = 0, leak_since_ns: int | None = None, fresh_noise: bool = True):
         self.t_ns, self.step, self.fresh_noise = t_ns, step, fresh_noise
         self.leak_since_ns = t_ns if leak_since_ns is None else leak_since_ns
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the next intervals are the same, up to the same times."""
+        return isinstance(other, Clock) and vars(self) == vars(other)
 
     def step_to(self, t_ns: int, flags: Flags, num: Numbers) -> Step:
         """The interval up to t_ns [int, ns], which must be after the last one."""
