@@ -17,11 +17,16 @@ def pixel_planes(each: Sequence[Planes], flags: Flags, pixels: int) -> Planes:
         parts["fast"].append(by_pixel(planes.fast, pixels, count).reshape(-1))
         parts["rest"].append(by_pixel(planes.rest, pixels, 2).reshape(-1) if planes.rest.size else planes.rest)
         parts["hot"].append(k * pixels + planes.hot.astype(np.int64))
-        for name in ("memory", "theta", "drawn", "t_last", "count", "t_reset", "shade"):
-            plane = np.ascontiguousarray(getattr(planes, name))
-            if k == 0 or len(plane) == pixels:  # (one that nothing uses has one entry in all)
-                parts[name].append(plane)
+    for name in ("memory", "theta", "drawn", "t_last", "count", "t_reset", "shade"):
+        parts[name] = _alike([np.ascontiguousarray(getattr(planes, name)) for planes in each], pixels)
     return Planes(**{name: np.concatenate(part) for name, part in parts.items()})
+
+
+def _alike(planes: list[np.ndarray], pixels: int) -> list[np.ndarray]:
+    """One plane of some sensors: with room for each pixel of all, if any of them uses its own, or else one entry."""
+    if not any(len(plane) == pixels for plane in planes):
+        return planes[:1]
+    return [plane if len(plane) == pixels else np.repeat(plane, pixels, axis=0) for plane in planes]
 
 
 def by_pixel(plane: np.ndarray, pixels: int, count: int) -> np.ndarray:

@@ -42,7 +42,8 @@ def kernels_of(flags: Flags, stride: int) -> Kernels:
         thread, all_threads = cuda.grid(1), planes.memory.size
         own, scratch, flagged = cuda.local.array(stride, f32), cuda.local.array(SCRATCH, f32), cuda.local.array(1, u8)
         tally = cuda.local.array(TALLIES, i64)
-        found, start = cuda.shared.array(1, i64), cuda.shared.array(1, i64)
+        found = cuda.shared.array(1, i64)
+        start = cuda.shared.array(1, i64)
         frames, first, place = clips.light.shape[0], clips.light.shape[0], 0
         if cuda.threadIdx.x == 0:
             found[0] = 0

@@ -1,0 +1,33 @@
+"""State pixel by pixel: of as many sensors as there are, each in its place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vid2ev import DvsSpec
+from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
+from vid2ev.sensors.pixel_planes import pixel_planes
+
+SIZE, PIXELS = (7, 5), 35
+HOT, SHOTS = {"hot_probability": 0.2, "hot_rate_hz": 50.0}, {"shot_rate_hz": 5.0, "hot_probability": 0.0}
+
+
+def test_planes_that_one_sensor_uses_have_room_for_all():
+    """Hot pixels remember their last event; shots do not ask for that, and both are the same kernels."""
+    specs = [DvsSpec(refractory_us=0.0, **more) for more in (HOT, SHOTS, HOT)]
+    flags = flags_of(specs[0], labels=False)
+    assert all(flags_of(spec, labels=False) == flags for spec in specs)
+    each = [planes_of(spec, flags, numbers_of(spec, 1, 0), *SIZE)[0] for spec in specs]
+    assert [len(planes.t_last) for planes in each] == [PIXELS, 1, PIXELS]
+    for order in ([0, 1, 2], [1, 0, 2], [0, 2, 1]):
+        planes = pixel_planes([each[k] for k in order], flags, PIXELS)
+        assert len(planes.t_last) == len(planes.memory) == 3 * PIXELS
+        hot = [k * PIXELS + each[which].hot for k, which in enumerate(order)]
+        np.testing.assert_array_equal(planes.hot, np.concatenate(hot))
+
+
+def test_a_plane_that_no_sensor_uses_has_one_entry():
+    specs = [DvsSpec(refractory_us=0.0, **SHOTS), DvsSpec(refractory_us=0.0, **SHOTS, threshold_on=0.4)]
+    flags = flags_of(specs[0], labels=False)
+    each = [planes_of(spec, flags, numbers_of(spec, 1, 0), *SIZE)[0] for spec in specs]
+    assert len(pixel_planes(each, flags, PIXELS).t_last) == 1
