@@ -20,6 +20,7 @@ from vid2ev import CisSpec, DvsSpec, cis_names, load_sensor
 from vid2ev.__main__ import main
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.rig_file import read_rig
+from vid2ev.sensors.devices import missing_for_cuda
 from vid2ev.sources.with_depth import parse_depth
 
 ROOT = Path(__file__).parents[1]
@@ -213,3 +214,10 @@ def test_the_python_of_the_page_runs() -> None:
         with contextlib.redirect_stdout(None):
             exec(compile(code, FROM_V2E.name, "exec"), namespace)
         assert len(namespace["events"])  # type: ignore[arg-type]
+
+
+def test_the_benchmark_of_gpus_says_in_one_line_that_there_is_none() -> None:
+    if not missing_for_cuda():
+        pytest.skip("there is a GPU: the example would measure it for minutes")
+    done = CliRunner().invoke(example("benchmark_gpu").main, [])
+    assert done.exit_code == 0 and re.fullmatch(r"no GPU: .+; nothing is measured\n", done.output)

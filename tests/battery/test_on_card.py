@@ -1,11 +1,14 @@
 """A sensor on a GPU is the sensor on a CPU: the same events, counts and state, to the bit.
 
 The GPU is numba's simulator: kernels are run thread by thread, and what they call is compiled for the CPU from the same
-text, for one pixel per thread.  Compiling that takes half a minute for a combination of effects, so most are slow.
+text, for one pixel per thread.  Compiling that takes 35 s of a CPU and more for a combination of effects, so all but
+one are slow: `python -m pytest tests/battery/test_on_card.py -m slow`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +25,13 @@ from vid2ev.sensors.batch import DvsBatch
 from vid2ev.sensors.devices import memory_of, missing_for_cuda
 from vid2ev.sensors.dvs import Dvs, DvsSpec
 from vid2ev.sensors.dvs_on_card import DvsOnCard
-from vid2ev.stream import Events
+from vid2ev.stream import Events, Frame
+from vid2ev.stream.still import Still, strip_count
 
 from .combinations import COMPILED
 from .drawn_clips import SIZE, Clip, clips
 
-QUICK = ("paper", "everything")
+QUICK = ("paper",)
 
 
 class Tensors(Card):
@@ -55,9 +59,15 @@ def as_arrays(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
 
 memories = pytest.mark.parametrize("memory", [Simulated(), Tensors()], ids=["arrays", "tensors"])
 LABELS = {"paper": False, "everything": True}
-specs = pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COMPILED]
-)
+
+
+def each_of(names: Iterable[str]) -> Any:
+    """Sensors by name; those that are not quick are slow."""
+    quick = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in names]
+    return pytest.mark.parametrize("name", quick)
+
+
+specs, two_specs = each_of(COMPILED), each_of(("paper", "everything"))
 
 
 def assert_same(one: list[Events], other: list[Events]) -> None:
@@ -96,7 +106,7 @@ def test_events_counts_and_state_are_those_of_the_walk_on_a_cpu(name, data):
 
 
 @memories
-@pytest.mark.parametrize("name", QUICK)
+@two_specs
 def test_a_state_is_taken_up_by_the_other(name, memory):
     rng = np.random.default_rng(3)
     frames = np.exp(rng.normal(0, 0.7, (9, *SIZE[::-1]))).astype(np.float32)
@@ -113,33 +123,48 @@ def test_a_state_is_taken_up_by_the_other(name, memory):
     assert sum(map(len, whole[5:])) > 100 and card.counts == cpu.counts
 
 
+def test_frames_with_cuts_and_with_what_is_still_are_run_as_on_a_cpu():
+    rng = np.random.default_rng(7)
+    light = list(np.exp(rng.normal(0, 0.7, (7, *SIZE[::-1]))).astype(np.float32))
+    light[2] = light[1].copy()
+    frames = [Frame(light[k], 10**6 * k, cut=k == 4) for k in range(7)]
+    frames[2] = replace(frames[2], still=Still(light[1], np.ones(strip_count(*SIZE), bool)))
+    cpu, card = both("paper", Clip(np.zeros(0), light[0], 0, 5))
+    ours, theirs = list(card.run(frames)), list(cpu.run(frames))
+    assert_same(ours, theirs)
+    assert sum(map(len, ours)) > 100 and len(ours[4]) == 0
+
+
 @memories
-def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(memory):
-    rng, base = np.random.default_rng(4), COMPILED["everything"].model_dump()
-    changes = ({}, {"threshold_on": 0.3, "shot_rate_hz": 300.0}, {"follower_tau_us": 900.0, "random_phase": False})
+@two_specs
+def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(name, memory):
+    rng, base, labels = np.random.default_rng(4), COMPILED[name].model_dump(), LABELS[name]
+    more = {"shot_rate_hz": 300.0} if base["shot_rate_hz"] > 0 else {"mismatch": 0.05}
+    changes = ({}, {"threshold_on": 0.3} | more, {"follower_tau_us": 900.0, "random_phase": False})
     sensors, seeds = [DvsSpec(**(base | change)) for change in changes], [5, 2**64 - 1, 0]
     frames = np.exp(rng.normal(0, 0.7, (7, 3, *SIZE[::-1]))).astype(np.float32)
     t_ns = np.cumsum(rng.integers(1e4, 4e6, (7, 3)), axis=0)
-    batch = DvsBatch(sensors, SIZE, seeds, memory=memory, cameras=[0, 1, 2], labels=True)
+    batch = DvsBatch(sensors, SIZE, seeds, memory=memory, cameras=[0, 1, 2], labels=labels)
     batch.restart(frames[0], t_ns[0])
     parts = [batch.steps(frames[1:4], t_ns[1:4]), batch.steps(frames[4:], t_ns[4:])]
     for k, (spec, seed) in enumerate(zip(sensors, seeds, strict=True)):
-        alone = Dvs(spec, SIZE, seed, camera=k, labels=True)
+        alone = Dvs(spec, SIZE, seed, camera=k, labels=labels)
         each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(7)][1:]
         assert sum(map(len, each)) > 50
         assert_same(each, [part.of(k, j) for part in parts for j in range(3)])
 
 
 @memories
-def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(memory):
-    rng, spec = np.random.default_rng(6), COMPILED["everything"]
+@two_specs
+def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(name, memory):
+    rng, spec, labels = np.random.default_rng(6), COMPILED[name], LABELS[name]
     frames = np.exp(rng.normal(0, 0.7, (5, 2, *SIZE[::-1]))).astype(np.float32)
     t_ns = np.repeat(np.cumsum(rng.integers(1e4, 4e6, 5))[:, None], 2, axis=1)
-    batch = DvsBatch([spec, spec], SIZE, [8, 9], memory=memory, labels=True)
+    batch = DvsBatch([spec, spec], SIZE, [8, 9], memory=memory, labels=labels)
     batch.restart(frames[0], t_ns[0])
     parts = [batch.steps(frames[1:3], t_ns[1:3]), batch.steps(frames[3:], t_ns[3:])]
     for k in range(2):
-        alone = Dvs(spec, SIZE, 8 + k, labels=True)
+        alone = Dvs(spec, SIZE, 8 + k, labels=labels)
         each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(5)][1:]
         assert sum(map(len, each)) > 50
         assert_same(each, [part.of(k, j) for part in parts for j in range(2)])

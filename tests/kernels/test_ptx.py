@@ -1,7 +1,7 @@
 """The kernels of a GPU as machine code of NVIDIA's (PTX), which needs compilers, but no GPU.
 
 That code is what says whether arithmetic is that of the text: products and sums are rounded each by itself but where
-the text fuses them.
+the text fuses them.  Most sensors are slow: `python -m pytest tests/kernels/test_ptx.py -m "slow or not slow"` is all.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ pytestmark = pytest.mark.skipif(
 CAPABILITY = (9, 0)
 TWO_POLES = clean(photoreceptor_tau_us=300, follower_tau_us=100)
 SENSORS = {"two poles": TWO_POLES, "paper": DvsSpec(), "everything": EVERYTHING, "after, tracking": AFTER_TRACKING}
+QUICK = ("two poles",)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -90,7 +91,9 @@ def strictly(flags: Flags, kernel: str) -> str:
 
 
 @pytest.mark.parametrize("kernel", ["glance", "walk", "settle", "undo", "propose"])
-@pytest.mark.parametrize("name", SENSORS)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SENSORS]
+)
 def test_kernels_compile_and_call_nothing(name, kernel):
     ptx = strictly(flags_of(SENSORS[name], labels=True), kernel)
     assert ".visible .entry" in ptx
