@@ -69,8 +69,9 @@ class Reel:
             return everything
         wanted = np.zeros(tiles, np.uint8)
         touch(rays_of_pixels(self.intrinsics), balls, wanted)
-        lines, columns = np.nonzero(details != last.details)
-        wanted[lines // TILE, columns // TILE] = 1
+        if (other := details != last.details).any():
+            lines, columns = np.nonzero(other)
+            wanted[lines // TILE, columns // TILE] = 1
         return wanted
 
 

@@ -109,18 +109,20 @@ def paint(
 
     works: list[Work] = [trace, smooth] if samples > 1 else [trace]
     for work in works:
-        _in_bands(work, len(rays), lambda: scratch_for(len(world.kind), cells[1]), threads)
+        _in_bands(
+            work, np.flatnonzero(wanted.any(axis=1)), len(rays), lambda: scratch_for(len(world.kind), cells[1]), threads
+        )
 
 
-def _in_bands(work: Work, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:
-    """Do the work for all bands of rows."""
+def _in_bands(work: Work, bands: np.ndarray, height: int, scratch: Callable[[], Scratch], threads: int | None) -> None:
+    """Do the work for these bands of rows."""
 
     def band(first: int) -> None:
         work(first, min(first + TILE, height), scratch())
 
-    firsts = range(0, height, TILE)
+    firsts = [int(band) * TILE for band in bands]
     threads = min(threads or os.cpu_count() or 1, len(firsts))
-    if threads == 1:
+    if threads <= 1:
         for first in firsts:
             band(first)
         return
