@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from numba import types
-from numba.core.extending import intrinsic
+
+from vid2ev.kernel_extending import intrinsic
 
 
 def _bitcast(source: Any, target: Any) -> Any:

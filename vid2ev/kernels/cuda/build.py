@@ -21,7 +21,8 @@ ALWAYS = {
 }
 CARD = ALWAYS | {
     "vid2ev.kernel_compiler": "vid2ev.kernels.cuda.device_compiler",
-    "vid2ev.kernel_intrinsics": "vid2ev.kernels.cuda.device_intrinsics",
+    "vid2ev.kernel_extending": "vid2ev.kernels.cuda.device_extending",
+    "vid2ev.kernel_intrinsics": "vid2ev.kernel_intrinsics",  # (its own text, by the other way in)
     "vid2ev.kernels.cuda.counter": "vid2ev.kernels.cuda.device_counter",
 }
 SIMULATED = ALWAYS | {
