@@ -13,6 +13,7 @@ import numpy as np
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
 from vid2ev.kernels.play import BENDS, LIGHT, SEEN, SMOOTH, STEPS
+from vid2ev.kernels.scan import BRIGHTEST
 from vid2ev.physics.elementary import expm1_32
 
 F = np.float32
@@ -24,7 +25,7 @@ CHANGES, CALM, LEFT = range(3)  # a strip's light has changed; it has not; nor t
 def arriving(light):
     """Light as the sensor takes it: what is no number or negative is none."""
     light = light if light > F(0.0) else F(0.0)
-    return light if light < F(1e30) else F(1e30)
+    return light if light < BRIGHTEST else BRIGHTEST
 
 
 @inner

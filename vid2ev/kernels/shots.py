@@ -29,21 +29,6 @@ def end_of_pixel(keys, forced, j, iv):
 
 
 @inner
-def is_quiet(block, scratch, flagged, keys, chance, first, last, p0, planes, flags, num, iv):
-    """Whether candidates first ... last - 1, those of a pixel, are shots of a good one that reaches no level."""
-    i = place_of_candidate(keys[first], iv)[0]
-    if flagged[i] != 0 or not block[HIGH * PITCH + i] < np.inf:
-        return False
-    path = path_of(block, scratch, i, flags, num, iv)
-    for j in range(first, last):
-        change = value(path, 1.0) - value(path, place_of_candidate(keys[j], iv)[1])
-        far = farthest(block, scratch, i, change, flags, iv)
-        if chance[j] == 0.0 or not is_below_thresholds(far, p0 + i, planes.theta, flags, num):
-            return False
-    return True
-
-
-@inner
 def farthest(block, scratch, i, change, flags, iv):
     """How far the signal of pixel i may go in the rest of an interval, at whose end it has changed by `change`."""
     if len(flags.poles) == 0 or not turns_at(block, scratch, i, flags):
@@ -64,23 +49,38 @@ def is_below_thresholds(far, pixel, theta, flags, num):
 
 
 @inner
+def load_quiet(block, scratch, flagged, keys, chance, first, last, p0, lanes, pixels, shots, planes, flags, num, iv):
+    """Load candidates first ... last - 1, those of a pixel, if they are shots of a good one that reaches no level, and
+    there is room for all: returns how many, all or none."""
+    i = place_of_candidate(keys[first], iv)[0]
+    if shots + (last - first) > LANE_COUNT or flagged[i] != 0 or not block[HIGH * PITCH + i] < np.inf:
+        return 0
+    path = path_of(block, scratch, i, flags, num, iv)
+    end = value(path, 1.0)
+    for j in range(first, last):
+        s, lane = place_of_candidate(keys[j], iv)[1], shots + (j - first)
+        here = value(path, s)
+        far = farthest(block, scratch, i, end - here, flags, iv)
+        if chance[j] == 0.0 or not is_below_thresholds(far, p0 + i, planes.theta, flags, num):
+            return 0
+        lanes[AT + lane], lanes[WHEN + lane], pixels[lane] = here, s, p0 + i
+        lanes[UP + lane], lanes[LABEL + lane] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
+    return last - first
+
+
+@inner
 def aim(block, scratch, flagged, keys, chance, forced, p0, lanes, pixels, shots, planes, flags, num, iv):
     """Load the shots of a block's quiet pixels and flag the pixels of the other candidates: (candidates left, shots
     loaded)."""
     left, first = 0, 0
     while first < forced:
-        last, i = end_of_pixel(keys, forced, first, iv), place_of_candidate(keys[first], iv)[0]
-        if shots + (last - first) <= LANE_COUNT and is_quiet(
-            block, scratch, flagged, keys, chance, first, last, p0, planes, flags, num, iv
-        ):
-            path = path_of(block, scratch, i, flags, num, iv)
-            for j in range(first, last):
-                s = place_of_candidate(keys[j], iv)[1]
-                lanes[AT + shots], lanes[WHEN + shots], pixels[shots] = value(path, s), s, p0 + i
-                lanes[UP + shots], lanes[LABEL + shots] = 1.0 if chance[j] > 0.0 else 0.0, SHOT
-                shots += 1
-        else:
-            flagged[i] = 1
+        last = end_of_pixel(keys, forced, first, iv)
+        loaded = load_quiet(
+            block, scratch, flagged, keys, chance, first, last, p0, lanes, pixels, shots, planes, flags, num, iv
+        )
+        shots += loaded
+        if loaded == 0:
+            flagged[place_of_candidate(keys[first], iv)[0]] = 1
             for j in range(first, last):
                 keys[left], chance[left] = keys[j], chance[j]
                 left += 1

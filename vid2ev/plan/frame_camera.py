@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
-from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, names_of, without
+from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, chosen, names_of, without
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.stream.bounds import together
 from vid2ev.stream.exposed import ROUNDING, Exposed, LevelChange
@@ -113,7 +113,7 @@ def _planned(
     among: Sequence[str] | None = None,
 ) -> FramePlan:
     if effects == "auto":
-        gone = _within({name: said for name, said in omissions.items() if among is None or name in among}, tolerance)
+        gone = _within(chosen(omissions, among), tolerance)
     else:
         kept = names_of(effects)
         gone = [name for name in omissions if name not in kept]

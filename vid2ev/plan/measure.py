@@ -21,10 +21,10 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, SPREAD, Scene
+from vid2ev.stream.still import told_of
 
 BRIGHTNESS_EVERY = 8  # frames
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
-NOT_TOLD = np.empty(0, np.uint8)
 
 
 class Measure:
@@ -74,9 +74,7 @@ class Measure:
             settle_measure(light, self._shade, self._curve, self._half, self._found)
             self._dt_s = math.inf
         else:
-            told = frame.still is not None and frame.still.before is self._last
-            known = frame.still.strips.view(np.uint8) if frame.still is not None and told else NOT_TOLD
-            self._advance(light, known, (frame.t_ns - self._t_ns) * 1e-9)
+            self._advance(light, told_of(frame.still, self._last), (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])

@@ -199,7 +199,7 @@ def _planned(
 ) -> Plan:
     used = list(omissions)
     if effects == "auto":
-        gone = _within({name: said for name, said in omissions.items() if among is None or name in among}, tolerance)
+        gone = _within(chosen(omissions, among), tolerance)
         changes = dict(change for name in gone for change in omissions[name].replace or EFFECTS[name].off.items())
     else:
         kept = names_of(effects)
@@ -213,6 +213,11 @@ def _planned(
     rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
     return Plan(shown, tolerance, rows, without(spec, changes), distance, seen)
+
+
+def chosen(omissions: dict[str, Any], among: Sequence[str] | None) -> dict[str, Any]:
+    """The omissions of these effects; of all for None."""
+    return {name: said for name, said in omissions.items() if among is None or name in among}
 
 
 def check_tolerance(tolerance: float) -> None:

@@ -37,9 +37,12 @@ def moved_things(before: World, after: World) -> np.ndarray | None:
     return moved
 
 
-def balls_of(before: World, after: World, moved: np.ndarray) -> np.ndarray | None:
+def balls_between(before: World, after: World) -> np.ndarray | None:
     """The balls, as `touch` takes them, that hold all that moves and all that its shadows may fall on; None for
     everywhere."""
+    moved = moved_things(before, after)
+    if moved is None:
+        return None
     balls = np.concatenate([world.ball[moved] for world in (before, after)])
     shadows = [np.empty((0, 4))]
     if after.casts and len(balls):

@@ -13,7 +13,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.details import details_of
 from vid2ev.scenes.lens import rays_of_pixels
-from vid2ev.scenes.moves import balls_of, moved_things
+from vid2ev.scenes.moves import balls_between
 from vid2ev.scenes.rays.layout import World as Numbers
 from vid2ev.scenes.rays.touch import touch
 from vid2ev.scenes.rays.walk import TILE
@@ -61,12 +61,10 @@ class Reel:
 
     def _wanted(self, numbers: Numbers, details: np.ndarray) -> np.ndarray:
         """The tiles of which the picture may be another than the last."""
-        tiles = tiles_of(self.intrinsics.size)
-        everything, last = np.ones(tiles, np.uint8), self._last
-        moved = None if last is None else moved_things(last.numbers, numbers)
-        balls = None if last is None or moved is None else balls_of(last.numbers, numbers, moved)
+        tiles, last = tiles_of(self.intrinsics.size), self._last
+        balls = None if last is None else balls_between(last.numbers, numbers)
         if last is None or balls is None:
-            return everything
+            return np.ones(tiles, np.uint8)
         wanted = np.zeros(tiles, np.uint8)
         touch(rays_of_pixels(self.intrinsics), balls, wanted)
         if (other := details != last.details).any():

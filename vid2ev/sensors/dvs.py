@@ -24,7 +24,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.still import Still, strip_count
+from vid2ev.stream.still import Still, strip_count, told_of
 
 __all__ = ["Dvs", "DvsSpec"]
 
@@ -109,7 +109,7 @@ class Dvs:
         interval = interval_of(
             self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
         )
-        self._sleep.begin(interval, still.strips if still is not None and still.before is self._seen else None)
+        self._sleep.begin(interval, told_of(still, self._seen))
         events = self._events(self._walk(flat, table, interval), interval)
         self._sleep.end()
         self._t_ns, self._seen = t_ns, light

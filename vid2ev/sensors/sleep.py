@@ -6,8 +6,7 @@ import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, STRIP, Interval
 from vid2ev.kernels.naps import AGAIN, AWAKE, COLUMNS, HISTORY, Naps
-
-NOT_TOLD = np.empty(0, np.uint8)
+from vid2ev.stream.still import NOT_TOLD
 
 
 class Sleep:
@@ -28,9 +27,9 @@ class Sleep:
             tick=0,
         )
 
-    def begin(self, interval: Interval, still: np.ndarray | None) -> None:
-        """An interval, and which strips keep their light in it, if that is known."""
-        self.naps = self.naps._replace(told=NOT_TOLD if still is None or not self.naps.wanted else still.view(np.uint8))
+    def begin(self, interval: Interval, told: np.ndarray) -> None:
+        """An interval, and which strips are told to keep their light in it, if that is known."""
+        self.naps = self.naps._replace(told=told if self.naps.wanted else NOT_TOLD)
         tick, history = self.naps.tick, self.naps.history
         weights = (interval.x1, interval.x2, interval.g, interval.a, interval.b)
         again = weights == tuple(history[(tick - 1) % HISTORY, :AGAIN].tolist())

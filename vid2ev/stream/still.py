@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 STRIP = 256  # pixels, row by row
+NOT_TOLD = np.empty(0, np.uint8)
 BRIGHTEST = 1e30  # light that sensors take as it is; what is below 0 or not finite they mend, and count
 
 
@@ -20,6 +21,11 @@ class Still(NamedTuple):
 
     before: np.ndarray
     strips: np.ndarray
+
+
+def told_of(still: Still | None, last: object) -> np.ndarray:
+    """uint8 [strips]: what is said to whoever saw `last` before; empty if that is nothing."""
+    return NOT_TOLD if still is None or still.before is not last else still.strips.view(np.uint8)
 
 
 def strip_count(width: int, height: int) -> int:

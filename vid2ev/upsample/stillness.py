@@ -9,6 +9,7 @@ from vid2ev.kernel_cache import mark_our_kernels
 from vid2ev.stream.still import BRIGHTEST, STRIP, strip_count
 
 mark_our_kernels()
+_BRIGHTEST = np.float32(BRIGHTEST)
 
 
 def still_strips(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -33,9 +34,12 @@ def compare(before, after, length, same):
 def all_same(before, after):
     """Whether all of two arrays are the same light."""
     odd = np.uint32(0)
-    brightest = np.float32(BRIGHTEST)
     for i in range(before.size):
-        value = after[i]
-        fine = (value == before[i]) & (value >= np.float32(0)) & (value <= brightest)
-        odd = np.uint32(odd | np.uint32(fine == False))  # noqa: E712 (vectorises, `not` does not)
+        odd = np.uint32(odd | np.uint32(is_kept(before[i], after[i]) == False))  # noqa: E712 (vectorises, `not` does not)
     return odd == 0
+
+
+@njit(nogil=True, error_model="numpy")
+def is_kept(before, after):
+    """Whether a pixel's light is what it was, and light as it should be."""
+    return (before == after) & (after >= np.float32(0)) & (after <= _BRIGHTEST)

@@ -16,12 +16,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.stream.still import BRIGHTEST, STRIP
+from vid2ev.stream.still import STRIP
+from vid2ev.upsample.stillness import is_kept
 
 F = np.float32
 BEFORE, AFTER = 1, 2  # pixels of margin that `carry` needs around an image
 _HALF, _ONE, _TWO, _THREE, _FOUR = F(0.5), F(1), F(2), F(3), F(4)
-_BRIGHTEST = F(BRIGHTEST)
 _TINY = F(1e-20)  # in place of a sum of nothing
 
 
@@ -165,8 +165,7 @@ def _fade(before, after, margined, motion, out, place, count):
         p, q = before[k + i], after[k + i]
         out[j + i] = q + motion[size + size + j + i] * (p - q)  # (in this form equal light stays the same to the bit)
         moves = np.uint32(moves | np.uint32((motion[j + i] != F(0)) | (motion[size + j + i] != F(0))))
-        fine = (p == q) & (q >= F(0)) & (q <= _BRIGHTEST)
-        differs = np.uint32(differs | np.uint32(fine == False))  # noqa: E712 (vectorises, `not` does not)
+        differs = np.uint32(differs | np.uint32(is_kept(p, q) == False))  # noqa: E712 (vectorises, `not` does not)
     return moves != 0, differs != 0
 
 
