@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from killed import converted
 
 CLIP = "synthetic:moving-edge,size=640x32,fps=100,duration_s=0.12"
-RUN = """
-import json, os, signal, sys
-from vid2ev import convert
-
-last, seen = int(sys.argv[1]), 0
-
-def report(*_):
-    global seen
-    seen += 1
-    if seen == last:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-convert(sys.argv[2], sys.argv[3], report=report, **json.loads(sys.argv[4]))
-"""
 OPTIONS = {
     "overrides": ["shot_rate_hz=2"],
     "upsample": "none",
@@ -37,8 +22,7 @@ OPTIONS = {
 
 
 def run(directory: Path, killed_at: int = 0, **changed: object) -> int:
-    arguments = [str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed)]
-    return subprocess.run([sys.executable, "-c", RUN, *arguments], stderr=subprocess.DEVNULL, env=os.environ).returncode
+    return converted(CLIP, directory, OPTIONS | changed, killed_at).returncode
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")

@@ -10,24 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from killed import converted
 
 SIZE = (40, 30)
-RUN = """
-import json, os, signal, sys
-from vid2ev import convert
-from vid2ev.plan import planner
-
-planner.HELD, last, seen = 10 * 40 * 30 * 4, int(sys.argv[1]), 0
-
-def report(*_):
-    global seen
-    seen += 1
-    if seen == last:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-convert(sys.argv[2], sys.argv[3], report=report, **json.loads(sys.argv[4]))
-print(seen)
-"""
+FEW_HELD = f"from vid2ev.plan import planner; planner.HELD = {10 * SIZE[0] * SIZE[1] * 4}\n"
 OPTIONS = {
     "overrides": ["random_phase=true", "mismatch=0", "crossing_noise=0", "refractory_us=0"],
     "upsample": "none",
@@ -41,8 +27,7 @@ OPTIONS = {
 
 
 def run(clip: Path, directory: Path, killed_at: int = 0, **changed: object) -> subprocess.CompletedProcess[str]:
-    arguments = [str(killed_at), str(clip), str(directory), json.dumps(OPTIONS | changed)]
-    return subprocess.run([sys.executable, "-c", RUN, *arguments], capture_output=True, text=True)
+    return converted(clip, directory, OPTIONS | changed, killed_at, FEW_HELD)
 
 
 @pytest.fixture
