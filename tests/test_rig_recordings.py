@@ -114,6 +114,8 @@ def test_depth_maps_serve_as_a_plane_does(tmp_path: Path, depth: str) -> None:
         ({"rig": rig(sensor="davis3")}, "did you mean davis346"),
         ({"rig": rig(translation_mm=(15.0, 0.0, 0.0)), "depth": "plane:-1"}, "plane:-1"),
         ({"rig": rig(), "depth": "plane:2", "cis": "papr"}, "did you mean paper"),
+        ({"depth": "plane:2"}, "leave --depth out"),
+        ({"rig": rig(translation_mm=(0.0, 0.0, 0.0)), "depth": "plane:2"}, "leave --depth out"),
         ({"rig": "missing.toml"}, "missing.toml"),
         ({"cis": "paper", "overrides": ["cis.exposure_us=-1"]}, "exposure_us"),
         ({"cis": "paper", "overrides": ["exposure_us=1"]}, r"did you mean cis\.exposure_us"),

@@ -136,8 +136,13 @@ class Recipe:
             raise UsageError("truth 'flow' of a video is known to nobody: expected a scene; leave it out")
         if self.depth is None and kinds & {"depth", "map"}:
             raise UsageError("truth 'depth' and 'map' need to know how far the video's scene is; add --depth")
-        if self.depth is None and self.sight().needs_depth:
-            away = next(mount for mount in self.mounts if mount.pose.translation_m.any())
+        away = next((mount for mount in self.mounts if mount.pose.translation_m.any()), None)
+        if self.depth is not None and away is None and not kinds & {"depth", "map"}:
+            raise UsageError(
+                f"depth '{self.depth}' and all cameras where the video's is, which see the same at any depth; leave"
+                " --depth out, or add --rig with a camera beside it, or --truth depth"
+            )
+        if self.depth is None and away is not None and self.sight().needs_depth:
             raise UsageError(
                 f"camera {away.name} stands beside the video's, and how far the scene is was not said; add --depth"
                 " plane:METRES, a depth map or a folder of them"
