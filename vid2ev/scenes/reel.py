@@ -15,8 +15,8 @@ from vid2ev.scenes.details import details_of
 from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.moves import balls_between
 from vid2ev.scenes.rays.layout import World as Numbers
+from vid2ev.scenes.rays.tiles import TILE
 from vid2ev.scenes.rays.touch import touch
-from vid2ev.scenes.rays.walk import TILE
 from vid2ev.scenes.render import Canvas, Picture, canvas_of, paint, tiles_of
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world import World

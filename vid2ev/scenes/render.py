@@ -24,7 +24,8 @@ from vid2ev.scenes.details import details_of
 from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.rays.layout import World
 from vid2ev.scenes.rays.scratch import Scratch, scratch_for
-from vid2ev.scenes.rays.walk import TILE, smooth_band, trace_band
+from vid2ev.scenes.rays.tiles import TILE
+from vid2ev.scenes.rays.walk import smooth_band, trace_band
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world_numbers import numbers_of
 

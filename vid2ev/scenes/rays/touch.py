@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from vid2ev.scenes.rays.compiler import walk
-from vid2ev.scenes.rays.walk import TILE, cone
+from vid2ev.scenes.rays.tiles import TILE, cone
 
 MARGIN = 1  # px around a tile: of the keys of its pixels' neighbours; `cone` adds as much
 SLACK = 1e-9  # of a cosine
