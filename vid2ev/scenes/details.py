@@ -31,19 +31,28 @@ def details_of(snapshot: Snapshot, world: World, intrinsics: Intrinsics, camera:
     """uint8 [H + 2, W + 2], 1 where pixels (with a margin of 1 px) are to be measured finely."""
     width, height = intrinsics.size
     found = np.zeros((height + 2, width + 2), np.uint8)
+    columns, lines = places_of_details(snapshot, world, intrinsics, camera).T
+    found[lines, columns] = 1
+    return found
+
+
+def places_of_details(snapshot: Snapshot, world: World, intrinsics: Intrinsics, camera: Pose) -> np.ndarray:
+    """Those pixels one by one, int64 [n, 2], column and line; some may be there twice."""
+    size = intrinsics.size[0] + 2, intrinsics.size[1] + 2
+    found = [np.zeros((0, 2), np.int64)]
     focal = max(intrinsics.focal_px)
     back = camera.inverse()
     for thing, (x, y, z, radius) in zip(snapshot.things, world.ball, strict=True):
         if z - radius > 0 and radius * focal / z < SMALL_PX:
             centre = pixels_of(np.array([[x, y, z]]), intrinsics)
-            _mark(found, centre, radius * focal / z + 1)
+            found += _around(centre, radius * focal / z + 1, size)
         elif (corners := _corners(thing)) is not None:
             here = back @ thing.pose
-            _mark_corners(found, pixels_of(here.apply(corners), intrinsics), thing.shape.kind)
+            found += _around_corners(pixels_of(here.apply(corners), intrinsics), thing.shape.kind, size)
             if thing.shape.kind == "cylinder":
                 rims = _rim_ends(thing, here.inverse().translation_m)
-                _mark(found, pixels_of(here.apply(rims), intrinsics), AROUND)
-    return found
+                found += _around(pixels_of(here.apply(rims), intrinsics), AROUND, size)
+    return np.concatenate(found)
 
 
 def _corners(thing: Thing) -> np.ndarray | None:
@@ -68,25 +77,24 @@ def _rim_ends(thing: Thing, eye: np.ndarray) -> np.ndarray:
     return np.concatenate([np.column_stack([around, [z, z]]) for z in (-half[2], half[2])])
 
 
-def _mark_corners(found: np.ndarray, corners: np.ndarray, kind: str) -> None:
-    if kind != "cylinder":
-        _mark(found, corners, AROUND)
+def _around_corners(corners: np.ndarray, kind: str, size: tuple[int, int]) -> list[np.ndarray]:
+    found = [] if kind == "cylinder" else _around(corners, AROUND, size)
     if kind == "mesh" or not np.isfinite(corners).all():
-        return
+        return found
     import cv2
 
     _, sides, _ = cv2.minAreaRect(np.clip(corners, -1e6, 1e6).astype(np.float32))
-    if min(sides) < THIN_PX and max(sides) < 4 * max(found.shape):
+    if min(sides) < THIN_PX and max(sides) < 4 * max(size):
         share = np.linspace(0, 1, int(2 * max(sides)) + 2)[:, None, None]
-        _mark(found, (corners[EDGES[:, 0]] * share + corners[EDGES[:, 1]] * (1 - share)).reshape(-1, 2), 0.5)
+        edges = corners[EDGES[:, 0]] * share + corners[EDGES[:, 1]] * (1 - share)
+        found += _around(edges.reshape(-1, 2), 0.5, size)
+    return found
 
 
-def _mark(found: np.ndarray, places: np.ndarray, around: float) -> None:
-    """Mark the pixels within `around` of places [n, 2, px], as a square."""
-    height, width = found.shape
-    steps = np.arange(-around, around + 1, min(1.0, 2 * around))
-    for x, y in product(np.minimum(steps, around), repeat=2):
-        spots = np.floor(places + np.array([x + 1.5, y + 1.5]))
-        inside = ((spots >= 0) & (spots < (width, height))).all(axis=1)
-        columns, lines = spots[inside].astype(np.intp).T
-        found[lines, columns] = 1
+def _around(places: np.ndarray, around: float, size: tuple[int, int]) -> list[np.ndarray]:
+    """The pixels of a canvas of this size within `around` of places [n, 2, px], as a square."""
+    steps = 1.5 + np.minimum(np.arange(-around, around + min(1.0, 2 * around), min(1.0, 2 * around)), around)
+    columns, lines = (np.floor(np.add.outer(steps, places[:, axis])) for axis in range(2))
+    columns, lines = np.broadcast_arrays(columns[:, None], lines[None])
+    inside = (columns >= 0) & (columns < size[0]) & (lines >= 0) & (lines < size[1])
+    return [np.stack([columns[inside], lines[inside]], axis=1).astype(np.int64)]
