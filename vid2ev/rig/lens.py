@@ -16,11 +16,16 @@ Sources: the models of OpenCV 4.x ("Camera calibration and 3D reconstruction", "
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vid2ev.rig.intrinsics import Intrinsics
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 FIELD_DEG = 89.5  # from the axis; a plane at z = 1 cannot hold more
 STEPS = 12  # of Newton's method, at most
@@ -57,11 +62,19 @@ def bent(plane: np.ndarray, camera: Intrinsics) -> np.ndarray:
     """Pixels [..., 2] of places [..., 2] on the plane z = 1, in the same precision; NaN beyond the lens's field."""
     if camera.model == "none":
         return (plane * camera.focal_px + camera.centre_px).astype(plane.dtype)
-    limit = np.asarray(radial_table(camera)[0][-1], plane.dtype)
-    with np.errstate(invalid="ignore", over="ignore"):
-        inside = plane[..., 0] ** 2 + plane[..., 1] ** 2 <= limit * limit
-        px = _distorted(np.where(inside[..., None], plane, 0), camera)
-    px[~inside] = np.nan
+    import torch
+
+    return bent_tensor(torch.from_numpy(plane), camera).numpy()
+
+
+def bent_tensor(plane: Tensor, camera: Intrinsics) -> Tensor:
+    """`bent` of a tensor, on its device."""
+    if camera.model == "none":
+        return plane * plane.new_tensor(camera.focal_px) + plane.new_tensor(camera.centre_px)
+    limit = plane.new_tensor(radial_table(camera)[0][-1])
+    inside = plane[..., 0] ** 2 + plane[..., 1] ** 2 <= limit * limit
+    px = _distorted_tensor(plane.where(inside[..., None], 0), camera)
+    px[~inside] = math.nan
     return px
 
 
@@ -82,18 +95,23 @@ def radial_table(camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
 
 def _distorted(plane: np.ndarray, camera: Intrinsics) -> np.ndarray:
     import torch
+
+    return _distorted_tensor(torch.from_numpy(np.ascontiguousarray(plane)), camera).numpy()
+
+
+def _distorted_tensor(plane: Tensor, camera: Intrinsics) -> Tensor:
     from kornia.geometry.calibration import distort_points
     from kornia.geometry.camera import distort_points_kannala_brandt
 
-    points = torch.from_numpy(np.ascontiguousarray(plane.reshape(-1, 2)))
+    points = plane.reshape(-1, 2)
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     if camera.model == "equidistant":
-        values = torch.tensor([fx, fy, cx, cy, *camera.distortion], dtype=points.dtype)
+        values = points.new_tensor([fx, fy, cx, cy, *camera.distortion])
         made = distort_points_kannala_brandt(points, values.expand(len(points), 8))
     else:
-        matrix, plain = torch.from_numpy(camera.matrix).to(points.dtype), torch.eye(3, dtype=points.dtype)
-        made = distort_points(points, matrix, torch.tensor(camera.distortion, dtype=points.dtype), plain)
-    return made.numpy().reshape(plane.shape)
+        matrix, plain = points.new_tensor(camera.matrix), points.new_tensor(np.eye(3))
+        made = distort_points(points, matrix, points.new_tensor(camera.distortion), plain)
+    return made.reshape(plane.shape)
 
 
 def _straightened(px: np.ndarray, plane: np.ndarray, camera: Intrinsics) -> np.ndarray:

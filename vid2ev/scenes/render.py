@@ -73,6 +73,13 @@ def tiles_of(size: tuple[int, int]) -> tuple[int, int]:
     return -(-(height + 2) // TILE), -(-(width + 2) // TILE)
 
 
+def cells_of(samples: int) -> tuple[int, int]:
+    """Into how many cells pixels are cut each way: usually, and at details.  Raises UsageError."""
+    if not 1 <= samples <= 16:
+        raise UsageError(f"{samples} samples must be 1 (jagged edges) to 16; 2 is usual")
+    return samples, max(samples, FINE)
+
+
 def render(
     snapshot: Snapshot, intrinsics: Intrinsics, pose: Pose, *, samples: int = SAMPLES, threads: int | None = None
 ) -> Picture:
@@ -97,9 +104,7 @@ def paint(
     threads: int | None = None,
 ) -> None:
     """Paint the tiles that are `wanted`, uint8 of `tiles_of`; all others stay as they are."""
-    if not 1 <= samples <= 16:
-        raise UsageError(f"{samples} samples must be 1 (jagged edges) to 16; 2 is usual")
-    rays, cells = rays_of_pixels(intrinsics), (samples, max(samples, FINE))
+    rays, cells = rays_of_pixels(intrinsics), cells_of(samples)
     light, thing, depth, keys = canvas
 
     def trace(first: int, last: int, scratch: Scratch) -> Any:

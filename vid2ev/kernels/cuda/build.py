@@ -32,10 +32,10 @@ SIMULATED = ALWAYS | {
 
 
 class Build:
-    """Modules executed anew, with others in the place of those `exchanged` (name -> name)."""
+    """Modules of `parts` executed anew, with others in the place of those `exchanged` (name -> name)."""
 
-    def __init__(self, exchanged: dict[str, str]):
-        self._exchanged = exchanged
+    def __init__(self, exchanged: dict[str, str], parts: tuple[str, ...] = PARTS):
+        self._exchanged, self._parts = exchanged, parts
         self._modules: dict[str, Any] = {}
 
     def module(self, name: str) -> Any:
@@ -52,8 +52,8 @@ class Build:
 
     def _import(self, name: str, globals: Any = None, locals: Any = None, fromlist: Any = (), level: int = 0) -> Any:
         """`from name import ...`: ours, where it is ours."""
-        if name in PARTS:
+        if name in self._parts:
             return SimpleNamespace(**{part: self.module(f"{name}.{part}") for part in fromlist})
-        if fromlist and (name in self._exchanged or name.startswith(tuple(f"{part}." for part in PARTS))):
+        if fromlist and (name in self._exchanged or name.startswith(tuple(f"{part}." for part in self._parts))):
             return self.module(name)
         return builtins.__import__(name, globals, locals, fromlist, level)

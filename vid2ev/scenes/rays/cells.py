@@ -72,8 +72,11 @@ def is_straight(world, rays, keys, x, y, apart_x, apart_y, size, count, scratch)
     if length == 0.0:
         return True
     off_x, off_y = OFF_LINE * size * apart_y / length, -OFF_LINE * size * apart_x / length
-    one, _ = key_at(world, rays, x + off_x, y + off_y, count, scratch)
-    other, _ = key_at(world, rays, x - off_x, y - off_y, count, scratch)
+    one, other = keys[0], keys[0]
+    for _ in range(2):  # (one side, and the other)
+        one = other
+        other, _there = key_at(world, rays, x + off_x, y + off_y, count, scratch)
+        off_x, off_y = -off_x, -off_y
     return one != other and (one == keys[0] or other == keys[0])
 
 

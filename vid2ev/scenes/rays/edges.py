@@ -13,7 +13,7 @@ import math
 
 from vid2ev.scenes.rays.cells import share_cell
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import BEHIND, JUMP, MESH, PART, THING
+from vid2ev.scenes.rays.layout import BEHIND, JUMP, MESH, NOTHING, PART, THING
 from vid2ev.scenes.rays.meet import key_of, meet, meet_thing, row, turned
 from vid2ev.scenes.rays.pixel import light_of
 from vid2ev.scenes.rays.probe import change_between, key_at, ray_at
@@ -29,13 +29,20 @@ def measure(world, rays, column, line, cells, count, scratch):
     # A side belongs to two cells; its change is found once.
     for j in range(cells + 1):
         for i in range(cells + 1):
-            x, y, key = left + i * size, top + j * size, scratch.corners[j, i]
-            if i < cells and scratch.corners[j, i + 1] != key:
-                beside = scratch.corners[j, i + 1]
-                scratch.across[j, i] = change_between(world, rays, x, y, x + size, y, key, beside, count, scratch)
-            if j < cells and scratch.corners[j + 1, i] != key:
-                below = scratch.corners[j + 1, i]
-                scratch.down[j, i] = change_between(world, rays, x, y, x, y + size, key, below, count, scratch)
+            x, y = left + i * size, top + j * size
+            for way in range(2):
+                di, dj = 1 - way, way
+                if i + di > cells or j + dj > cells:
+                    continue
+                key, next_key = scratch.corners[j, i], scratch.corners[j + dj, i + di]
+                if key != next_key:
+                    share = change_between(
+                        world, rays, x, y, x + di * size, y + dj * size, key, next_key, count, scratch
+                    )
+                    if way == 0:
+                        scratch.across[j, i] = share
+                    else:
+                        scratch.down[j, i] = share
     found = 0
     for j in range(cells):
         for i in range(cells):
@@ -101,13 +108,13 @@ def light_of_part(world, rays, part, across, down, count, scratch):
     """The light of a part where its centre is, even if something else is in front there; at its corner if it is not."""
     key, area = scratch.keys[part], scratch.parts[part, AREA]
     x, y = ray_at(rays, scratch.parts[part, X] / area, scratch.parts[part, Y] / area)
-    if key < 0:
-        return light_of(world, (-1, math.inf, 0, 0.0, 0.0), x, y, across, down, 0)
-    thing, shadows = key // THING, key % BEHIND
-    eye, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
-    t, face, b1, b2 = meet_thing(world, thing, eye, d, math.inf, scratch.stack)
-    meeting = thing, t, face, b1, b2
-    if not (t < math.inf and key_of(world, thing, t, face, shadows, scratch.split[0]) == key):
-        x, y = ray_at(rays, scratch.parts[part, AT_X], scratch.parts[part, AT_Y])
-        meeting = meet(world, scratch.things, count, x, y, scratch.stack)
+    meeting, shadows = (NOTHING, math.inf, 0, 0.0, 0.0), 0
+    if key >= 0:
+        thing, shadows = key // THING, key % BEHIND
+        eye, d = row(world.eye, thing), turned(world.turn, thing, x, y, 1.0)
+        t, face, b1, b2 = meet_thing(world, thing, eye, d, math.inf, scratch.stack)
+        meeting = thing, t, face, b1, b2
+        if not (t < math.inf and key_of(world, thing, t, face, shadows, scratch.split[0]) == key):
+            x, y = ray_at(rays, scratch.parts[part, AT_X], scratch.parts[part, AT_Y])
+            meeting = meet(world, scratch.things, count, x, y, scratch.stack)
     return light_of(world, meeting, x, y, across, down, shadows)

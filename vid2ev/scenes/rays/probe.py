@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.meet import key_of, meet
 from vid2ev.scenes.rays.pixel import shadows_of
@@ -14,8 +16,9 @@ HALVINGS = 9  # an edge is found to 1 / 1000 of a cell
 @law
 def ray_at(rays, x, y):
     """The ray (x, y, 1) through any place of the picture [px], from those through the centres of its pixels."""
-    column = min(max(math.floor(x) + 1, 0), rays.shape[1] - 2)
-    line = min(max(math.floor(y) + 1, 0), rays.shape[0] - 2)
+    # (a GPU's floor is a float)
+    column = min(max(np.int64(math.floor(x)) + 1, 0), rays.shape[1] - 2)
+    line = min(max(np.int64(math.floor(y)) + 1, 0), rays.shape[0] - 2)
     right, low = x + 1.0 - column, y + 1.0 - line
     w00, w01 = (1.0 - right) * (1.0 - low), right * (1.0 - low)
     w10, w11 = (1.0 - right) * low, right * low

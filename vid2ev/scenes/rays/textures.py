@@ -71,7 +71,7 @@ def along(world, level, u, v, axis_u, axis_v, long, apart, wraps_u, wraps_v):
     if long <= LONG * apart:
         return of_level(world, level, u, v, wraps_u, wraps_v)
     reach = 0.5 * long / apart + 1.0 - 0.5 * LONG  # half the samples
-    side = math.ceil(reach) - 1
+    side = np.int64(math.ceil(reach)) - 1  # (a GPU's is a float)
     axis_u, axis_v, one = axis_u * apart, axis_v * apart, np.float32(1.0)
     red, green, blue, sum_ = np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
     for k in range(-side, side + 1):

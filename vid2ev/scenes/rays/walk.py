@@ -6,8 +6,8 @@ other, so threads may share the bands in any way.
 
 from __future__ import annotations
 
+from vid2ev.scenes.rays.carry import carry
 from vid2ev.scenes.rays.compiler import walk
-from vid2ev.scenes.rays.meet import meet
 from vid2ev.scenes.rays.picture import is_mixed, smooth, trace
 from vid2ev.scenes.rays.tiles import TILE, things_in_tile
 
@@ -52,8 +52,10 @@ def smooth_band(world, rays, first, last, wanted, cells, details, light, depth, 
 
 
 @walk
-def cast(world, rays, depth, thing, scratch):
-    """Depth and thing of single rays [n, 2]."""
-    for k in range(len(rays)):
-        meeting = meet(world, world.order, len(world.order), rays[k, 0], rays[k, 1], scratch.stack)
-        depth[k], thing[k] = meeting[1], meeting[0]
+def carry_all(world, motions, rays, depth, thing, plane, seen, stack):
+    """`carry` for all pixels of a picture: into plane float64 [H, W, 2] and seen uint8 [H, W]."""
+    for line in range(thing.shape[0]):
+        for column in range(thing.shape[1]):
+            x, y = rays[line + 1, column + 1, 0], rays[line + 1, column + 1, 1]
+            there_x, there_y, visible = carry(world, motions, x, y, depth[line, column], thing[line, column], stack)
+            plane[line, column, 0], plane[line, column, 1], seen[line, column] = there_x, there_y, visible

@@ -1,0 +1,116 @@
+"""Pictures of worlds on a GPU, several at a time, by the text of `render`: the same bits in the simulator.
+
+On a card, what is not rounded alike everywhere (angles, powers) may differ in the last bits of a float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from vid2ev.kernels.cuda.build import Build
+from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.scenes.lens import rays_of_pixels
+from vid2ev.scenes.rays.cuda.easel import STILL, Easel, Listed
+from vid2ev.scenes.rays.layout import World
+from vid2ev.scenes.rays.tiles import TILE
+from vid2ev.scenes.render import Picture, cells_of, tiles_of
+
+AT_A_TIME = 16  # pictures
+LISTS = 1 << 25  # numbers of things in the lists of all tiles, a quarter of a gigabyte: of many things, fewer pictures
+CARD = {"vid2ev.scenes.rays.compiler": "vid2ev.scenes.rays.cuda.device_compiler"}
+SIMULATED = {"vid2ev.kernels.cuda.machine": "vid2ev.kernels.cuda.simulated_machine"}
+
+
+class WorldsOnCard:
+    """The numbers of worlds on a device; what stays the same from one to the next is uploaded once."""
+
+    def __init__(self, memory: Any):
+        self._memory = memory
+        self._still: dict[str, tuple[np.ndarray, Any]] = {}
+
+    def put(self, worlds: Sequence[World]) -> World:
+        """All of them, as `easel.world_of` takes them."""
+        still = {name: self._kept(name, getattr(worlds[0], name)) for name in STILL}
+        moving = {name: np.stack([getattr(one, name) for one in worlds]) for name in World._fields if name not in STILL}
+        return World(**still, **self._together(moving))
+
+    def _kept(self, name: str, array: np.ndarray) -> Any:
+        host, there = self._still.get(name, (None, None))
+        if host is not array:
+            there = self._memory.put(array)
+            self._still[name] = array, there
+        return there
+
+    def _together(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Arrays on the device, those of a type in one transfer."""
+        placed: dict[str, Any] = {}
+        for dtype in (np.int64, np.float64):
+            ours = {name: array for name, array in arrays.items() if array.dtype == dtype}
+            flat, first = self._memory.put(np.concatenate([array.reshape(-1) for array in ours.values()])), 0
+            for name, array in ours.items():
+                placed[name] = flat[first : first + array.size].reshape(array.shape)
+                first += array.size
+        return placed
+
+
+class PainterOnCard:
+    """Paints what a camera sees, on a device (`vid2ev.kernels.cuda.memory`).
+
+    samples  as of `render`
+    """
+
+    def __init__(self, memory: Any, intrinsics: Intrinsics, samples: int):
+        self._memory, self._size, self._samples = memory, intrinsics.size, samples
+        self._kernels = _kernels(memory.name, cells_of(samples))
+        self._worlds, self._rays = WorldsOnCard(memory), memory.put(rays_of_pixels(intrinsics))
+
+    def at_a_time(self, things: int) -> int:
+        """How many pictures of so many things are painted at a time."""
+        down, across = tiles_of(self._size)
+        return max(1, min(AT_A_TIME, LISTS // max(1, down * across * things)))
+
+    def paint(self, worlds: Sequence[World], details: Sequence[np.ndarray]) -> list[Picture]:
+        """The pictures of some worlds, with their `places_of_details`, as arrays of the device.
+
+        The worlds have as many things and lamps each, and the same textures and meshes.
+        """
+        count = len(worlds)
+        easel, listed = self._easel(details), self._lists(count, len(worlds[0].kind))
+        there, tiles = self._worlds.put(worlds), len(worlds) * tiles_of(self._size)[0] * tiles_of(self._size)[1]
+        kernels, pixels = self._kernels, tiles * TILE * TILE
+        self._memory.launch(kernels.listing, tiles, there, easel, listed)
+        self._memory.launch(kernels.trace, pixels, there, easel, listed)
+        if self._samples > 1:
+            self._memory.launch(kernels.mixing, pixels, there, easel, listed)
+            self._memory.launch(kernels.smooth, count * self._size[0] * self._size[1], there, easel, listed)
+        return [Picture(easel.light[k], easel.depth[k, 1:-1, 1:-1], easel.thing[k]) for k in range(count)]
+
+    def _easel(self, details: Sequence[np.ndarray]) -> Easel:
+        """What as many pictures are painted on, their details marked."""
+        (width, height), count, zeros = self._size, len(details), self._memory.zeros
+        large = count, height + 2, width + 2
+        easel = Easel(
+            self._rays, zeros((count, height, width, 3), np.float32), zeros(large, np.float32),
+            zeros((count, height, width), np.int32), zeros(large, np.int64), zeros(large, np.uint8),
+        )  # fmt: skip
+        rows = [large[2] * (large[1] * k + spots[:, 1]) + spots[:, 0] for k, spots in enumerate(details)]
+        easel.details.reshape(-1)[self._memory.put(np.concatenate(rows))] = 1
+        return easel
+
+    def _lists(self, count: int, things: int) -> Listed:
+        (width, height), (down, across), zeros = self._size, tiles_of(self._size), self._memory.zeros
+        return Listed(
+            zeros((count, down * across, max(things, 1)), np.int64), zeros((count, down * across), np.int64),
+            zeros(count * width * height, np.int64), zeros(1, np.int64),
+        )  # fmt: skip
+
+
+@cache
+def _kernels(kind: str, cells: tuple[int, int]) -> Any:
+    """The kernels of a kind of memory; a simulated GPU calls the laws as they are compiled for a CPU."""
+    build = Build(SIMULATED, ()) if kind == "simulated" else Build(CARD, ("vid2ev.scenes.rays",))
+    return build.module("vid2ev.scenes.rays.cuda.kernels").kernels_of(cells)
