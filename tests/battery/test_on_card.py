@@ -13,14 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cuda.clips import Sent
-from vid2ev.kernels.cuda.memory import UNSIGNED, Card, Simulated
-from vid2ev.kernels.layout import Flags
+from vid2ev.kernels.cuda.memory import Simulated
 from vid2ev.sensors.batch import DvsBatch
 from vid2ev.sensors.devices import memory_of, missing_for_cuda
 from vid2ev.sensors.dvs import Dvs, DvsSpec
@@ -28,36 +26,13 @@ from vid2ev.sensors.dvs_on_card import DvsOnCard
 from vid2ev.stream import Events, Frame
 from vid2ev.stream.still import Still, strip_count
 
+from .card_memories import memories
 from .combinations import COMPILED
 from .drawn_clips import SIZE, Clip, clips
 
 QUICK = ("paper",)
 
 
-class Tensors(Card):
-    """A card's memory, with tensors of torch on the CPU, and the kernels of the simulator."""
-
-    def __init__(self) -> None:
-        super().__init__("cpu")
-
-    def kernels(self, flags: Flags) -> Any:
-        return Simulated().kernels(flags)
-
-    def launch(self, kernel: Any, threads: int, *arguments: Any) -> None:
-        Simulated().launch(kernel, threads, *(as_arrays(argument) for argument in arguments))
-
-
-def as_arrays(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
-    """Tensors as the arrays that kernels see, which share their memory."""
-    if hasattr(argument, "_fields"):
-        kind = type(argument)
-        return kind(*(as_arrays(getattr(argument, name), (kind.__name__, name)) for name in argument._fields))
-    if not isinstance(argument, torch.Tensor):
-        return argument
-    return argument.numpy().view(UNSIGNED.get(place, argument.numpy().dtype))
-
-
-memories = pytest.mark.parametrize("memory", [Simulated(), Tensors()], ids=["arrays", "tensors"])
 LABELS = {"paper": False, "everything": True}
 
 

@@ -18,7 +18,10 @@ from against.clips import AFTER_TRACKING, EVERYTHING, clean
 from vid2ev.kernels.cuda.build import CARD, Build
 from vid2ev.kernels.cuda.clips import Candidates, Clips, Listed, Sent, Start, Totals
 from vid2ev.kernels.cuda.proposals import Proposals
+from vid2ev.kernels.cuda.row_values import Added, Read, Taken
 from vid2ev.kernels.layout import PITCH, Flags, Planes, stride_of
+from vid2ev.sensors.cis_readout import numbers_of
+from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.spec import DvsSpec
 
@@ -42,12 +45,12 @@ def a_card_to_compile_for():
         yield
 
 
+def array(kind: Any, *shape: int) -> np.ndarray:
+    return np.zeros(shape or (1,), kind)
+
+
 def arguments() -> dict[str, tuple]:
-    """Of each kernel, arguments of the types that it is launched with."""
-
-    def array(kind: Any, *shape: int) -> np.ndarray:
-        return np.zeros(shape or (1,), kind)
-
+    """Of each kernel of the walk, arguments of the types that it is launched with."""
     f4, f8, i8, u8, u1 = np.float32, np.float64, np.int64, np.uint64, np.uint8
     planes = Planes(
         array(f4), array(f4), array(f8), array(f4, 1, 2), array(f4, 1, 2), array(i8), array(np.uint32), array(i8),
@@ -71,16 +74,30 @@ def arguments() -> dict[str, tuple]:
     }
 
 
-def ptx_of(flags: Flags, kernel: str) -> str:
-    from numba import cuda
-    from numba.cuda.typing.typeof import typeof
+def of_rows() -> dict[str, tuple]:
+    """The same of the kernels of frame sensors."""
+    f4, f8 = array(np.float32, 1, 1), array(np.float64, 1, 1)
+    num = numbers_of(CisSpec(), 2**64 - 1, 3)
+    return {
+        "take_values": (Taken(f4, f4, array(np.int64)), True),
+        "add_values": (Added(f8, f4, f4, array(np.float64), array(np.float64)),),
+        "read_values": (Read(f8, f4, f4, f4, f4, array(np.uint16, 1, 1)), 5, num),
+    }
 
+
+def ptx_of(flags: Flags, kernel: str) -> str:
     build = Build(CARD)
     ours = build.module("vid2ev.kernels.layout").Flags(*flags)
     kernels = build.module("vid2ev.kernels.cuda.kernels").kernels_of(ours, int(stride_of(flags)) // PITCH)
-    types = tuple(typeof(argument) for argument in arguments()[kernel])
-    function = getattr(kernels, kernel).py_func
-    return cuda.compile(function, types, device=False, abi="numba", cc=CAPABILITY, output="ptx")[0]
+    return compiled(getattr(kernels, kernel), arguments()[kernel])
+
+
+def compiled(kernel: Any, given: tuple) -> str:
+    from numba import cuda
+    from numba.cuda.typing.typeof import typeof
+
+    types = tuple(typeof(argument) for argument in given)
+    return cuda.compile(kernel.py_func, types, device=False, abi="numba", cc=CAPABILITY, output="ptx")[0]
 
 
 def strictly(flags: Flags, kernel: str) -> str:
@@ -98,6 +115,18 @@ def test_kernels_compile_and_call_nothing(name, kernel):
     ptx = strictly(flags_of(SENSORS[name], labels=True), kernel)
     assert ".visible .entry" in ptx
     assert not re.search(r"^\s*call", ptx, re.MULTILINE), "all is in one piece, nothing is left to a library"
+
+
+@pytest.mark.parametrize("kernel", of_rows())
+def test_kernels_of_frame_sensors_do_so_and_keep_no_more_than_six_numbers_in_memory(kernel):
+    from vid2ev.kernels.cuda.strict import strict
+
+    with strict():
+        module = Build(CARD).module("vid2ev.kernels.cuda.exposures")
+        ptx = compiled(getattr(module, kernel), of_rows()[kernel])
+    assert ".visible .entry" in ptx and not re.search(r"^\s*call", ptx, re.MULTILINE)
+    scratch = re.findall(r"\.local .*\[(\d+)\]", ptx)
+    assert scratch == (["32"] if kernel == "read_values" else [])  # four words, and noise of both kinds
 
 
 def test_a_product_and_a_sum_are_fused_only_where_the_text_says_so():

@@ -74,14 +74,14 @@ def add_rows(total, before, weight_before, after, weight_after):
 
 
 @compiled
-def read_rows(total, shade, gain, dark, first, tick, num, codes, light):
+def read_rows(total, shade, gain, dark, first, tick, num, words, noise, codes, light):
     """Codes uint16 [h, n] of the sums of rows that begin with pixel `first`, in the exposure number `tick`.
 
     `shade` [h, n], `gain` and `dark` (see physics/fixed_pattern.py) and `light` (float32, to be filled) are empty
-    [0, 0] where they are not in use.  The sums are used up.
+    [0, 0] where they are not in use.  The sums are used up.  `words` (uint32 [4, n]) is scratch, and so is `noise`
+    (float64 [2, n], zeros).
     """
     n = total.shape[1]
-    words, noise, noise_e = np.empty((4, n), np.uint32), np.zeros(n), np.zeros(n)
     for y in range(total.shape[0]):
         level = total[y]
         if shade.size > 0:
@@ -92,14 +92,14 @@ def read_rows(total, shade, gain, dark, first, tick, num, codes, light):
                 light[y, i] = F(level[i])
         if num.random:
             fill_words(words, num.seed, READOUT + 256 * num.camera, first + y * n, tick)
-            fill_noise(words[0], words[1], noise, noise_e)
+            fill_noise(words[0], words[1], noise[0], noise[1])
         for i in range(n):
             level[i] *= num.exposure_gain
         if num.electrons:
-            through_electrons(level, gain, dark, y, words, noise_e, num)
+            through_electrons(level, gain, dark, y, words, noise[1], num)
         row = codes[y]
         for i in range(n):
-            row[i] = np.uint16(code_of(WHITE * level[i], num.least, num.slope, num.top, num.noise_lsb * noise[i]))
+            row[i] = np.uint16(code_of(WHITE * level[i], num.least, num.slope, num.top, num.noise_lsb * noise[0, i]))
 
 
 @compiled

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_intrinsics import floor
 from vid2ev.stream.exposed import Change, Exposed, LevelChange, level_change, normal_most, surely_square
 
 WHITE = 65535.0  # I16 of light 1.0
@@ -48,7 +48,7 @@ class Adc(BaseModel, frozen=True, extra="forbid"):
 def code_of(i16, least, slope, top, noise):
     """The code (as float64) of I16 with a noise [LSB]; a NaN cannot come here."""
     level = min(max((i16 - least) / slope, 0.0), top)
-    return min(max(np.floor(level + noise + 0.5), 0.0), top)
+    return min(max(floor(level + noise + 0.5), 0.0), top)
 
 
 def lsb_per_light(spec: Any) -> float:

@@ -32,6 +32,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_intrinsics import floor, sqrt
 from vid2ev.physics.adc import WHITE
 from vid2ev.physics.elementary import exp64
 from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain
@@ -64,9 +65,9 @@ class Electrons(BaseModel, frozen=True, extra="forbid"):
 def poisson_many(mean, z):
     """A Poisson number of a mean above FEW, from a standard normal number."""
     mean = min(max(mean, FEW), MANY)
-    root = np.sqrt(mean)
+    root = sqrt(mean)
     number = mean + root * z + (2.0 + z * z) / 6.0 - (z + 0.5 * z * z * z) / (36.0 * root)
-    return max(np.floor(number), 0.0)
+    return max(floor(number), 0.0)
 
 
 @compiled

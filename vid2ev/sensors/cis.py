@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.kernels.exposures import add_rows, read_rows, take_rows
 from vid2ev.physics.shutter import interval_weights, opening_ns
 from vid2ev.sensors.cis_readout import frozen_of, numbers_of
+from vid2ev.sensors.cis_rows import Rows
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.limits import check_sensor
-from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
 
@@ -29,7 +29,7 @@ class Open:
 
     index: int
     start_ns: int
-    total: np.ndarray  # float64 [H, n]
+    total: Any  # float64 [H, n], where the rows are
     pending: np.ndarray  # float64 [H]
 
 
@@ -61,21 +61,20 @@ class Cis:
         width, height = size
         self.spec, self.size, self.seed, self.camera, self.linear = spec, (width, height), seed, camera, linear
         self.effects = spec.effects()
-        self._rows = (height, width * (3 if spec.colour else 1))
-        if spec.in_flight(height) * self._rows[0] * self._rows[1] * 8 > OPEN_BYTES:
+        shape = (height, width * (3 if spec.colour else 1))
+        if spec.in_flight(height) * shape[0] * shape[1] * 8 > OPEN_BYTES:
             raise UsageError(
                 f"{spec.in_flight(height)} exposures of {width}x{height} pixels open at a time: expected to hold them"
                 " in 4 GiB; shorten exposure_us or line_us, or lower frame_rate_hz"
             )
         self._row_ns = np.arange(height) * (1e3 * spec.line_us)
-        self._tiles = Tiles(height, threads)
         self._numbers = numbers_of(spec, seed, camera)
-        self._frozen = frozen_of(spec, self._numbers, size)
+        frozen = frozen_of(spec, self._numbers, size)
+        self._rows: Any = Rows(shape, self._numbers, frozen, threads, colour=spec.colour, linear=linear)
         self._t_ns: int | None = None
-        self._first_ns = self._next = self._made = self._unfinished = self._mended = 0
-        self._before, self._after = np.empty(self._rows, np.float32), np.empty(self._rows, np.float32)
+        self._first_ns = self._next = self._made = self._unfinished = 0
         self._open: list[Open] = []
-        self._spare: list[np.ndarray] = []  # sums that are free again
+        self._spare: list[Any] = []  # sums that are free again, and zero
 
     # ------------------------------------------------------------------------------------------------- light in
 
@@ -120,10 +119,10 @@ class Cis:
         return {
             "clock": np.array(clock, np.int64),
             "counts": np.array(list(self.counts.values()), np.int64),
-            "light": self._before.copy(),
+            "light": self._rows.get(self._rows.before),
             "open": np.array([(each.index, each.start_ns) for each in self._open], np.int64).reshape(-1, 2),
-            "totals": np.array([each.total for each in self._open]).reshape(-1, *self._rows),
-            "pending": np.array([each.pending for each in self._open]).reshape(-1, self._rows[0]),
+            "totals": np.array([self._rows.get(each.total) for each in self._open]).reshape(-1, *self._rows.shape),
+            "pending": np.array([each.pending for each in self._open]).reshape(-1, self._rows.shape[0]),
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -131,15 +130,17 @@ class Cis:
         self._open.clear()
         if not state:
             self._t_ns, self._first_ns, self._next = None, 0, 0
-            self._made = self._unfinished = self._mended = 0
+            self._made = self._unfinished = self._rows.mended = 0
             return
-        if state["light"].shape != self._rows:
-            raise UsageError(f"state of {state['light'].shape} values, expected {self._rows}: another sensor's state")
+        if state["light"].shape != self._rows.shape:
+            raise UsageError(
+                f"state of {state['light'].shape} values, expected {self._rows.shape}: another sensor's state"
+            )
         self._t_ns, self._first_ns, self._next = (int(n) for n in state["clock"])
-        self._made, self._unfinished, self._mended = (int(n) for n in state["counts"])
-        self._before[...] = state["light"]
+        self._made, self._unfinished, self._rows.mended = (int(n) for n in state["counts"])
+        self._rows.before = self._rows.put(state["light"])
         self._open += [
-            Open(int(index), int(start_ns), total.copy(), pending.copy())
+            Open(int(index), int(start_ns), self._rows.put(total), pending.copy())
             for (index, start_ns), total, pending in zip(state["open"], state["totals"], state["pending"], strict=True)
         ]
 
@@ -147,27 +148,24 @@ class Cis:
     def counts(self) -> dict[str, int]:
         """Exposures made (`frames`), those that the light did not last for (`unfinished`, after `flush`), and values
         `not_finite` (or above 1e30, or negative where colours cannot be) that were mended."""
-        return {"frames": self._made, "unfinished": self._unfinished, "not_finite": self._mended}
+        return {"frames": self._made, "unfinished": self._unfinished, "not_finite": self._rows.mended}
 
     def maps(self) -> dict[str, np.ndarray]:
         """What is frozen in this sensor, float32, each of the shape of a picture: `gain` (relative sensitivity), `dark`
         (dark signal [electrons]), and shading (optical gain)."""
-        shade, gain, dark = self._frozen
-        planes = {"gain": (gain, 1.0), "dark": (dark, 0.0), "shading": (shade, 1.0)}
-        return {
-            name: self._shaped(plane.copy() if plane.size else np.full(self._rows, neutral, np.float32))
-            for name, (plane, neutral) in planes.items()
-        }
+        names, shape = {"gain": "gain", "dark": "dark", "shading": "shade"}, self._rows.shape
+        planes = self._rows.frozen.padded()._asdict()
+        return {name: self._shaped(np.broadcast_to(planes[field], shape).copy()) for name, field in names.items()}
 
     # ------------------------------------------------------------------------------------------------- inside
 
     def _advance(self, light: np.ndarray, t_ns: int, cut: bool) -> Iterator[Exposure]:
         """The exposures that a frame completes; all of them are to be taken before the next frame comes."""
         rows, t_ns = self._light(light), self._later(t_ns)
-        self._take(rows)
+        self._rows.take(rows)
         if self._t_ns is None:  # the first frame: as if its light had been there for a moment
             self._first_ns, self._t_ns = t_ns, t_ns - 1
-            self._before[...] = self._after
+            self._rows.before[...] = self._rows.after
         since_ns, begun = self._t_ns, self._open
         self._t_ns, self._open = t_ns, []
         for each in begun:
@@ -175,7 +173,7 @@ class Cis:
         while (start_ns := self._first_ns + opening_ns(self._next, self.spec.frame_rate_hz)) <= t_ns:
             self._next += 1
             yield from self._expose(self._opened(self._next - 1, start_ns), since_ns, cut)
-        self._before, self._after = self._after, self._before
+        self._rows.pass_on()
 
     def _expose(self, each: Open, since_ns: int, cut: bool) -> Iterator[Exposure]:
         """Give an exposure the light from `since_ns` until now; it comes out if its last row closes."""
@@ -185,9 +183,7 @@ class Cis:
         before += each.pending  # (a frame's two sides are added at once, when the next frame is there)
         each.pending, after = np.where(closed, 0.0, after), np.where(closed, after, 0.0)
         if before.any() or after.any():
-            self._each_rows(
-                lambda a, b: add_rows(each.total[a:b], self._before[a:b], before[a:b], self._after[a:b], after[a:b])
-            )
+            self._rows.add(each.total, before, after)
         if closed[-1]:
             yield self._read(each)
         else:
@@ -203,44 +199,33 @@ class Cis:
 
     def _read(self, each: Open) -> Exposure:
         """Read out an exposure; its sums are free for another one."""
-        codes = np.empty(self._rows, np.uint16)
-        light = np.empty(self._rows if self.linear else (0, 0), np.float32)
-
-        def read(a: int, b: int) -> None:
-            first, frozen = a * self._rows[1], self._frozen.rows(a, b)
-            read_rows(each.total[a:b], *frozen, first, each.index, self._numbers, codes[a:b], light[a:b])
-
-        self._each_rows(read)
+        codes, light = self._rows.read(each.total, each.index)
         self._spare.append(each.total)
         self._made += 1
         end_ns = each.start_ns + round(self._row_ns[-1] + 1e3 * self.spec.exposure_us)
-        made = self._shaped(light) if self.linear else None
+        made = None if light is None else self._shaped(light)
         return Exposure(self._shaped(codes), each.start_ns, end_ns, each.index, made)
 
     def _opened(self, index: int, start_ns: int) -> Open:
-        total = self._spare.pop() if self._spare else np.empty(self._rows, np.float64)
-        total.fill(0.0)
-        return Open(index, start_ns, total, np.zeros(self._rows[0]))
+        total = self._spare.pop() if self._spare else self._rows.sums()
+        return Open(index, start_ns, total, np.zeros(self._rows.shape[0]))
 
-    def _each_rows(self, work) -> list:  # type: ignore[no-untyped-def]
-        return self._tiles.each_blocks(lambda _, first, last: work(first, last))
-
-    def _take(self, rows: np.ndarray) -> None:
-        signed = self.spec.colour
-        self._mended += sum(self._each_rows(lambda a, b: take_rows(rows[a:b], self._after[a:b], signed)))
-
-    def _light(self, light: np.ndarray) -> np.ndarray:
+    def _light(self, light: Any) -> Any:
         """Light as rows [H, n]."""
         light = np.asarray(light)
+        self._check(light.shape, light.dtype, light.dtype.kind == "f")
+        wanted = None if light.dtype in (np.float32, np.float64) else np.float32
+        return np.ascontiguousarray(light, wanted).reshape(self._rows.shape)
+
+    def _check(self, shape: tuple[int, ...], dtype: Any, floating: bool) -> None:
+        """Raises UsageError for light of another shape than the sensor's, and for codes."""
         width, height = self.size
         expected = (height, width, 3) if self.spec.colour else (height, width)
-        if light.shape != expected:
-            remedy = "open the source with colour='rgb', or set cis.colour=false" if light.ndim == 2 else "resize it"
-            raise UsageError(f"light of shape {light.shape}: expected {expected} of this sensor; {remedy}")
-        if light.dtype.kind != "f":
-            raise UsageError(f"light of type {light.dtype}: expected floating point, linear; decode the codes first")
-        wanted = None if light.dtype in (np.float32, np.float64) else np.float32
-        return np.ascontiguousarray(light, wanted).reshape(self._rows)
+        if shape != expected:
+            remedy = "open the source with colour='rgb', or set cis.colour=false" if len(shape) == 2 else "resize it"
+            raise UsageError(f"light of shape {shape}: expected {expected} of this sensor; {remedy}")
+        if not floating:
+            raise UsageError(f"light of type {dtype}: expected floating point, linear; decode the codes first")
 
     def _later(self, t_ns: int) -> int:
         """The time of a frame, which must be after the last one."""
@@ -253,4 +238,4 @@ class Cis:
         return t_ns
 
     def _shaped(self, rows: np.ndarray) -> np.ndarray:
-        return rows.reshape(self._rows[0], self.size[0], 3) if self.spec.colour else rows
+        return rows.reshape(self.size[1], self.size[0], 3) if self.spec.colour else rows

@@ -27,6 +27,13 @@ class Frozen(NamedTuple):
         """The rows first ... last - 1."""
         return Frozen(*(plane[first:last] for plane in self))
 
+    def padded(self) -> Frozen:
+        """The planes; in the place of empty ones [1, 1] of what changes nothing."""
+        return Frozen(*(plane if plane.size else neutral for plane, neutral in zip(self, NEUTRAL, strict=True)))
+
+
+NEUTRAL = Frozen(*(np.full((1, 1), value, np.float32) for value in (1.0, 1.0, 0.0)))
+
 
 def numbers_of(spec: CisSpec, seed: int, camera: int) -> ReadOut:
     """What readout needs of a specification."""

@@ -11,8 +11,12 @@ from vid2ev.kernels.cuda.build import CARD, SIMULATED, Build
 from vid2ev.kernels.layout import PITCH, Flags, stride_of
 
 THREADS = 128  # of a block
-# What torch has as int32 or int64 for want of these, by the tuple that it is in, and its name there.
-UNSIGNED = {("Planes", "count"): np.uint32, ("Clips", "bases"): np.uint64, ("Sent", "keys"): np.uint64}
+# What torch has as signed numbers for want of these, by the tuple that it is in, and its name there.
+UNSIGNED = {
+    ("Planes", "count"): np.uint32, ("Clips", "bases"): np.uint64, ("Sent", "keys"): np.uint64,
+    ("Read", "codes"): np.uint16,
+}  # fmt: skip
+SIGNED = {np.dtype(np.uint16): np.int16, np.dtype(np.uint32): np.int32, np.dtype(np.uint64): np.int64}
 
 
 class Simulated:
@@ -70,6 +74,10 @@ class Simulated:
         """The kernels for a combination of effects."""
         return _kernels("simulated", flags)
 
+    def module(self, name: str) -> Any:
+        """A module of kernels, as it is for this device."""
+        return _build("simulated").module(name)
+
 
 class Card:
     """A GPU of NVIDIA's, through torch: no copies between its tensors and the kernels."""
@@ -85,12 +93,10 @@ class Card:
         return self.put(np.zeros(0, dtype)).new_zeros(shape)
 
     def put(self, array: np.ndarray) -> Any:
-        signed = {np.dtype(np.uint32): np.int32, np.dtype(np.uint64): np.int64}.get(array.dtype)
-        array = np.array(array) if signed is None else np.array(array).view(signed)
-        return self.torch.from_numpy(array).to(self.device)
+        return self.torch.from_numpy(np.array(array).view(SIGNED.get(array.dtype, array.dtype))).to(self.device)
 
     def get(self, array: Any) -> np.ndarray:
-        return array.cpu().numpy()
+        return array.to("cpu", copy=True).numpy()
 
     def light(self, light: Any) -> Any:
         return self.torch.as_tensor(light).to(self.device, self.torch.float32).contiguous()
@@ -127,6 +133,9 @@ class Card:
 
     def kernels(self, flags: Flags) -> Any:
         return _kernels("cuda", flags)
+
+    def module(self, name: str) -> Any:
+        return _build("cuda").module(name)
 
 
 def _seen(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
