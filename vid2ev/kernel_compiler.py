@@ -36,6 +36,12 @@ def compiled(function: Callable) -> Any:
     return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function))
 
 
+def inlined(function: Callable) -> Any:
+    """A law that is put into whatever calls it, however long it is: so a loop over pixels that calls it is vector code."""
+    options = OPTIONS | {"forceinline": True}
+    return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **options)(function))
+
+
 def inner(function: Callable) -> Any:
     """A part of kernels, which only they can call."""
     return of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))

@@ -11,7 +11,7 @@ from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, LANE_COUNT, LOW, PITCH, STRIP, stride_of
 from vid2ev.kernels.naps import give_back
 from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
-from vid2ev.kernels.settle import settle_pixel, shift_pixel
+from vid2ev.kernels.settle import settle_lanes, shift_pixel
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.sleep import doze, next_run, stir
 from vid2ev.kernels.slow import climb, load
@@ -199,8 +199,9 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
         block[HIGH * PITCH : HIGH * PITCH + BLOCK] = np.inf
         block[LOW * PITCH : LOW * PITCH + BLOCK] = -np.inf
         read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
-        for i in range(size):
-            settle_pixel(block, scratch[NEW + i], i, p0 + i, t_ns, bad, random_phase, planes, flags, num, work)
+        for first in range(0, size, LANE_COUNT):
+            seen = scratch[NEW + first : NEW + min(first + LANE_COUNT, size)]
+            settle_lanes(block, seen, first, seen.size, p0, t_ns, bad, random_phase, planes, flags, num, work)
 
 
 @compiled

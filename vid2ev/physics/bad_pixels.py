@@ -41,10 +41,8 @@ def bad_pixel_map(n, seed, camera, hot_probability, cold_probability):
     kind = np.zeros(n, np.uint8)
     for pixel in range(n):
         words = philox(seed, HOT_MAP + 256 * camera, pixel, 0)
-        if unit(words[0]) < hot_probability:
-            kind[pixel] = 1
-        elif unit(words[1]) < cold_probability:
-            kind[pixel] = 2
+        hot, cold = unit(words[0]) < hot_probability, unit(words[1]) < cold_probability
+        kind[pixel] = np.uint8(1) if hot else np.uint8(2) * np.uint8(cold)
     return kind
 
 

@@ -18,7 +18,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_compiler import inlined
 from vid2ev.physics.random import PHASE, philox, unit
 
 
@@ -42,7 +42,7 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@compiled
+@inlined
 def initial_phase(seed, camera, pixel):
     """Fraction of the ON threshold that lies between the first signal and the first ON level, in (0, 1)."""
     word, _, _, _ = philox(seed, PHASE + 256 * camera, pixel, 0)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_compiler import inlined
 from vid2ev.physics.mismatch import FLOOR, clipped
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import CROSSING, normal_pair, philox
@@ -35,7 +35,7 @@ class CrossingNoise(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@compiled
+@inlined
 def noisy_thresholds(on, off, sigma, seed, camera, pixel, count):
     """ON and OFF threshold [nat] for the pixel's crossing number `count`."""
     words = philox(seed, CROSSING + 256 * camera, pixel, count)

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
 from vid2ev.stream.scene import Omission, Scene
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean
+CHUNK = 1024  # pixels drawn for at a time
 
 
 class Mismatch(BaseModel, frozen=True, extra="forbid"):
@@ -36,7 +37,7 @@ class Mismatch(BaseModel, frozen=True, extra="forbid"):
     )
 
 
-@compiled
+@inlined
 def clipped(mean, sigma, z):
     """mean + sigma z, z clipped symmetrically so that the result is at least FLOOR of the mean; sigma > 0."""
     limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
@@ -58,11 +59,15 @@ def reached_spread(mean: float, sigma: float) -> float:
 @compiled
 def fill_thresholds(theta, seed, camera, first, mean_on, mean_off, sigma):
     """Thresholds of pixels first, first + 1, ... into theta float32 [n, 2] (ON, OFF)."""
-    for i in range(len(theta)):
-        words = philox(seed, MISMATCH + 256 * camera, first + i, 0)
-        on, off = normal_pair(words[0], words[1])
-        theta[i, 0] = np.float32(clipped(mean_on, sigma, on))
-        theta[i, 1] = np.float32(clipped(mean_off, sigma, off))
+    drawn = np.empty((2, CHUNK), np.float32)  # (what loops of vector code write lies side by side)
+    for start in range(0, len(theta), CHUNK):
+        some, (on, off) = theta[start : start + CHUNK], (drawn[0], drawn[1])
+        for i in range(len(some)):
+            words = philox(seed, MISMATCH + 256 * camera, first + start + i, 0)
+            z_on, z_off = normal_pair(words[0], words[1])
+            on[i], off[i] = clipped(mean_on, sigma, z_on), clipped(mean_off, sigma, z_off)
+        for i in range(len(some)):
+            some[i, 0], some[i, 1] = on[i], off[i]
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

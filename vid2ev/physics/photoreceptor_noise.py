@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.omission import light_events
 from vid2ev.physics.photoreceptor import step_weights
@@ -71,7 +71,7 @@ def noise_step(dt: float, tau1: float, tau2: float, rms: float, fresh: bool) -> 
     return NoiseStep(keep1, mix, keep2, s11, s21, math.sqrt(max(q22 - s21 * s21, 0.0)))
 
 
-@compiled
+@inlined
 def noise_draw(n1, n2, pixel, num, iv):
     """The pair after one interval (float32)."""
     words = philox(num.seed, PHOTORECEPTOR + 256 * num.camera, pixel, iv.step)

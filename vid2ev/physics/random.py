@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.kernel_intrinsics import floor, fma, sqrt
 from vid2ev.physics.elementary import log64
 
@@ -25,7 +25,7 @@ _32 = np.uint64(32)
 _TO_UNIT = 2.0**-32
 
 
-@compiled
+@inlined
 def _round(c0, c1, c2, c3, k0, k1):
     first, second = np.uint64(c0) * _M0, np.uint64(c2) * _M1
     return (
@@ -36,19 +36,7 @@ def _round(c0, c1, c2, c3, k0, k1):
     )
 
 
-@compiled
-def philox(seed, stream, pixel, tick):
-    """Four uint32 words for a seed (uint64), a stream (effect + 256 * camera), a pixel and a tick (int64)."""
-    c0, c3 = np.uint32(pixel), np.uint32(stream)
-    c1, c2 = np.uint32(tick), np.uint32(np.uint64(tick) >> _32)
-    k0, k1 = np.uint32(seed), np.uint32(np.uint64(seed) >> _32)
-    for _ in range(10):
-        c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
-        k0, k1 = np.uint32(k0 + _W0), np.uint32(k1 + _W1)
-    return c0, c1, c2, c3
-
-
-@compiled
+@inlined
 def _five_rounds(c0, c1, c2, c3, k0, k1):
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1)
     c0, c1, c2, c3 = _round(c0, c1, c2, c3, np.uint32(k0 + _W0), np.uint32(k1 + _W1))
@@ -57,26 +45,33 @@ def _five_rounds(c0, c1, c2, c3, k0, k1):
     return _round(c0, c1, c2, c3, np.uint32(k0 + _4W0), np.uint32(k1 + _4W1))
 
 
+@inlined
+def philox(seed, stream, pixel, tick):
+    """Four uint32 words for a seed (uint64), a stream (effect + 256 * camera), a pixel and a tick (int64).
+
+    Without a loop over the rounds, a loop over pixels is vector code.
+    """
+    k0, k1 = np.uint32(seed), np.uint32(np.uint64(seed) >> _32)
+    c1, c2 = np.uint32(tick), np.uint32(np.uint64(tick) >> _32)
+    c0, c1, c2, c3 = _five_rounds(np.uint32(pixel), c1, c2, np.uint32(stream), k0, k1)
+    return _five_rounds(c0, c1, c2, c3, np.uint32(k0 + _5W0), np.uint32(k1 + _5W1))
+
+
 @compiled
 def fill_words(words, seed, stream, first, tick):
-    """The words of `philox` for pixels first, first + 1, ... into words uint32 [4, n]; without a loop over the rounds
-    the loop over the pixels is vector code."""
+    """The words of `philox` for pixels first, first + 1, ... into words uint32 [4, n]."""
     w0, w1, w2, w3 = words[0], words[1], words[2], words[3]
-    k0, k1 = np.uint32(seed), np.uint32(np.uint64(seed) >> _32)
-    l0, l1 = np.uint32(k0 + _5W0), np.uint32(k1 + _5W1)
-    t0, t1 = np.uint32(tick), np.uint32(np.uint64(tick) >> _32)
     for i in range(w0.size):
-        c0, c1, c2, c3 = _five_rounds(np.uint32(first + i), t0, t1, np.uint32(stream), k0, k1)
-        w0[i], w1[i], w2[i], w3[i] = _five_rounds(c0, c1, c2, c3, l0, l1)
+        w0[i], w1[i], w2[i], w3[i] = philox(seed, stream, first + i, tick)
 
 
-@compiled
+@inlined
 def unit(word):
     """A uint32 word as a float64 in (0, 1), symmetric about 1/2."""
     return (np.float64(word) + 0.5) * _TO_UNIT
 
 
-@compiled
+@inlined
 def normal_pair(first, second):
     """Two independent standard normal numbers from two words (Box and Muller 1958); |z| < 6.8."""
     radius = sqrt(-2.0 * log64(unit(first)))

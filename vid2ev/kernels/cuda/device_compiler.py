@@ -15,4 +15,4 @@ def compiled(function: Callable) -> Any:
     return cuda.jit(device=True, lto=False)(function)
 
 
-inner = compiled
+inlined = inner = compiled

@@ -26,7 +26,7 @@ from vid2ev.kernels.scan import (
     note_rests,
     scan,
 )
-from vid2ev.kernels.settle import settle_pixel, shift_pixel
+from vid2ev.kernels.settle import settle_lanes, shift_pixel
 from vid2ev.kernels.slow import climb, load
 
 F = np.float32
@@ -144,7 +144,8 @@ def settle(pixel, light, t_ns, bad, random_phase, planes, work, flags, num, tall
     for i in range(stride):
         block[i] = F(0.0)
     tally[NOT_FINITE] += take_light(work.scratch, light[pixel], gain_of(planes, pixel, flags), flags)
-    settle_pixel(block, work.scratch[NEW], 0, pixel, t_ns, bad, random_phase, planes, flags, num, work)
+    seen = work.scratch[NEW : NEW + 1]
+    settle_lanes(block, seen, 0, 1, pixel, t_ns, bad, random_phase, planes, flags, num, work)
 
 
 @compiled

@@ -24,6 +24,9 @@ def compiled(function: Callable) -> Any:
     return cpu.of_plain_types(njit(pipeline_class=cpu.KernelCompiler, **OPTIONS)(named_apart(function)))
 
 
+inlined = compiled
+
+
 def inner(function: Callable) -> Any:
     """A function that only others call."""
     return cpu.inner(named_apart(function))
