@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "vid2ev"
+PACKAGE, CLIENT = ROOT / "vid2ev", ROOT / "interp"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 # The floor of each room; an import may only go to a lower floor, or stay in its own room.
@@ -61,6 +61,22 @@ FLOORS = {
     "commands": 16,
     "__main__": 17,
 }
+# Those of interp, which stands beside vid2ev and uses it, never the other way round.
+CLIENT_FLOORS = {
+    "": 0,
+    "precision": 0,
+    "light": 1,
+    "warp": 1,
+    "blend": 1,
+    "blocks": 1,
+    "representation": 2,
+    "candidates": 3,
+    "networks": 4,
+    "losses": 5,
+    "weights": 5,
+    "work": 5,
+}
+PACKAGES = {"vid2ev": FLOORS, "interp": CLIENT_FLOORS}
 
 
 def module_name(path: Path) -> str:
@@ -68,8 +84,12 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+MODULES = {module_name(path): path for package in (PACKAGE, CLIENT) for path in sorted(package.rglob("*.py"))}
 COMMANDS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["vid2ev.commands"]
+
+
+def package(module: str) -> str:
+    return module.split(".")[0]
 
 
 def room(module: str) -> str:
@@ -77,7 +97,7 @@ def room(module: str) -> str:
 
 
 def imports_of(nodes: list[ast.stmt]) -> set[str]:
-    """The vid2ev modules that the statements import; `from package import name` is resolved to a module."""
+    """Our modules that the statements import; `from package import name` is resolved to a module."""
     found: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -87,7 +107,7 @@ def imports_of(nodes: list[ast.stmt]) -> set[str]:
             for alias in node.names:
                 submodule = f"{node.module}.{alias.name}"
                 found.add(submodule if submodule in MODULES else node.module or "")
-    return {name for name in found if name.split(".")[0] == "vid2ev"}
+    return {name for name in found if package(name) in PACKAGES}
 
 
 def tree(module: str) -> ast.Module:
@@ -98,9 +118,21 @@ def tree(module: str) -> ast.Module:
 def test_imports_go_down_only(module: str) -> None:
     # Imports inside functions count too: they are later, not higher.
     nodes = [node for node in ast.walk(tree(module)) if isinstance(node, ast.stmt)]
+    floors = PACKAGES[package(module)]
+    assert room(module) in floors, f"give the room of {module} a floor"
     for target in imports_of(nodes):
-        assert room(module) in FLOORS, f"give the room of {module} a floor"
-        assert room(target) == room(module) or FLOORS[room(target)] < FLOORS[room(module)], f"{module} -> {target}"
+        if package(target) != package(module):
+            assert package(module) == "interp", f"{module} -> {target}: vid2ev knows nothing of its clients"
+            continue
+        assert room(target) == room(module) or floors[room(target)] < floors[room(module)], f"{module} -> {target}"
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if package(module) == "interp"])
+def test_a_client_uses_public_names_only(module: str) -> None:
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.ImportFrom) and package(node.module or "") == "vid2ev":
+            parts = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+            assert not any(part.startswith("_") for part in parts), f"{module} imports {'.'.join(parts)}"
 
 
 def test_imports_make_no_cycle() -> None:
@@ -112,7 +144,7 @@ def test_every_module_imports_alone() -> None:
     program = """
 import importlib, sys
 for name in sys.argv[1:]:
-    for loaded in [loaded for loaded in sys.modules if loaded.split(".")[0] == "vid2ev"]:
+    for loaded in [loaded for loaded in sys.modules if loaded.split(".")[0] in ("vid2ev", "interp")]:
         del sys.modules[loaded]
     importlib.import_module(name)
 """
@@ -202,7 +234,7 @@ def test_the_readme_names_every_preset() -> None:
 
 
 def test_links_in_the_documents_lead_somewhere() -> None:
-    for page in (ROOT / "README.md", PACKAGE / "README.md", PACKAGE / "HARD_CASES.md"):
+    for page in (ROOT / "README.md", PACKAGE / "README.md", PACKAGE / "HARD_CASES.md", CLIENT / "README.md"):
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if not target.startswith("http"):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"

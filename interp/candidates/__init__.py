@@ -1,0 +1,1 @@
+"""Pictures of an instant in closed form, from key frames and events."""

@@ -1,0 +1,72 @@
+"""Differences between images, and what is wanted of flows: means over all their values, in float32 also under autocast.
+
+    Charbonnier   mean sqrt(d^2 + e^2), e = 0.001: near 0 a parabola, so that what is exactly right has slope 0 and
+    not infinity pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid
+    smoothness    mean |dF/dx| + mean |dF/dy|
+
+Sources: Charbonnier et al. (1994), "Two deterministic half-quadratic regularization algorithms for computed imaging",
+ICIP; Burt and Adelson (1983), "The Laplacian pyramid as a compact image code", IEEE Trans. Communications 31(4);
+smoothness and warps, Jiang et al. (2018), "Super SloMo", CVPR.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch.nn import functional as F
+
+from interp.precision import in_full_precision
+from interp.warp import warp
+
+EPSILON = 1e-3
+LEVELS = 5
+BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
+
+
+@in_full_precision
+def charbonnier(images: torch.Tensor, truth: torch.Tensor, epsilon: float = EPSILON) -> torch.Tensor:
+    """A smooth absolute difference; epsilon for 0."""
+    return torch.sqrt((images - truth) ** 2 + epsilon**2).mean()
+
+
+@in_full_precision
+def absolute(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
+    """The mean absolute difference."""
+    return (images - truth).abs().mean()
+
+
+@in_full_precision
+def pyramid(images: torch.Tensor, truth: torch.Tensor, levels: int = LEVELS) -> torch.Tensor:
+    """The difference of images [..., C, H, W] in the levels of a Laplacian pyramid, as far as there are pixels for
+    them."""
+    rest = (images - truth).flatten(0, -4) if images.ndim > 4 else images - truth
+    total = rest.new_zeros(())
+    for _ in range(levels - 1):
+        if min(rest.shape[-2:]) < 2:
+            break
+        lower = _blurred(rest)[..., ::2, ::2]
+        total = (
+            total + (rest - F.interpolate(lower, rest.shape[-2:], mode="bilinear", align_corners=False)).abs().mean()
+        )
+        rest = lower
+    return total + rest.abs().mean()
+
+
+@in_full_precision
+def smoothness(flows: torch.Tensor) -> torch.Tensor:
+    """How much flows [..., c, H, W] px change from pixel to pixel; 0 of a single pixel."""
+    across, down = flows.diff(dim=-1).abs(), flows.diff(dim=-2).abs()
+    return across.sum() / max(across.numel(), 1) + down.sum() / max(down.numel(), 1)
+
+
+@in_full_precision
+def between_frames(flows: torch.Tensor, frame_0: torch.Tensor, frame_1: torch.Tensor) -> torch.Tensor:
+    """How badly flows [B, 4, H, W] px carry two frames [B, C, H, W] into each other: mean absolute differences, both
+    ways."""
+    return absolute(warp(frame_1, flows[:, :2]), frame_0) + absolute(warp(frame_0, flows[:, 2:]), frame_1)
+
+
+def _blurred(x: torch.Tensor) -> torch.Tensor:
+    """A binomial blur over 5 x 5 pixels, [B, C, H, W], continued by its border."""
+    kernel = x.new_tensor(BINOMIAL).expand(x.shape[1], 1, 1, 5)
+    x = F.conv2d(F.pad(x, (2, 2, 0, 0), mode="replicate"), kernel, groups=x.shape[1])
+    return F.conv2d(F.pad(x, (0, 0, 2, 2), mode="replicate"), kernel.transpose(2, 3), groups=x.shape[1])

@@ -1,0 +1,178 @@
+"""The one way into networks that take two frames: any size, any number of targets, the first flow once per pair.
+
+    network(frame_0, frame_1, times, events) -> Interpolated
+
+is `network.at(network.prepare(frame_0, frame_1, events), times)`.  What does not depend on the target is in
+`prepare`, so that a pair can be asked for more targets later.
+
+Sides need not be multiples of anything: frames are continued by their borders, events by none, and what comes out is
+cut back.  Nothing is resampled.  A network of three colours takes grey frames, as three that are alike, and gives
+back their mean. Codes are not clipped: that would take the gradients from pixels out of range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+from interp.networks.spec import FrameFedSpec
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
+from interp.warp import warp
+from vid2ev.errors import UsageError
+
+Times = torch.Tensor | Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """B pairs of frames, ready for any number of targets.
+
+    frame_0, frame_1   [B, C, H, W], with sides that the network takes
+    events             of that size; none if `seen` is false
+    flows              [B, 4, H, W] px: from the first to the second (x, y) and back; at the network's own resolution
+    once               what else the network computes once
+    size, grey         height and width, and whether the frames were grey, as they came
+    """
+
+    frame_0: torch.Tensor
+    frame_1: torch.Tensor
+    events: EventCounts
+    seen: bool
+    size: tuple[int, int]
+    grey: bool
+    flows: torch.Tensor | None = None
+    once: tuple[torch.Tensor, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Interpolated:
+    """N images for each of B pairs, and what they were made of, for losses.
+
+    images     [B, N, C, H, W] codes, not clipped
+    flows      [B, 4, H, W] px: first to second frame (x, y), second to first; None of networks that do not estimate it
+    flows_at   [B, N, 4, H, W] px: target to first frame, target to second
+    warps      [B, N, 2, C, H, W]: both frames, warped by these
+    weights    [B, N, K, H, W] of the pictures blended
+    blend      [B, N, C, H, W]: of the two warps alone
+    """
+
+    images: torch.Tensor
+    flows: torch.Tensor | None
+    flows_at: torch.Tensor
+    warps: torch.Tensor
+    weights: torch.Tensor
+    blend: torch.Tensor
+
+
+class FrameFed(nn.Module):
+    """Base of the networks that take two frames.  They add `synthesise`, `multiple`, and what there is once per
+    pair."""
+
+    spec: FrameFedSpec
+    multiple: int
+
+    def flows_of(self, pair: Pair) -> torch.Tensor | None:
+        """Flows between the frames, [B, 4, h, w] px."""
+        return None
+
+    def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
+        """What else does not depend on the target."""
+        return ()
+
+    def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
+        """Images at times [B, N]."""
+        raise NotImplementedError
+
+    def forward(
+        self, frame_0: torch.Tensor, frame_1: torch.Tensor, times: Times, events: EventCounts | None = None
+    ) -> Interpolated:
+        """Images at N times.
+
+        frame_0, frame_1   [B, C, H, W] codes, 0 ... 1
+        times              [N] or [B, N], 0 ... 1 from the first frame to the second
+        events             between the frames; those of a sensor of another size are laid over the frames edge on edge
+        Raises UsageError for shapes and times that cannot be meant.
+        """
+        return self.at(self.prepare(frame_0, frame_1, events), times)
+
+    def prepare(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None = None) -> Pair:
+        """What does not depend on the targets; see `forward`."""
+        pair = self._padded(frame_0, frame_1, events)
+        pair = replace(pair, flows=self.flows_of(pair))
+        return replace(pair, once=self.computed_once(pair))
+
+    def at(self, pair: Pair, times: Times) -> Interpolated:
+        """Images of a pair at N times; see `forward`."""
+        asked = torch.as_tensor(times, dtype=torch.float32, device=pair.frame_0.device)
+        if asked.ndim not in (1, 2) or (asked.ndim == 2 and len(asked) != len(pair.frame_0)):
+            raise UsageError(
+                f"times of shape {list(asked.shape)}: expected [N], or [B, N] for {len(pair.frame_0)} pairs"
+            )
+        if not bool(((asked >= 0) & (asked <= 1)).all()):
+            raise UsageError(
+                "times outside of 0 ... 1, the first and the second frame; choose frames around the target"
+            )
+        made = self.synthesise(pair, asked if asked.ndim == 2 else asked.expand(len(pair.frame_0), -1))
+        return _cut_back(made, pair)
+
+    def _padded(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None) -> Pair:
+        self._check(frame_0, frame_1, events)
+        batch, channels, height, width = frame_0.shape
+        right, below = -width % self.multiple, -height % self.multiple
+        seen, grey = events is not None, channels < self.spec.colours
+        if events is None:
+            events = EventCounts.none(batch, (height, width)).to(frame_0.device)
+        first, second = (
+            F.pad(frame.expand(-1, self.spec.colours, -1, -1), (0, right, 0, below), mode="replicate")
+            for frame in (frame_0, frame_1)
+        )
+        laid = over(events, (height, width)).padded(right, below)
+        return Pair(first, second, laid, seen, (height, width), grey)
+
+    def _check(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None) -> None:
+        if frame_0.ndim != 4 or frame_0.shape != frame_1.shape or frame_0.shape[1] not in (1, self.spec.colours):
+            shapes, wanted = f"{list(frame_0.shape)} and {list(frame_1.shape)}", self.spec.colours
+            remedy = " or 1" if wanted > 1 else "; average their colours"
+            raise UsageError(f"frames of shapes {shapes}: expected two [B, C, H, W] that are alike, C {wanted}{remedy}")
+        if events is not None and len(events.off_on) != len(frame_0):
+            raise UsageError(
+                f"events of {len(events.off_on)} pairs and {len(frame_0)} pairs of frames; stack one for each"
+            )
+
+
+def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:
+    """A network's answer [B, N, c, H, W] float32 to parts [B, N, c_k, H, W], or [B, c_k, H, W] if alike for all N."""
+    targets = max(part.shape[1] for part in parts if part.ndim == 5)
+    wide = [part if part.ndim == 5 else part[:, None].expand(-1, targets, -1, -1, -1) for part in parts]
+    joined = torch.cat([part.float() for part in wide], 2)
+    return network(joined.flatten(0, 1)).float().unflatten(0, joined.shape[:2])
+
+
+def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
+    """Both frames, warped by flows [B, N, 4, H, W] to them: [B, N, 2, C, H, W]."""
+    return torch.stack([warp(pair.frame_0, flows_at[:, :, :2]), warp(pair.frame_1, flows_at[:, :, 2:])], 2)
+
+
+def shares_at(times: torch.Tensor) -> torch.Tensor:
+    """How near both frames are: [B, N, 2] of times [B, N]."""
+    return torch.stack([1 - times, times], -1)
+
+
+def _cut_back(made: Interpolated, pair: Pair) -> Interpolated:
+    height, width = pair.size
+
+    def cut(part: torch.Tensor) -> torch.Tensor:
+        return part[..., :height, :width]
+
+    def codes(part: torch.Tensor) -> torch.Tensor:
+        return cut(part).mean(-3, keepdim=True) if pair.grey else cut(part)
+
+    flows = None if made.flows is None else cut(made.flows)
+    return Interpolated(
+        codes(made.images), flows, cut(made.flows_at), codes(made.warps), cut(made.weights), codes(made.blend)
+    )

@@ -1,0 +1,107 @@
+"""HDR post-processing: a network that makes interpolated frames agree over time, and gives them the range that events
+show.
+
+    path A    the frame P_t, and its own last picture O_{t-1}      conv7, conv3 of stride 2
+    path B    the events (or the frame before processing, and the one before that)      the same
+    both      conv3 of stride 2, five residual blocks, ConvLSTM, nearest x2 and conv3 twice, conv7, tanh
+    O_t = P_t + what comes out
+
+Only path A is joined on the way up, so that events, which look nothing like a picture, do not leak into it.  O_{t-1}
+and the state of the LSTM carry no gradients from step to step.  Before the first frame O is taken to be that frame.
+
+Sources: Lai et al. (2018), "Learning blind video temporal consistency", ECCV, and its code,
+https://github.com/phoenix104104/fast_blind_video_consistency (without normalisation, as its published model is);
+events in path B, Radomski et al., section III.A.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from pydantic import Field
+from torch import nn
+from torch.nn import functional as F
+
+from interp.blocks.recurrent import ConvLstm, State, detached
+from interp.blocks.residual import Residual
+from interp.networks.spec import NetworkSpec
+
+SLOPE = 0.2
+BLOCKS = 5
+MULTIPLE = 8  # sides of 8 at least, so that reflected borders fit
+
+
+class HdrSpec(NetworkSpec):
+    """Options of the HDR network; of size paper with frames in path B it has 2,979,555 parameters and 268 kMAC/px."""
+
+    colours: Literal[1, 3] = Field(default=3, description="channels of a frame; 1 saves 4 % of the cost")
+    second: Literal["events", "frames"] = Field(
+        default="events",
+        description="what path B sees: events (bins channels) or frames (twice as many channels as a frame)",
+    )
+    bins: int = Field(default=5, ge=1, le=64, description="of events: 1,568 parameters and 1.568 kMAC/px each")
+
+
+@dataclass(frozen=True, slots=True)
+class HdrState:
+    """What is kept from step to step, without gradients: the last output, the last frame of path B, the LSTM."""
+
+    output: torch.Tensor
+    second: torch.Tensor
+    cell: State
+
+
+class Hdr(nn.Module):
+    """The HDR network."""
+
+    def __init__(self, spec: HdrSpec):
+        super().__init__()
+        self.spec = spec
+        base, frames = spec.base, 2 * spec.colours
+        self.into_a, self.down_a = _conv(frames, base, 7), _conv(base, 2 * base, 3, 2)
+        self.into_b = _conv(spec.bins if spec.second == "events" else frames, base, 7)
+        self.down_b = _conv(base, 2 * base, 3, 2)
+        self.down = _conv(4 * base, 4 * base, 3, 2)
+        self.middle = nn.Sequential(*(Residual(4 * base, SLOPE, True, "reflect") for _ in range(BLOCKS)))
+        self.cell = ConvLstm(4 * base, 4 * base)
+        self.up = nn.ModuleList([_conv(4 * base, 2 * base, 3), _conv(4 * base, base, 3)])
+        self.out = _conv(2 * base, spec.colours, 7)
+
+    def forward(
+        self, frame: torch.Tensor, second: torch.Tensor, state: HdrState | None = None
+    ) -> tuple[torch.Tensor, HdrState]:
+        """The picture O_t [B, C, H, W] for a frame P_t [B, C, H, W], and the state after it.
+
+        second   events [B, bins, H, W], or the frame before processing [B, C, H, W]
+        """
+        height, width = frame.shape[-2:]
+        edges = (0, -width % MULTIPLE, 0, -height % MULTIPLE)
+        whole = F.pad(frame, edges, mode="replicate")
+        beside = F.pad(second, edges, mode="constant" if self.spec.second == "events" else "replicate")
+        before = state or HdrState(whole.detach(), beside.detach(), ())
+        path_b = beside if self.spec.second == "events" else torch.cat([beside, before.second], 1)
+        residue, cell = self._residue(torch.cat([whole, before.output], 1), path_b, before.cell)
+        output = whole + residue
+        (kept,) = detached((cell,))
+        assert kept is not None
+        return output[..., :height, :width], HdrState(output.detach(), beside.detach(), kept)
+
+    def _residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
+        first = _leaky(self.into_a(path_a))
+        second = _leaky(self.down_a(first))
+        beside = _leaky(self.down_b(_leaky(self.into_b(path_b))))
+        x = self.middle(_leaky(self.down(torch.cat([second, beside], 1))))
+        x, cell = self.cell(x, cell or None)
+        for up, level in zip(self.up, (second, first), strict=True):
+            x = torch.cat([_leaky(up(F.interpolate(x, scale_factor=2, mode="nearest"))), level], 1)
+        return torch.tanh(self.out(x).float()), cell
+
+
+def _conv(channels_in: int, channels_out: int, kernel: int, stride: int = 1) -> nn.Conv2d:
+    return nn.Conv2d(channels_in, channels_out, kernel, stride, kernel // 2, padding_mode="reflect")
+
+
+def _leaky(x: torch.Tensor) -> torch.Tensor:
+    return F.leaky_relu(x, SLOPE)

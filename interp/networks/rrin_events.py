@@ -1,0 +1,191 @@
+"""RRIN, and RRINEvents, which is RRIN with events: four UNets, each with a task of its own.
+
+    U1   F_01, F_10 = U1(I0, I1)                                      once per pair
+    U2   F_t0, F_t1 += U2(F_t0, F_t1, I0, I1, events)                 what is not straight and even motion
+    U3   V0, V1 = sigmoid(U3(F_t0, F_t1, I0, I1, g0, g1, events))     what is visible in which frame
+         J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)          g_k = g(I_k, F_tk)
+    U4   I_t = J + U4(I0, I1, J)                                      what warped frames do not have: colours, dynamic
+    range
+
+The defaults are the paper's network; the depths of its UNets are inferred from the 17 million parameters it has (the
+19.19 million of RRIN with U4 one level shallower).  The options below them are what made a network of a sixteenth of
+that learn on two cores in minutes; the register has them as `rrin_events_light`:
+
+    coarse       U1 to U3 at half the resolution, U4 on squares of 2 x 2 pixels: a quarter of the cost
+    candidate    the bridge (`candidates/bridge.py`) as a third picture: from it on, not from nothing
+    gate         no residue where nothing happens, so that what stands still stays untouched
+
+In a blend with warps the candidate wins before flows have learnt anything, and then they never do.  So it is either
+kept out of the blend (`base`: U4 corrects it, and sees the blend) or left out of it at random (`softmax`,
+`candidate_dropout`); and `Interpolated.blend` is of the warps alone, for a loss of their own.
+
+Sources: Li et al. (2020), "Video frame interpolation via residue refinement", ICASSP; channels and levels as in
+https://github.com/HopLee6/RRIN; events, Radomski et al., section III.A.2.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import torch
+from pydantic import Field
+from torch import nn
+from torch.nn import functional as F
+
+from interp.blend import blend
+from interp.blocks.unet import HalfSized, Unet, rrin_layout
+from interp.candidates.bridge import bridge
+from interp.light import Transfer
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
+from interp.networks.spec import FrameFedSpec
+from interp.warp import flows_at
+
+Depth = Annotated[int, Field(ge=2, le=7)]
+GATE_REACH_PX = 5  # events so far apart open the gate between them
+GATE_STEEPNESS = 4.0
+
+
+class RrinEventsSpec(FrameFedSpec):
+    """Options of RRIN and RRINEvents."""
+
+    depths: tuple[Depth, Depth, Depth, Depth] = Field(
+        default=(5, 4, 4, 3),
+        description="levels of U1 to U4: U1 of 5 is 10,992,292 parameters and 261 kMAC/px, once per pair; U2 to U4 of 4"
+        " are 2.73 M and 202 kMAC/px each, of 3 0.67 M and 142",
+    )
+    bins: int = Field(
+        default=5,
+        ge=0,
+        le=64,
+        description="of events from the target to each frame, 0 for none: 576 parameters and 0.576 kMAC/px a bin in U2,"
+        " and in U3",
+    )
+    events_into_masks: bool = Field(default=True, description="events into U3 as well; see bins")
+    coarse: bool = Field(
+        default=False,
+        description="U1 to U3 at half the resolution, U4 on squares of pixels: about a quarter of the time",
+    )
+    candidate: Literal["none", "input", "base", "softmax"] = Field(
+        default="none",
+        description="the bridge: none; input of U3 and U4; base that U4 corrects; softmax: a third picture in the"
+        " blend, too. 864 parameters and 0.864 kMAC/px in each, and two products with the events",
+    )
+    candidate_dropout: float = Field(
+        default=0.3, ge=0, lt=1, description="share of training images whose blend does without the candidate; free"
+    )
+    chroma: Literal["keyframes", "warps"] = Field(
+        default="keyframes", description="where the candidate has its colours from; free"
+    )
+    gate: bool = Field(default=False, description="no residue where no event is near; costs one mean of counts")
+    transfer: Transfer = Field(
+        default="srgb", description="how the frames are coded: srgb or linear; for the candidate"
+    )
+
+
+class RrinEvents(FrameFed):
+    """RRINEvents; without events RRIN."""
+
+    def __init__(self, spec: RrinEventsSpec):
+        super().__init__()
+        self.spec: RrinEventsSpec = spec
+        colours, zero = spec.colours, spec.zero_heads
+        events, candidate = 2 * spec.bins, colours * (spec.candidate != "none")
+        masks_in = 4 * colours + 4 + events * spec.events_into_masks + candidate * self._blends_candidate
+        pictures = 3 if spec.candidate == "softmax" else 2
+        layouts = [rrin_layout(depth, spec.base) for depth in spec.depths]
+        self.flow = Unet(2 * colours, 4, layouts[0], zero)
+        self.refine = Unet(2 * colours + 4 + events, 4, layouts[1], zero)
+        self.masks = Unet(masks_in, pictures, layouts[2], zero)
+        residue_in = 3 * colours + candidate
+        if spec.coarse:
+            self.residue: nn.Module = HalfSized(
+                residue_in, colours, rrin_layout(spec.depths[3] - 1, 2 * spec.base), zero
+            )
+        else:
+            self.residue = Unet(residue_in, colours, layouts[3], zero)
+        self.multiple = 2 ** (max(spec.depths) - 1) * (2 if spec.coarse else 1)
+
+    @property
+    def _blends_candidate(self) -> bool:
+        return self.spec.candidate in ("input", "softmax")
+
+    def flows_of(self, pair: Pair) -> torch.Tensor:
+        """Flows between the frames; in pixels of half the resolution, if coarse."""
+        frames = torch.cat([pair.frame_0, pair.frame_1], 1)
+        return self.flow(self._coarse(frames)).float() * self.spec.flow_scale
+
+    def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
+        """Images at times [B, N]."""
+        assert pair.flows is not None
+        frames = [self._coarse(pair.frame_0), self._coarse(pair.frame_1)]
+        events = [self._events(pair).halves(times, self.spec.bins)] if self.spec.bins else []
+        at = flows_at(pair.flows, times)
+        at = at + run(self.refine, [at, *frames, *events]) * self.spec.flow_scale
+        fine = self._fine_flow(at)
+        warps = warped(pair, fine)
+        candidate = [self._candidate(pair, times, warps)] if self.spec.candidate != "none" else []
+        seen = [
+            at,
+            *frames,
+            *(self._coarse(warps[:, :, k]) for k in (0, 1)),
+            *(events if self.spec.events_into_masks else []),
+        ]
+        seen += [self._coarse(each) for each in candidate if self._blends_candidate]
+        logits = F.logsigmoid(self._fine(run(self.masks, seen)))
+        of_warps, weights = blend(warps, logits[:, :, :2], shares_at(times))
+        draft, weights = self._draft(of_warps, weights, warps, candidate, logits, times)
+        residue = run(
+            self.residue, [pair.frame_0, pair.frame_1, of_warps if self.spec.candidate == "base" else draft, *candidate]
+        )
+        image = draft + (self._gate(pair)[:, None] * residue if self.spec.gate and pair.seen else residue)
+        return Interpolated(image, self._fine_flow(pair.flows), fine, warps, weights, of_warps)
+
+    def _draft(
+        self,
+        of_warps: torch.Tensor,
+        weights: torch.Tensor,
+        warps: torch.Tensor,
+        candidate: list[torch.Tensor],
+        logits: torch.Tensor,
+        times: torch.Tensor,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """The picture that U4 corrects, and the weights it was blended with."""
+        if self.spec.candidate == "base":
+            return candidate[0], weights
+        if self.spec.candidate != "softmax":
+            return of_warps, weights
+        kept = torch.ones_like(times)
+        if self.training:
+            kept = (torch.rand_like(times) >= self.spec.candidate_dropout).to(times)
+        pictures = torch.cat([warps, candidate[0][:, :, None]], 2)
+        return blend(pictures, logits, torch.cat([shares_at(times), kept[..., None]], -1))
+
+    def _candidate(self, pair: Pair, times: torch.Tensor, warps: torch.Tensor) -> torch.Tensor:
+        around = None
+        if self.spec.chroma == "warps":
+            around = warps[:, :, 0] + times[..., None, None, None] * (warps[:, :, 1] - warps[:, :, 0])
+        return bridge(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around=around)
+
+    def _gate(self, pair: Pair) -> torch.Tensor:
+        """How much residue is let through, [B, 1, H, W]: 0 where no event is near."""
+        number = pair.events.off_on.float().sum((1, 2)).unsqueeze(1)
+        near = F.avg_pool2d(number, GATE_REACH_PX, stride=1, padding=GATE_REACH_PX // 2)
+        return 1 - torch.exp(-GATE_STEEPNESS * near)
+
+    def _events(self, pair: Pair):  # type: ignore[no-untyped-def]
+        return pair.events.pooled(2) if self.spec.coarse else pair.events
+
+    def _coarse(self, x: torch.Tensor) -> torch.Tensor:
+        """Pictures [..., c, H, W] at the resolution of U1 to U3."""
+        return F.avg_pool2d(x.flatten(0, -4), 2).unflatten(0, x.shape[:-3]) if self.spec.coarse else x
+
+    def _fine(self, x: torch.Tensor) -> torch.Tensor:
+        """Pictures [..., c, h, w] back at full resolution."""
+        if not self.spec.coarse:
+            return x
+        larger = F.interpolate(x.flatten(0, -4), scale_factor=2, mode="bilinear", align_corners=False)
+        return larger.unflatten(0, x.shape[:-3])
+
+    def _fine_flow(self, flow: torch.Tensor) -> torch.Tensor:
+        """Flows at full resolution, in its pixels."""
+        return self._fine(flow) * 2 if self.spec.coarse else flow

@@ -1,0 +1,143 @@
+"""RRINSloMoEvents, the combined system: RRINEvents' residue after Super SloMo's flow refinement and visibility in one
+network.
+
+    F_01, F_10 = flow(I0, I1, events?)                                   own, or trained before and frozen
+    dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, events, reconstructions?)
+    J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
+    I_t = J + UNet(I0, I1, J)                                            if refine is unet
+
+Source: Radomski et al., section III.A.3; depths are not given there: 5 levels for flow, 4 for the combined UNet, 3
+for the others.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from pydantic import Field
+from torch import nn
+from torch.nn import functional as F
+
+from interp.blend import blend
+from interp.blocks.frozen import Frozen
+from interp.blocks.unet import Unet, rrin_layout
+from interp.networks.e2vid import E2vid, E2vidSpec
+from interp.networks.event_input import EventInput, Events, first_last_and_target
+from interp.networks.firenet import FireNet, FireNetSpec
+from interp.networks.flow import FlowNetwork, FlowNetworkSpec
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
+from interp.networks.spec import FrameFedSpec
+from interp.warp import flows_at
+
+SUB_BINS = 5  # of the window that a reconstruction is made of
+Weights = Literal["own", "pretrained"]
+
+
+class RrinSlomoEventsSpec(FrameFedSpec):
+    """Options of RRINSloMoEvents; by default 14.4 million parameters and 614 kMAC/px at size paper."""
+
+    events: Events = Field(
+        default="halves",
+        description="into the combined UNet: none, bins (first, last, target; 3 channels) or halves (2 bins channels);"
+        " 288 parameters and 0.288 kMAC/px for each channel",
+    )
+    bins: int = Field(default=5, ge=1, le=64, description="of events, in each half or between the frames; see events")
+    flow_input: Literal["frames", "frames+events"] = Field(
+        default="frames",
+        description="of the flow network: all bins as well; 288 parameters and 0.288 kMAC/px a bin, once per pair",
+    )
+    flow: Weights = Field(
+        default="own",
+        description="pretrained: weights of the network `flow`, frozen; training takes about a third less time",
+    )
+    prepare: Literal["none", "unet"] = Field(
+        default="none",
+        description="a UNet of 3 levels changes the bins by what both frames show: 0.67 M parameters and 144 kMAC/px,"
+        " for bins once per pair, for halves for each target",
+    )
+    refine: Literal["none", "unet"] = Field(
+        default="unet",
+        description="the UNet of the residue, of 3 levels: 667,875 parameters and 142 kMAC/px; none: no colours"
+        " and no dynamic range that warped frames do not have",
+    )
+    reconstruct: Literal["none", "firenet", "e2vid"] = Field(
+        default="none",
+        description="a picture from events alone per bin, first, last and target as input: firenet 38 k parameters and"
+        " 38 kMAC/px, e2vid 10.7 M and 454, times the number of bins, once per pair",
+    )
+    reconstruct_weights: Weights = Field(default="own", description="pretrained: weights of that network, frozen")
+
+
+class RrinSlomoEvents(FrameFed):
+    """RRINSloMoEvents; pretrained parts are loaded with `interp.weights.load_part`."""
+
+    def __init__(self, spec: RrinSlomoEventsSpec):
+        super().__init__()
+        self.spec: RrinSlomoEventsSpec = spec
+        colours, zero = spec.colours, spec.zero_heads
+        bins = spec.bins if spec.flow_input == "frames+events" else 0
+        flow = FlowNetwork(
+            FlowNetworkSpec(size=spec.size, colours=colours, bins=bins, flow_scale=spec.flow_scale, zero_heads=zero)
+        )
+        self.flow: nn.Module = Frozen(flow) if spec.flow == "pretrained" else flow
+        self.event_input = EventInput(spec.events, spec.bins, prepare=self._prepare if spec.prepare == "unet" else None)
+        self.reconstruct = self._reconstruct()
+        pictures = 0 if self.reconstruct is None else 3
+        channels = 4 * colours + 8 + self.event_input.channels + pictures
+        self.combined = Unet(channels, 6, rrin_layout(4, spec.base), zero)
+        self.residue = Unet(3 * colours, colours, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
+        self.multiple = flow.multiple
+
+    def flows_of(self, pair: Pair) -> torch.Tensor:
+        """Flows between the frames."""
+        return self.flow(pair.frame_0, pair.frame_1, pair.events)
+
+    def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
+        """Reconstructions, if there are, and then bins, if they are taken."""
+        pictures = () if self.reconstruct is None else (self._pictures(pair),)
+        return (*pictures, *self.event_input.once(pair))
+
+    def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
+        """Images at times [B, N]."""
+        assert pair.flows is not None
+        once, beside = pair.once, []
+        if self.reconstruct is not None:
+            beside, once = [first_last_and_target(once[0], times)], once[1:]
+        at = flows_at(pair.flows, times)
+        first = warped(pair, at)
+        parts = [pair.frame_0, pair.frame_1, pair.flows, at[:, :, 2:], at[:, :, :2], first[:, :, 1], first[:, :, 0]]
+        found = run(self.combined, [*parts, *self.event_input.at(pair, once, times), *beside])
+        at = at + found[:, :, :4] * self.spec.flow_scale
+        warps = warped(pair, at)
+        image, weights = blend(warps, F.logsigmoid(found[:, :, 4:]), shares_at(times))
+        of_warps = image
+        if self.residue is not None:
+            image = image + run(self.residue, [pair.frame_0, pair.frame_1, image])
+        return Interpolated(image, pair.flows, at, warps, weights, of_warps)
+
+    def _prepare(self, channels: int) -> nn.Module:
+        return Unet(2 * self.spec.colours + channels, channels, rrin_layout(3, self.spec.base), self.spec.zero_heads)
+
+    def _reconstruct(self) -> nn.Module | None:
+        if self.spec.reconstruct == "none":
+            return None
+        size = self.spec.size
+        network = (
+            E2vid(E2vidSpec(size=size, bins=SUB_BINS))
+            if self.spec.reconstruct == "e2vid"
+            else FireNet(FireNetSpec(size=size, bins=SUB_BINS))
+        )
+        return Frozen(network) if self.spec.reconstruct_weights == "pretrained" else network
+
+    def _pictures(self, pair: Pair) -> torch.Tensor:
+        """A picture per bin, from the events up to its end: [B, bins, H, W]."""
+        edges = torch.arange(self.spec.bins + 1, device=pair.frame_0.device) / self.spec.bins
+        edges = edges.expand(len(pair.frame_0), -1)
+        windows = pair.events.voxels(edges[:, :-1], edges[:, 1:], SUB_BINS)
+        states, images = (), []
+        for window in windows.unbind(1):
+            assert self.reconstruct is not None
+            image, states = self.reconstruct(window, states)
+            images.append(image)
+        return torch.cat(images, 1)

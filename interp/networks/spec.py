@@ -1,0 +1,43 @@
+"""What all networks' specifications have."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Size = Literal["tiny", "small", "paper"]
+BASES = {"tiny": 8, "small": 16, "paper": 32}
+
+
+class NetworkSpec(BaseModel):
+    """A network's options; frozen.  The costs that fields name are those of size `paper`, a quarter at `small`, a
+    sixteenth at `tiny`, unless they say otherwise."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    size: Size = Field(
+        default="tiny",
+        description="8, 16 or 32 channels at full resolution; parameters and kMAC/px are fourfold from one to the next",
+    )
+
+    @property
+    def base(self) -> int:
+        """Channels at full resolution."""
+        return BASES[self.size]
+
+
+class FrameFedSpec(NetworkSpec):
+    """Options of networks that take two frames."""
+
+    colours: Literal[1, 3] = Field(
+        default=3,
+        description="channels of a frame; a network of 3 takes grey frames, too. 1 saves less than 2 % of the cost",
+    )
+    flow_scale: float = Field(
+        default=10.0, gt=0, description="pixels that 1 at the head of a flow network stands for; costs nothing"
+    )
+    zero_heads: bool = Field(
+        default=True,
+        description="heads of flows and residues start at 0, so that training starts at a cross-fade; free",
+    )

@@ -1,0 +1,1 @@
+"""Events as the arrays that networks take."""

@@ -1,0 +1,75 @@
+"""Events of a sensor with another place, lens or resolution, in the geometry of the frames.
+
+A count of events is how often the log of light has gone through a threshold: it belongs to a place, like light, not
+to an area.  So a pixel of the frame takes the counts from where it looks in the event camera, between four of its
+pixels. Where pixels of the frame are larger, these are means over as many pixels.  Where it looks at nothing, there
+are none.
+
+Where the cameras are calibrated, `places_of` says where pixels look, through both lenses, by depth or at infinity
+(which is rectification).  Where they are not, `over` lays one picture over the other, and the network has to learn
+the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from interp.representation.event_counts import EventCounts
+from interp.warp import sample
+
+if TYPE_CHECKING:
+    from vid2ev.rig.intrinsics import Intrinsics
+    from vid2ev.rig.pose import Pose
+
+
+def carried(counts: EventCounts, places: torch.Tensor) -> EventCounts:
+    """Counts [B, 2, S, h, w] at places [H, W, 2] px (x, y) of the event camera: [B, 2, S, H, W] float32.
+
+    NaN is a place that is not known.
+    """
+    height, width = counts.off_on.shape[-2:]
+    seen = ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
+    factor = _pixels_across(places, seen)
+    maps = counts.pooled(factor).off_on if factor > 1 else counts.off_on.float()
+    where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
+    found = sample(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float())
+    return replace(counts, off_on=(found * seen).unflatten(1, counts.off_on.shape[1:3]))
+
+
+def over(counts: EventCounts, size: tuple[int, int]) -> EventCounts:
+    """Counts laid over frames of a size (height, width), edge on edge: for cameras that are not calibrated."""
+    if counts.off_on.shape[-2:] == size:
+        return counts
+    height, width = counts.off_on.shape[-2:]
+    across = (torch.arange(size[1]) + 0.5) * (width / size[1]) - 0.5
+    down = (torch.arange(size[0]) + 0.5) * (height / size[0]) - 0.5
+    places = torch.stack([across.expand(size), down[:, None].expand(size)], -1)
+    return carried(counts, places.to(counts.off_on.device))
+
+
+def places_of(
+    frame_camera: Intrinsics,
+    frame_pose: Pose,
+    event_camera: Intrinsics,
+    event_pose: Pose,
+    depth_m: np.ndarray | float = np.inf,
+) -> torch.Tensor:
+    """Where pixels of the frame camera look in the event camera: [H, W, 2] px float32; NaN where it is not known.
+
+    depth_m   of what the frame camera sees, [H, W] or one number
+    The poses are those of the cameras in one and the same frame.
+    """
+    from vid2ev.rig.truth import pixel_map
+
+    depth = np.broadcast_to(np.asarray(depth_m, np.float64), frame_camera.size[::-1])
+    return torch.from_numpy(pixel_map(frame_camera, frame_pose, depth, event_camera, event_pose))
+
+
+def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> int:
+    """How many pixels of the event camera a pixel of the frame is wide, in the middle of all; at least 1."""
+    across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
+    return max(1, round(float(across.median()))) if len(across) else 1

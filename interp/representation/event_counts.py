@@ -1,0 +1,150 @@
+"""The events between two frames as counts per sub-interval: what networks are given for any number of target times.
+
+OFF and ON events of each of S equal sub-intervals are counted apart.  Voxels of any window are then one product of
+matrices (`bins.py`), the same for recordings and for what is simulated while training.
+
+    change    sum over events of +c_ON or -c_OFF [nat]: by how much the log of light has changed
+    voxels    change per bin / (3 * 0.15 nat), within -10 ... 10: an event of the usual threshold is a third
+
+The gain is fixed: how many events there are says how large contrast and motion are, which a division by their
+standard deviation would take away, and there is nothing to divide by where there are none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from torch.nn import functional as F
+
+from interp.precision import in_full_precision
+from interp.representation.bins import bin_weights
+from vid2ev.errors import UsageError
+
+if TYPE_CHECKING:
+    from vid2ev import Events
+
+USUAL_NATS = 0.15  # the paper's threshold
+PER_VOXEL_NATS = 3 * USUAL_NATS
+LARGEST = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class EventCounts:
+    """Counts of B pairs of frames.
+
+    off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals
+    contrast   [B, 2] nats that an OFF and an ON event stand for
+    """
+
+    off_on: torch.Tensor
+    contrast: torch.Tensor
+
+    @property
+    def steps(self) -> int:
+        """S, the number of sub-intervals."""
+        return self.off_on.shape[2]
+
+    def nats(self) -> torch.Tensor:
+        """Change of log light per sub-interval [B, S, H, W] float32."""
+        off, on = self.off_on.float().unbind(1)
+        down, up = self.contrast.float()[..., None, None, None].unbind(1)
+        return on * up - off * down
+
+    def change(self, start: torch.Tensor, stop: torch.Tensor) -> torch.Tensor:
+        """Change of log light [B, N, H, W] nats in windows [B, N], in 0 ... 1 of the time between the frames."""
+        return _in_bins(self.nats(), start, stop, 1).squeeze(2)
+
+    def number(self, start: torch.Tensor, stop: torch.Tensor) -> torch.Tensor:
+        """Number of events, OFF and ON, [B, N, H, W] in windows [B, N]."""
+        return _in_bins(self.off_on.float().sum(1), start, stop, 1).squeeze(2)
+
+    def voxels(self, start: torch.Tensor, stop: torch.Tensor, bins: int) -> torch.Tensor:
+        """Voxel grids [B, N, bins, H, W] of windows [B, N]."""
+        return as_voxels(_in_bins(self.nats(), start, stop, bins))
+
+    def halves(self, times: torch.Tensor, bins: int) -> torch.Tensor:
+        """Voxel grids [B, N, 2 bins, H, W]: from each time back to the first frame, then on to the second.
+
+        Backwards what got darker gets brighter: signs and bins are turned around, so that both halves look alike.
+        """
+        ends = torch.zeros_like(times), torch.ones_like(times)
+        before, after = self.voxels(ends[0], times, bins), self.voxels(times, ends[1], bins)
+        return torch.cat([-before.flip(2), after], dim=2)
+
+    def whole(self, bins: int) -> torch.Tensor:
+        """The voxel grid [B, bins, H, W] of all the time between the frames."""
+        start = self.contrast.new_zeros(len(self.contrast), 1)
+        return self.voxels(start, start + 1, bins).squeeze(1)
+
+    def padded(self, right: int, below: int) -> EventCounts:
+        """With so many pixels more, in which nothing happens."""
+        return replace(self, off_on=F.pad(self.off_on, (0, right, 0, below)))
+
+    def pooled(self, factor: int) -> EventCounts:
+        """Means of squares of pixels, as a sensor of larger pixels would count."""
+        counts = F.avg_pool2d(self.off_on.float().flatten(1, 2), factor)
+        return replace(self, off_on=counts.unflatten(1, (2, self.steps)))
+
+    def reversed(self) -> EventCounts:
+        """With time running backwards: the last sub-interval first, ON for OFF."""
+        return EventCounts(self.off_on.flip(1, 2), self.contrast.flip(1))
+
+    def to(self, device: torch.device | str) -> EventCounts:
+        """The same on a device."""
+        return EventCounts(self.off_on.to(device), self.contrast.to(device))
+
+    @staticmethod
+    def none(batch: int, size: tuple[int, int], steps: int = 1, contrast: float = USUAL_NATS) -> EventCounts:
+        """No events, for sizes (height, width)."""
+        return EventCounts(torch.zeros(batch, 2, steps, *size), torch.full((batch, 2), contrast))
+
+    @staticmethod
+    def stacked(counts: Sequence[EventCounts]) -> EventCounts:
+        """Several as one batch; they must have one size and one number of sub-intervals."""
+        return EventCounts(torch.cat([one.off_on for one in counts]), torch.cat([one.contrast for one in counts]))
+
+
+def count_events(
+    events: Events,
+    size: tuple[int, int],
+    start_us: int,
+    stop_us: int,
+    steps: int = 32,
+    contrast: tuple[float, float] = (USUAL_NATS, USUAL_NATS),
+) -> EventCounts:
+    """Counts, B = 1, of the events in (start_us, stop_us] on a sensor of `size` (width, height).
+
+    steps      S; an event at the edge of two sub-intervals is in the earlier one
+    contrast   nats that an OFF and an ON event stand for
+    Raises UsageError for events outside of the sensor and for less than one sub-interval.
+    """
+    if steps < 1:
+        raise UsageError(f"{steps} sub-intervals between frames: expected at least 1; choose for example 32")
+    width, height = size
+    t = np.asarray(events.t).astype(np.int64)
+    kept = (t > start_us) & (t <= stop_us)
+    x, y, p = (np.asarray(each)[kept].astype(np.int64) for each in (events.x, events.y, events.p))
+    if len(x) and (min(x.min(), y.min()) < 0 or x.max() >= width or y.max() >= height):
+        raise UsageError(f"events outside of the {width}x{height} sensor; give the size of the sensor that sent them")
+    step = ((t[kept] - start_us) * steps - 1) // max(stop_us - start_us, 1)
+    flat = ((np.minimum(p, 1) * steps + step) * height + y) * width + x
+    counts = np.bincount(flat, minlength=2 * steps * height * width).reshape(1, 2, steps, height, width)
+    kind = np.uint8 if counts.max(initial=0) < 256 else np.int32
+    return EventCounts(torch.from_numpy(counts.astype(kind)), torch.tensor([contrast], dtype=torch.float32))
+
+
+def as_voxels(nats: torch.Tensor) -> torch.Tensor:
+    """Change of log light [nat] in the units that networks take."""
+    return (nats / PER_VOXEL_NATS).clamp(-LARGEST, LARGEST)
+
+
+@in_full_precision
+def _in_bins(values: torch.Tensor, start: torch.Tensor, stop: torch.Tensor, bins: int) -> torch.Tensor:
+    """[B, N, bins, H, W] of values per sub-interval [B, S, H, W]."""
+    weights = bin_weights(start, stop, bins, values.shape[1])
+    found = weights.flatten(1, 2) @ values.flatten(2)
+    return found.unflatten(1, weights.shape[1:3]).unflatten(3, values.shape[2:])

@@ -1,0 +1,87 @@
+"""Weights on disk: safetensors, with the network's name and options beside them.  Nothing in such a file can run.
+
+metadata   network: a name of `interp.networks`; spec: its options, as JSON; more as whoever saves it likes
+tensors    by their names in the network; names that a wrapper has put `module.` or `_orig_mod.` before are understood
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from interp.blocks.frozen import Frozen
+from interp.networks import NETWORKS, make
+from vid2ev.errors import DataError, UsageError
+
+WRAPPERS = ("module.", "_orig_mod.")
+
+
+def save(path: Path, name: str, network: nn.Module, about: Mapping[str, str] | None = None) -> None:
+    """Write a network of that name, whole or not at all; `about` goes into the metadata."""
+    from safetensors.torch import save as in_bytes
+
+    from vid2ev.recording.disk import whole_file
+
+    spec = network.spec.model_dump_json()  # type: ignore[operator, union-attr]
+    tensors = {key: tensor.detach().cpu().contiguous() for key, tensor in network.state_dict().items()}
+    with whole_file(path) as file:
+        file.write(in_bytes(tensors, {**(about or {}), "network": name, "spec": spec}))
+
+
+def load(path: Path) -> nn.Module:
+    """The network of a file, as in use.  Raises DataError for a file that does not hold one."""
+    name, spec, tensors = _read(path)
+    try:
+        network = make(name, **spec)
+    except (UsageError, TypeError) as error:
+        raise DataError(f"{path} is of another version of its network ({error}); train it again") from error
+    _fill(network, tensors, path)
+    return network.eval()
+
+
+def load_part(network: nn.Module, part: str, path: Path) -> None:
+    """Give a part of a network, such as `flow` or `reconstruct`, the weights of a network trained for itself."""
+    module = getattr(network, part, None)
+    if not isinstance(module, nn.Module):
+        raise UsageError(
+            f"{type(network).__name__} has no part '{part}'; it has {', '.join(dict(network.named_children()))}"
+        )
+    _fill(module.module if isinstance(module, Frozen) else module, _read(path)[2], path)
+
+
+def _read(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, "pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {_bare(key): file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError) as error:
+        raise DataError(f"{path} cannot be read as weights ({error}); give a file that training has written") from error
+    name = metadata.get("network", "")
+    try:
+        spec = json.loads(metadata.get("spec", ""))
+    except ValueError:
+        spec = None
+    if name not in NETWORKS or not isinstance(spec, dict):
+        raise DataError(f"{path} does not say which network its weights are of; give a file that training has written")
+    return name, spec, tensors
+
+
+def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
+    try:
+        module.load_state_dict(tensors)
+    except RuntimeError as error:
+        first = str(error).splitlines()[1].strip()
+        raise DataError(f"{path} holds the weights of another network ({first}); give those of this one") from error
+
+
+def _bare(key: str) -> str:
+    while key.startswith(WRAPPERS):
+        key = key.removeprefix("module.").removeprefix("_orig_mod.")
+    return key
