@@ -13,7 +13,13 @@ stay there, 16 frames at a time; the median of some runs, the card awaited befor
 
 The roofline is what must be moved of a pixel and frame: its light once (4 bytes), its state in and out once for 16
 frames; the share is that over the time, against a copy measured on the same card.
-Without a GPU it says so, in one line.  It has run in the simulator so far, and on no card.
+
+Last it prints the numbers by which `--device auto` chooses, as `vid2ev/sensors/devices.py` has them: nanoseconds for a
+pixel and step on a thread of the CPU and on the card, light carried along motion and the sensor `paper`, and what it
+takes until a card has made its first events.
+
+Without a GPU it says so, in one line, and measures what the CPU takes.  It has run in the simulator so far, and on no
+card.
 """
 
 from __future__ import annotations
@@ -29,6 +35,7 @@ import numpy as np
 SIZES = {"346x260": (346, 260), "1280x720": (1280, 720), "3840x2160": (3840, 2160)}
 FRAMES, RUNS, FRAME_NS = 16, 7, 1_000_000
 BEGIN, END = "<!-- gpu: begin -->", "<!-- gpu: end -->"
+STEPS = 17  # from frame to frame, as many as `--subframes auto` takes of eight clips (the median)
 CLIPS, CLIP_FRAMES = 64, 256  # of training: 256x256, 9 frames of truth and 32 steps between each two
 
 
@@ -139,6 +146,44 @@ def clips_per_second(torch: Any, memory: Any, spec: Any) -> float:
     return CLIPS / seconds(torch, run)
 
 
+def start_s(memory: Any) -> float:
+    """Seconds until a sensor of 64x48 pixels has sent its first events: kernels are compiled, torch has begun."""
+    from vid2ev.sensors.dvs_on_card import DvsOnCard
+
+    began = time.perf_counter()
+    card = DvsOnCard(sensors()["paper"], (64, 48), memory=memory)
+    card.steps(frames("busy", (64, 48), FRAMES), [FRAME_NS * k for k in range(FRAMES)])
+    return time.perf_counter() - began
+
+
+def step_ns(memory: Any | None) -> float:
+    """Nanoseconds for a pixel and step of 1280x720: a photograph carried along motion of 3 px, and what a sensor
+    makes of it; of the CPU, where there is no memory of a card, those of one thread."""
+    import cv2
+    from skimage import data
+
+    from vid2ev.sensors.dvs import Dvs
+    from vid2ev.sensors.dvs_on_card import DvsOnCard
+    from vid2ev.stream.frames import Frame
+    from vid2ev.stream.upload import Upload
+    from vid2ev.upsample import make_upsampler
+
+    size, spec = SIZES["1280x720"], sensors()["paper"]
+    photograph = (cv2.resize(data.camera(), (size[0] + 3, size[1])).astype(np.float32) / 255) ** 2.2
+    before, after = (np.ascontiguousarray(photograph[:, k : k + size[0]]) for k in (0, 3))
+    upsampler = make_upsampler("flow", STEPS, upload=None if memory is None else Upload(memory.name))
+    dvs = Dvs(spec, size) if memory is None else DvsOnCard(spec, size, memory=memory)
+    clock = time.thread_time if memory is None else time.perf_counter
+    taken = []
+    for k in range(RUNS):
+        interval = upsampler.between(Frame(before, 2 * k * 10**9), Frame(after, (2 * k + 1) * 10**9))
+        dvs.restart(before, 2 * k * 10**9)
+        began = clock()
+        dvs.see_all(list(interval))  # (its events come to the host, which awaits the card)
+        taken.append(clock() - began)
+    return 1e9 * statistics.median(taken[1:]) / (size[0] * size[1] * STEPS)
+
+
 def copy_speed(torch: Any) -> float:
     """Bytes a second that a copy moves, both ways counted."""
     source = torch.zeros(1 << 28, device="cuda")
@@ -166,11 +211,12 @@ def main(into: Path | None, simulated: bool) -> None:
         click.echo("\n".join(parity(memory_of("simulated"), (23, 11), 6)))
         return
     if missing := missing_for_cuda():
-        click.echo(f"no GPU: {missing}; nothing is measured")
+        click.echo(f"no GPU: {missing}; nothing of it is measured\nCPU_NS = {step_ns(None):.1f}")
         return
     import torch
 
     memory = memory_of("cuda")
+    started = start_s(memory)
     click.echo("\n".join(parity(memory, SIZES["346x260"], 40)))
     copied = copy_speed(torch)
     rows = [
@@ -181,6 +227,7 @@ def main(into: Path | None, simulated: bool) -> None:
     ]
     text = table(rows, torch.cuda.get_device_name(), copied, clips_per_second(torch, memory, sensors()["paper"]))
     click.echo(text)
+    click.echo(f"CPU_NS = {step_ns(None):.1f}\nSTART_S = {started:.0f}\nCARD_NS = {step_ns(memory):.2f}")
     if into is not None:
         before, _, rest = into.read_text(encoding="utf-8").partition(BEGIN)
         after = rest.partition(END)[2]

@@ -262,8 +262,8 @@ def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyP
     vid2ev("convert", CLIP, "-o", "whole", "-q", *QUICK)
     of_recipe = instants._instants
 
-    def interrupted(recipe: Recipe, start: int) -> Iterator[Instant]:
-        for k, item in enumerate(of_recipe(recipe, start)):
+    def interrupted(*asked: Any) -> Iterator[Instant]:
+        for k, item in enumerate(of_recipe(*asked)):
             if k == 8:
                 raise KeyboardInterrupt
             yield item

@@ -15,7 +15,6 @@ import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, read_events
 from vid2ev.instants import Instant
-from vid2ev.recipe import Recipe
 from vid2ev.stream.ahead import ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
@@ -153,8 +152,8 @@ def test_a_random_seed_is_drawn_and_kept(tmp_path: Path) -> None:
 def test_a_source_that_fails_half_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     of_recipe = instants._instants
 
-    def failing(recipe: Recipe, start: int) -> Iterator[Instant]:
-        for k, item in enumerate(of_recipe(recipe, start)):
+    def failing(*asked: Any) -> Iterator[Instant]:
+        for k, item in enumerate(of_recipe(*asked)):
             if k == 8:
                 raise DataError("picture 8 is broken; mend it")
             yield item

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import secrets
 import time
@@ -22,6 +23,7 @@ from vid2ev.recipe import Recipe, plain
 from vid2ev.recorder import Progress, Recorder, growing, progress_of
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
+from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import usable_cores
 from vid2ev.sight import scene_of
@@ -49,6 +51,7 @@ def convert(
     effects: str | Sequence[str] = "all",
     tolerance: float = TOLERANCE,
     notes: Mapping[str, Any] | None = None,
+    device: str = "cpu",
     **rest: Any,
 ) -> dict[str, Any]:
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
@@ -64,6 +67,8 @@ def convert(
     effects    those to simulate: all, auto (what the clip calls for, by bounds within `tolerance`; `plan.planner` has
                what it takes), none, or names
     notes      what else the manifest is to say, ready for JSON
+    device     where light and events are made: cpu, cuda (a GPU; the CPU where there is none), or auto, by how much
+               there is to do (`sensors.devices`); "simulated" is for tests.  Light differs by what float32 rounds
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
 
@@ -81,7 +86,8 @@ def convert(
     if scene := scene_of(recipe.source):
         scene.world.afresh = not skip
     threads = threads or usable_cores()
-    planner = Planner(recipe, tolerance, threads) if effects == "auto" else None
+    where = device_for(device, recipe.work, threads)
+    planner = Planner(recipe, tolerance, threads, where) if effects == "auto" else None
     recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
@@ -91,7 +97,7 @@ def convert(
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
-        make = partial(Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip)
+        make = partial(Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip, device=where)
         recorder = _recorded(recipe, planner, folder, make, piece, report)
         said = described(planner.plans if planner else plans)
         manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
@@ -177,7 +183,7 @@ def _record(recorder: Recorder, planner: Planner | None, piece: int, report: Rep
     """From the point of the last checkpoint to the end of the source; returns False where there are new plans."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
-    coming = planner.instants if planner else partial(instants, recipe)
+    coming = planner.instants if planner else partial(instants, recipe, device=recorder.device)
     with closing(coming(max(done.frames - 1, 0))) as seen:
         first = next(seen, None)
         if first is None:
@@ -188,7 +194,7 @@ def _record(recorder: Recorder, planner: Planner | None, piece: int, report: Rep
                 return False
             recorder.add(instant)
             done.limited, done.seconds = limited_before + instant.limited, time.monotonic() - began
-            work += max(STEP, sum(frame.light.size for frame in instant.frames))
+            work += max(STEP, sum(math.prod(frame.light.shape) for frame in instant.frames))
             if instant.original and report and report(recipe, done) is True:
                 done.by_hand = True
                 done.warnings.append(f"ended by hand after {done.frames} frames")
@@ -213,6 +219,7 @@ def _run(video: str | Path, threads: int, recorder: Recorder) -> dict[str, Any]:
         "video": str(video),
         "seconds": round(recorder.done.seconds, 3),
         "threads": threads,
+        "device": recorder.device.describe(),
         "strips_slept": recorder.slept(),
         "machine": machine(),
     }

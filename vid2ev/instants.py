@@ -19,12 +19,14 @@ from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.mounts import Mount
 from vid2ev.recipe import Recipe
 from vid2ev.rig.depth import between
+from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, Stage, arriving
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
+from vid2ev.stream.upload import Upload, downloaded
 from vid2ev.truth import Truth, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
@@ -52,11 +54,19 @@ class Instant:
     shift_px: float | None = None
     depth: np.ndarray | None = None
 
+    def downloaded(self) -> Instant:
+        """The instant with light in arrays, wherever it is."""
+        return replace(self, frames=tuple(map(downloaded, self.frames)))
 
-def instants(recipe: Recipe, start: int = 0) -> Generator[Instant]:
+
+def instants(recipe: Recipe, start: int = 0, device: Device = CPU) -> Generator[Instant]:
     """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
-    little in advance: one looks for motion, another carries light along it, a third forms the views."""
-    return ahead(_instants(recipe, start), FRAMES_AHEAD)
+    little in advance: one looks for motion, another carries light along it, a third forms the views.
+
+    Light is made on the `device` from the source's frames on, and is in tensors of torch there.
+    """
+    upload = None if device.light is None else Upload(device.light)
+    return ahead(_instants(recipe, start, upload), FRAMES_AHEAD)
 
 
 def events_of(
@@ -90,12 +100,13 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
         yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(light))
 
 
-def _instants(recipe: Recipe, start: int) -> Generator[Instant]:
+def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
     sight = recipe.sight()
     if recipe.source.dense and (recipe.truth or not sight.free):
-        return (yield from _rendered(recipe, start))
+        return (yield from _rendered(recipe, start, upload))
     wanted, before_ns = recipe.truth, None
-    with closing(_light(recipe, start) if sight.free else ahead(_light(recipe, start), FRAMES_AHEAD)) as light:
+    made = _light(recipe, start, upload if sight.free else None)  # (views are made on the CPU)
+    with closing(made if sight.free else ahead(made, FRAMES_AHEAD)) as light:
         for frame, limited, shift_px in light:
             views, truth = sight.views(frame), tuple[Truth, ...]()
             if wanted and frame.original:
@@ -104,10 +115,11 @@ def _instants(recipe: Recipe, start: int) -> Generator[Instant]:
                     truth = wanted.of_views(frame, recipe.rig.source, recipe.plane_m, recipe.mounts, masks)
                 before_ns = frame.t_ns
             frames = arriving(frame, [view.light for view in views], recipe.mounts, recipe.bayer)
+            frames = tuple(map(upload.frame, frames)) if upload else frames
             yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth, shift_px, frame.depth)
 
 
-def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
+def _rendered(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
     """What each camera sees of a scene."""
     stage, wanted = Stage(recipe.source, recipe.mounts), recipe.truth
     due = with_next(stage.instants_ns, wanted) if wanted else {}
@@ -123,24 +135,24 @@ def _rendered(recipe: Recipe, start: int) -> Generator[Instant]:
                 replace(frame, still=None if still is None else Still(last.light, still))
                 for frame, last, still in zip(frames, before, stills, strict=True)
             )
-        yield Instant(frames, t_ns, truth=truth)
+        yield Instant(tuple(map(upload.frame, frames)) if upload else frames, t_ns, truth=truth)
         before = frames
 
 
-def _light(recipe: Recipe, start: int) -> Generator[tuple[Frame, int, float | None]]:
+def _light(recipe: Recipe, start: int, upload: Upload | None) -> Generator[tuple[Frame, int, float | None]]:
     """The frames of the source and those in between, each with the number of intervals so far that hit a limit, and how
     far things move in its interval [px]."""
     limited = 0
-    with closing(ahead(_intervals(recipe, start), INTERVALS_AHEAD)) as intervals:
+    with closing(ahead(_intervals(recipe, start, upload), INTERVALS_AHEAD)) as intervals:
         for interval in intervals:
             limited += interval.limited
             for frame in interval:
-                yield frame, limited, interval.shift_px
+                yield upload.frame(frame) if upload else frame, limited, interval.shift_px
 
 
-def _intervals(recipe: Recipe, start: int) -> Generator[Interval]:
+def _intervals(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Interval]:
     """The frame `start` by itself, and each interval after it."""
-    upsampler, straight = recipe.upsampler(), NoUpsampling()
+    upsampler, straight = recipe.upsampler(upload), NoUpsampling()
     cuts = CutDetector(recipe.threshold)
     before: Frame | None = None
     # (whether there is a cut after frame `start` depends on the frame before it, too)

@@ -13,6 +13,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.devices import CPU, Device, memory_of
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
@@ -108,10 +109,15 @@ class Mount:
         """The camera's part of the recording's folder, with a slash at its end."""
         return f"{self.name}/" if self.name else ""
 
-    def dvs(self, labels: bool = False, threads: int = 1, skip: bool = True) -> Dvs:
+    def dvs(self, labels: bool = False, threads: int = 1, skip: bool = True, device: Device = CPU) -> Dvs:
         """The event sensor, before its first frame."""
         assert isinstance(self.sensor.spec, DvsSpec)
         spec, number = self.sensor.spec, self.number
+        if device.name != "cpu":
+            from vid2ev.sensors.dvs_on_card import DvsOnCard
+
+            memory = memory_of(device.name)
+            return DvsOnCard(spec, self.size, self.seed, memory=memory, camera=number, labels=labels)
         return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip)
 
     def cis(self, threads: int = 1) -> Cis:

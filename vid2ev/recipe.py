@@ -20,9 +20,11 @@ from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
 from vid2ev.rig.depth import plane_of
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, scene_of
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
+from vid2ev.stream.upload import Upload
 from vid2ev.truth import Wanted
 from vid2ev.upsample import Upsampler, make_upsampler
 
@@ -148,9 +150,18 @@ class Recipe:
                 " plane:METRES, a depth map or a folder of them"
             )
 
-    def upsampler(self) -> Upsampler:
-        """A new upsampler."""
-        return make_upsampler(self.upsample, self.subframes, self.max_subframes, self.threshold)
+    def upsampler(self, upload: Upload | None = None) -> Upsampler:
+        """A new upsampler, which makes light on a device if there is an `upload` to it."""
+        return make_upsampler(self.upsample, self.subframes, self.max_subframes, self.threshold, upload)
+
+    @property
+    def work(self) -> Work:
+        """What it takes, as far as that is known before the first frame."""
+        steps = float(self.subframes) if self.subframes != "auto" else min(STEPS_OF_FLOW, self.max_subframes)
+        if self.upsample == "none" or (self.upsample == "linear" and self.subframes == "auto"):
+            steps = 1.0
+        pixels = sum(mount.size[0] * mount.size[1] for mount in self.mounts)
+        return Work(pixels, self.source.frames_expected, steps)
 
     @property
     def plane_m(self) -> float | None:

@@ -19,6 +19,7 @@ from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.rig.rig_file import write_rig
+from vid2ev.sensors.devices import CPU, Device
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -73,8 +74,16 @@ class Recorder:
     for each that follows and now and then `checkpoint`, and in the end `finish` and `write`.
     """
 
-    def __init__(self, recipe: Recipe, outputs: Outputs, folder: Folder, threads: int, skip: bool = True):
-        self.recipe, self.outputs, self.folder = recipe, outputs, folder
+    def __init__(
+        self,
+        recipe: Recipe,
+        outputs: Outputs,
+        folder: Folder,
+        threads: int,
+        skip: bool = True,
+        device: Device = CPU,
+    ):
+        self.recipe, self.outputs, self.folder, self.device = recipe, outputs, folder, device
         self.done = Progress()
         self.tracks: Sequence[Track] = [self._track(mount, threads, skip) for mount in recipe.mounts]
         self._truths = [TruthTrack(mount, folder) for mount in recipe.mounts if recipe.truth]
@@ -111,7 +120,6 @@ class Recorder:
         with self.folder.writing():
             for track in self.tracks:
                 track.finish()
-        self.done.events = sum(track.events for track in self.tracks)
         self.done.finished = True
         self.checkpoint()
 
@@ -122,6 +130,7 @@ class Recorder:
             for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
                 track.close()
                 state |= {f"track{mount.number}.{name}": array for name, array in track.state().items()}
+            self.done.events = sum(track.events for track in self.tracks)
             self.folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(self.done)))})
 
     def give_up(self) -> None:
@@ -163,7 +172,7 @@ class Recorder:
             return CisTrack(mount.cis(threads), self.folder, self.outputs, within=mount.within)
         source = self.recipe.source
         return DvsTrack(
-            mount.dvs(self.recipe.labels, threads, skip),
+            mount.dvs(self.recipe.labels, threads, skip, self.device),
             self.folder,
             self.outputs,
             within=mount.within,

@@ -100,6 +100,10 @@ class Auto(click.ParamType):
     help="Changes nothing but the time it takes.  [default: all cores]",
 )
 @click.option(
+    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="cpu", show_default=True,
+    help="Where light and events are made; auto: on a GPU, if there is one and enough to do.",
+)  # fmt: skip
+@click.option(
     "--skip/--no-skip", default=True,
     help="Skip pixels in which nothing can happen; changes nothing but the time it takes.  [default: yes]",
 )  # fmt: skip
@@ -180,6 +184,8 @@ def convert(
     from vid2ev.commands import batch
 
     quiet |= as_json
+    if options["device"] == "cuda" and not quiet:
+        _warn_without_gpu()
     options["seed"] = None if options["seed"] == "random" else options["seed"]
     found = [source for video in videos for source in batch.sources_in(video)]
     if len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/"):
@@ -197,6 +203,14 @@ def convert(
         json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )
     sys.exit(batch.exit_code(results))
+
+
+def _warn_without_gpu() -> None:
+    """One line where a GPU is asked for and there is none."""
+    from vid2ev.sensors.devices import missing_for_cuda
+
+    if missing := missing_for_cuda():
+        click.echo(f"device cuda: {missing}; converting on the CPU", err=True)
 
 
 def _one(
@@ -243,7 +257,7 @@ def _within(budget: str, video: str, directory: Path, quiet: bool, options: dict
     if choice is None:
         rest = dict(options)
         Outputs.taken_from(rest)
-        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume"))
+        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
         with pass_bar(quiet) as report:
             choice = chosen(video, budget, rest, given=given(), threads=threads, report=report)
     if not quiet:
@@ -259,7 +273,10 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     from vid2ev.plan.recordings import check_effects
     from vid2ev.recipe import Recipe
     from vid2ev.recording.folder import check_free
+    from vid2ev.sensors.devices import device_for
+    from vid2ev.sensors.tiles import usable_cores
 
+    device = options.pop("device")
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
     overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
     effects, tolerance = options.pop("effects"), options.pop("tolerance")
@@ -271,5 +288,6 @@ def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[st
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
     files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
+    facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
     text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
     return described | {"outputs": outputs.describe()}, text

@@ -102,7 +102,17 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     threads = manifest["run"]["threads"]
     took = f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}"
     slept, of = map(sum, zip((0, 0), *manifest["run"].get("strips_slept", {}).values(), strict=True))
-    return [("took", took), *([("slept", f"{100 * slept / of:.0f} % of the pixels' intervals")] if slept else [])]
+    device = device_facts(manifest["run"].get("device", {"asked": "cpu"}))
+    return [
+        ("took", took),
+        *device,
+        *([("slept", f"{100 * slept / of:.0f} % of the pixels' intervals")] if slept else []),
+    ]
+
+
+def device_facts(device: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Where a recording is made, and why, of a device's description; nothing if it is on the CPU as ever."""
+    return [("device", f"{device['used']}: {device['why']}")] if device["asked"] != "cpu" else []
 
 
 def file_facts(directory: Path) -> list[tuple[str, str]]:

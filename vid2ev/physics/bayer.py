@@ -19,12 +19,12 @@ PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")  # the two by two pixels at the top 
 
 
 def mosaic(rgb: np.ndarray, pattern: str) -> np.ndarray:
-    """What each pixel sees [float32, H x W] of linear red, green and blue [H, W, 3]."""
+    """What each pixel sees [float32, H x W] of linear red, green and blue [H, W, 3]: of a tensor of torch, a tensor."""
     channels = ["RGB".index(letter) for letter in check_pattern(pattern)]
-    light = np.empty(rgb.shape[:2], np.float32)
+    light = np.empty(rgb.shape[:2], np.float32) if isinstance(rgb, np.ndarray) else rgb.new_empty(rgb.shape[:2])
     for place, channel in enumerate(channels):
         part = (slice(place // 2, None, 2), slice(place % 2, None, 2))
-        light[part] = np.maximum(rgb[(*part, channel)], 0)
+        light[part] = rgb[(*part, channel)].clip(0)
     return light
 
 

@@ -42,6 +42,7 @@ from vid2ev.instants import Instant, instants
 from vid2ev.plan.plan import Plan, check_tolerance
 from vid2ev.plan.recordings import PASSES, Look, left_of, plans_unseen
 from vid2ev.recipe import Recipe
+from vid2ev.sensors.devices import CPU, Device
 
 HELD = 1 << 26  # bytes of light, at least an instant
 SPARE = 0.5  # share of the tolerance for the first plans: what comes may be worse, and to begin again is dear
@@ -53,12 +54,13 @@ class Planner:
     """The plans of a recipe's cameras within a tolerance of the distance: `begin`, then go through `instants` and show
     each to `see`; after the last, `finish`.  Where these return True the recording has to begin again by new `plans`.
 
-    `threads` measure, and change nothing but the time it takes.
+    `threads` measure, and change nothing but the time it takes.  Light is made on the `device`, and comes back to be
+    looked at.
     """
 
-    def __init__(self, recipe: Recipe, tolerance: float, threads: int = 1):
+    def __init__(self, recipe: Recipe, tolerance: float, threads: int = 1, device: Device = CPU):
         check_tolerance(tolerance)
-        self.recipe, self.tolerance = recipe, tolerance
+        self.recipe, self.tolerance, self.device = recipe, tolerance, device
         self.plans: dict[str, Plan] = {}
         self.looked, self.ended = 0, False  # instants, from the first on; and whether the last of them was the last
         self._look, self._looking = Look(recipe, threads), {mount.name for mount in recipe.mounts}
@@ -76,7 +78,7 @@ class Planner:
         """Make the first plans; those at which another planner was that had looked so far."""
         if self.plans:
             return
-        self._rest = instants(self.recipe)
+        self._rest = instants(self.recipe, device=self.device)
         more = self._hold(self._rest)
         if not self.looked or (more and not self.recipe.source.rewindable):
             self.plans = plans_unseen(self.recipe, PASSES, "auto", self.tolerance)
@@ -95,7 +97,7 @@ class Planner:
         if frame > 0:
             self._let_go()
         held, rest, self._held, self._rest = self._held, self._rest, deque(), None
-        rest = rest or instants(self.recipe, frame)
+        rest = rest or instants(self.recipe, frame, self.device)
         with closing(rest):
             while held:
                 yield held.popleft()
@@ -140,7 +142,7 @@ class Planner:
         self._held, self._rest = deque(), None
 
     def _measure(self, instant: Instant) -> None:
-        self._look.see(instant)
+        self._look.see(instant.downloaded())
         self._bytes += sum(frame.light.nbytes for frame in instant.frames)
         self.looked += 1
 

@@ -26,6 +26,7 @@ from vid2ev.recording.disk import sync
 from vid2ev.recording.panels import COLOURS, count, paint, reduced
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.upload import downloaded
 
 RATE = 30  # frames per second
 PARTS = 8  # frames per interval of a slow source, for which fewer will do
@@ -143,7 +144,7 @@ class Preview:
     def _picture(self) -> np.ndarray:
         """Both panels as planes Y, U, V, one after the other as yuv420p has them."""
         if self._gray is None:
-            self._gray = reduced(self._newest.light, self.across, self.down)
+            self._gray = reduced(downloaded(self._newest).light, self.across, self.down)
         width, height = self.panel
         picture = np.empty((height * 3 // 2, 2 * width), np.uint8)
         luma, chroma = picture[:height], picture[height:].reshape(2, height // 2, width)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,8 @@ class Dvs:
 
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
+
+    at_once = 1  # frames that are best given together, to `see_all`
 
     def __init__(
         self,
@@ -141,6 +143,10 @@ class Dvs:
         if frame.cut:
             return self.restart(frame.light, frame.t_ns)
         return self.step(frame.light, frame.t_ns, frame.still)
+
+    def see_all(self, frames: Sequence[Frame]) -> list[Events]:
+        """`see` for each frame."""
+        return [self.see(frame) for frame in frames]
 
     def run(self, frames: Iterable[Frame]) -> Iterator[Events]:
         """`see` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 
 FRAMES = 16  # at a time: the state of a pixel is read and written once for as many
@@ -28,6 +30,8 @@ class DvsOnCard(Dvs):
 
     Light may be a tensor of torch, on the device or not; it is then linear and floating point.
     """
+
+    at_once = FRAMES
 
     def __init__(
         self,
@@ -57,6 +61,18 @@ class DvsOnCard(Dvs):
         for first in range(len(sent), len(t_ns), FRAMES):
             some = slice(first, first + FRAMES)
             sent += self._some(light[some], [int(t) for t in t_ns[some]])
+        return sent
+
+    def see_all(self, frames: Sequence[Frame]) -> list[Events]:
+        """`Dvs.see_all`, those of a shot together."""
+        sent: list[Events] = []
+        while rest := frames[len(sent) :]:
+            if rest[0].cut:
+                sent.append(self.restart(rest[0].light, rest[0].t_ns))
+                continue
+            shot = list(takewhile(lambda frame: not frame.cut, rest))
+            light = self._memory.joined([self._memory.light(frame.light)[None] for frame in shot])
+            sent += self.steps(light, [frame.t_ns for frame in shot])
         return sent
 
     def _some(self, light: Any, t_ns: list[int]) -> list[Events]:

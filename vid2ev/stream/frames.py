@@ -20,6 +20,8 @@ class Frame:
     `light` is float32 and linear; 1.0 is diffuse white and brighter light goes on unclipped.  It is luminance [H, W]
     or, from a source opened with colour "rgb", red, green, blue [H, W, 3] of the primaries of BT.709; a colour that
     these cannot mix has a negative component, so that 0.2126 R + 0.7152 G + 0.0722 B is the luminance of any colour.
+    Light that is on a device is a tensor of torch (`stream.upload`) and is mixed and carried there.
+
     `t_ns` is the instant in nanoseconds on the clock of the source.  `original` is True for a frame of the source,
     False for one made between two of them.  `cut` is True where a new shot begins: what was seen before has nothing to
     do with it.  `depth`, where it is known, is float32 [H, W]: how far the scene is along the axis of the camera that
@@ -37,4 +39,9 @@ class Frame:
     @property
     def luminance(self) -> np.ndarray:
         """Luminance [H, W]; `light` itself where it is that."""
-        return self.light if self.light.ndim == 2 else self.light @ LUMINANCE
+        if self.light.ndim == 2:
+            return self.light
+        if isinstance(self.light, np.ndarray):
+            return self.light @ LUMINANCE
+        red, green, blue = self.light.unbind(-1)
+        return float(LUMINANCE[0]) * red + float(LUMINANCE[1]) * green + float(LUMINANCE[2]) * blue

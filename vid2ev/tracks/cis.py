@@ -11,6 +11,7 @@ from vid2ev.recording.exposures import ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.upload import downloaded
 
 
 class CisTrack:
@@ -34,7 +35,7 @@ class CisTrack:
     def add(self, frame: Frame) -> None:
         """The next frame, and the exposures that it completes."""
         self._begun = True
-        for exposure in self.cis.exposures(frame):
+        for exposure in self.cis.exposures(downloaded(frame)):
             self._files.add(exposure)
             self.last_us = exposure.end_ns // 1000
 

@@ -50,10 +50,11 @@ class DvsTrack:
         self._columns = EventColumns(folder, within, dvs.labels)
         self._film = Preview(dvs.size, folder.partial / within, wanted=outputs.preview, rate=rate)
         self._probe = Probe(outputs.probe, dvs.size[0]) if outputs.probe else None
+        self._waiting: list[Frame] = []  # until there are as many as the sensor takes at a time
 
     @property
     def events(self) -> int:
-        """Events so far."""
+        """Events so far, of the frames that the sensor has seen."""
         return self._columns.count
 
     def begin(self, frame: Frame) -> None:
@@ -67,15 +68,14 @@ class DvsTrack:
                 self._look_inside(frame, Events.empty())
 
     def add(self, frame: Frame) -> None:
-        """The next frame, and its events."""
-        events = self.dvs.see(frame)
-        self._append(events)
-        self._film.add(frame, events)
-        self._note(frame)
-        self._look_inside(frame, events)
+        """The next frame, and its events, now or with those of the next few."""
+        self._waiting.append(frame)
+        if self._probe or len(self._waiting) >= self.dvs.at_once:
+            self._see()
 
     def finish(self) -> None:
         """What the sensor held back."""
+        self._see()
         events = self.dvs.flush()
         self._append(events)
         self._film.finish(events)
@@ -83,7 +83,8 @@ class DvsTrack:
             self.folder.write(f"{self._within}{PROBE}", "".join(self._probe.event_lines(events)).encode())
 
     def close(self) -> None:
-        """End a piece of the preview."""
+        """Let the sensor see all frames, and end a piece of the preview."""
+        self._see()
         self._film.close()
 
     def state(self) -> dict[str, np.ndarray]:
@@ -131,6 +132,15 @@ class DvsTrack:
                 f" is {on:.3g} nat (ON) and {off:.3g} nat (OFF)"
             )
         return remarks
+
+    def _see(self) -> None:
+        """Show the sensor the frames that wait, and keep their events."""
+        frames, self._waiting = self._waiting, []
+        for frame, events in zip(frames, self.dvs.see_all(frames), strict=True):
+            self._append(events)
+            self._film.add(frame, events)
+            self._note(frame)
+            self._look_inside(frame, events)
 
     def _append(self, events: Events) -> None:
         self._columns.append(events)

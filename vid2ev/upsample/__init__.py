@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 
 from vid2ev.errors import UsageError
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.upload import Upload
 
 __all__ = ["METHODS", "Interval", "Upsampler", "make_upsampler"]
 
@@ -44,7 +45,11 @@ class Upsampler(Protocol):
 
 
 def make_upsampler(
-    method: str, subframes: Subframes = "auto", max_subframes: int = 64, threshold: float = 0.15
+    method: str,
+    subframes: Subframes = "auto",
+    max_subframes: int = 64,
+    threshold: float = 0.15,
+    upload: Upload | None = None,
 ) -> Upsampler:
     """The upsampler of a name.
 
@@ -55,6 +60,7 @@ def make_upsampler(
     subframes      steps per interval, or "auto": what motion and contrast call for (`subframes.py`), one if still
     max_subframes  the most that "auto" may take
     threshold      contrast threshold of the sensor [nat]: what changes much less asks for no frames
+    upload         to the device on which frames are made, as tensors; frames of the source may stay as they are
 
     Raises UsageError for an unknown method or a number that cannot be meant.
     """
@@ -71,7 +77,7 @@ def make_upsampler(
     if method == "linear":
         from vid2ev.upsample.linear import LinearUpsampling
 
-        return LinearUpsampling(1 if subframes == "auto" else subframes)
+        return LinearUpsampling(1 if subframes == "auto" else subframes, upload)
     from vid2ev.upsample.flow import FlowUpsampling
 
-    return FlowUpsampling(subframes, max_subframes, threshold)
+    return FlowUpsampling(subframes, max_subframes, threshold, upload)

@@ -24,7 +24,8 @@ import numpy as np
 
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still, strip_count
-from vid2ev.upsample import Interval
+from vid2ev.stream.upload import Upload
+from vid2ev.upsample import Interval, warp_tensors
 from vid2ev.upsample.proxies import agreement, finite, proxies
 from vid2ev.upsample.subframes import instants, steps_for
 from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
@@ -38,6 +39,7 @@ BLUR_PX, BLUR_TAPS = 1.0, 5  # of the sums of `splat`: closes the gaps between p
 AROUND = 9  # pixels whose change is averaged
 FAST_PERCENTILE = 95.0
 FEWEST = 16  # pixels that change; fewer are noise
+AT_ONCE = 1 << 23  # pixels made at a time on a device, where each takes some 200 bytes of its memory
 
 
 class Motion(NamedTuple):
@@ -56,10 +58,14 @@ class FlowUpsampling:
     subframes      steps per interval, or "auto"
     max_subframes  the most that "auto" takes
     threshold      contrast threshold [nat]: motion is measured where log light changes by half of it or more
+    upload         to the device on which light is carried; motion is estimated on the CPU all the same
     """
 
-    def __init__(self, subframes: int | Literal["auto"], max_subframes: int, threshold: float):
+    def __init__(
+        self, subframes: int | Literal["auto"], max_subframes: int, threshold: float, upload: Upload | None = None
+    ):
         self.subframes, self.max_subframes, self.threshold = subframes, max_subframes, threshold
+        self._upload = upload
         self._dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_FAST)  # type: ignore[attr-defined]
         self._dis.setFinestScale(0)
         self._dis.setPatchStride(5)
@@ -75,8 +81,10 @@ class FlowUpsampling:
         asked = steps_for(motion.shift_px, (b.t_ns - a.t_ns) * 1e-9)
         steps = min(asked, self.max_subframes) if self.subframes == "auto" else self.subframes
         limited = self.subframes == "auto" and asked > self.max_subframes
-        frames = carried(a, b, motion, steps) if steps > 1 else iter([b])
-        return Interval(frames, limited, motion.shift_px)
+        if steps == 1:
+            return Interval(iter([b]), limited, motion.shift_px)
+        made = carried_there(a, b, motion, steps, self._upload) if self._upload else carried(a, b, motion, steps)
+        return Interval(made, limited, motion.shift_px)
 
     def _motion(self, before: np.ndarray, after: np.ndarray) -> Motion:
         """Motion between two images of light [H, W]."""
@@ -115,6 +123,27 @@ def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
         yield Frame(light, t_ns, original=False, still=Still(last, is_still & was_still))
         last, was_still = light, is_still
     yield b if last is a.light else replace(b, still=Still(last, was_still))
+
+
+def carried_there(a: Frame, b: Frame, motion: Motion, steps: int, upload: Upload) -> Iterator[Frame]:
+    """`carried` on a device, some instants at a time: what goes there is the light of a and b, and the motion."""
+    before, after = (warp_tensors.with_margin(upload.light(frame.light)) for frame in (a, b))
+    forward, backward, sure_before, sure_after = map(upload.tensor, motion[:4])
+    (height, width), (rows, columns) = a.light.shape[:2], motion.sure_before.shape
+    times_ns = instants(a.t_ns, b.t_ns, steps)
+    some = max(1, AT_ONCE // (height * width))
+    for first in range(0, len(times_ns), some):
+        shares = [(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns[first : first + some]]
+        time = upload.tensor(np.array(shares, np.float32))[:, None, None]
+        thrown = warp_tensors.splat(forward, sure_before, float(UNSURE), time, 1.0, 1 - time)
+        other = warp_tensors.splat(backward, sure_after, float(UNSURE), 1 - time, -1.0, time)
+        x, y, share = warp_tensors.settle(thrown, other, BLUR_TAPS, BLUR_PX, time, float(ENOUGH))
+        moving = x * (width / columns), y * (height / rows), share
+        x, y, share = (warp_tensors.enlarged(plane, (width, height)) for plane in moving)
+        light = warp_tensors.carry(before, after, (x, y, share), time)
+        for t_ns, frame in zip(times_ns[first : first + some], light, strict=True):
+            yield Frame(frame[..., 0] if a.light.ndim == 2 else frame, t_ns, original=False)
+    yield upload.frame(b)
 
 
 def channels_of(light: np.ndarray) -> list[np.ndarray]:

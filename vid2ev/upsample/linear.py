@@ -9,30 +9,40 @@ import numpy as np
 
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
+from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval
 from vid2ev.upsample.stillness import still_strips
 from vid2ev.upsample.subframes import instants
 
 
 class LinearUpsampling:
-    """A fixed number of steps per interval, each pixel on its own."""
+    """A fixed number of steps per interval, each pixel on its own; on a device, if there is an `upload` to it."""
 
-    def __init__(self, subframes: int):
-        self.subframes = subframes
+    def __init__(self, subframes: int, upload: Upload | None = None):
+        self.subframes, self._upload = subframes, upload
 
     def between(self, a: Frame, b: Frame) -> Interval:
         """The frames after a up to and including b."""
-        return Interval(self._faded(a, b))
+        if self.subframes == 1:
+            return Interval(iter([b]))
+        return Interval(self._faded_there(a, b, self._upload) if self._upload else self._faded(a, b))
 
     def _faded(self, a: Frame, b: Frame) -> Iterator[Frame]:
-        if self.subframes == 1:
-            yield b
-            return
         last, still = a.light, still_strips(a.light, b.light)
-        for t_ns in instants(a.t_ns, b.t_ns, self.subframes):
-            share = np.float32((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
+        for t_ns, share in self._shares(a, b):
             with np.errstate(invalid="ignore"):  # (what is not finite is the sensor's to mend and to count)
-                light = a.light + share * (b.light - a.light)
+                light = a.light + np.float32(share) * (b.light - a.light)
             yield Frame(light, t_ns, original=False, still=Still(last, still))
             last = light
         yield replace(b, still=Still(last, still))
+
+    def _faded_there(self, a: Frame, b: Frame, upload: Upload) -> Iterator[Frame]:
+        before, after = upload.light(a.light), upload.light(b.light)
+        for t_ns, share in self._shares(a, b):
+            yield Frame(before + share * (after - before), t_ns, original=False)
+        yield upload.frame(b)
+
+    def _shares(self, a: Frame, b: Frame) -> Iterator[tuple[int, float]]:
+        """The instants in between [ns], and the share of the interval gone by at each."""
+        for t_ns in instants(a.t_ns, b.t_ns, self.subframes):
+            yield t_ns, (t_ns - a.t_ns) / (b.t_ns - a.t_ns)
