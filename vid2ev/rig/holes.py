@@ -5,7 +5,7 @@ these four, those on the farthest surface count, in proportion to 1 / distance**
 shows what is behind it.  Pixels that see nothing in their row or column take what their filled neighbours have.
 
 What is filled in that way is streaked.  It is made smooth by means over three by three pixels of the hole and the same
-surface, several times: streaks would flicker when things move.
+surface, several times, of all pixels at once: streaks would flicker when things move.
 
 The pixel at the rim of a hole is often a mixture with the thing in front, because the photograph's lens and pixels mix
 there; `inset` looks so many pixels further on, where these are of the same surface.
@@ -13,6 +13,7 @@ there; `inset` looks so many pixels further on, where these are of the same surf
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +30,9 @@ SPREAD = F(0.1)  # or up to this share of the way from the farthest to the neare
 
 
 class Fill(NamedTuple):
-    """How holes are filled: each pixel as a sum of others, in this order, since later ones take from earlier ones."""
+    """How holes are filled: each pixel as a sum of others, round by round, since later ones take from earlier ones."""
 
+    rounds: tuple[int, ...]  # where in `holes` each round ends, 0 before the first
     holes: np.ndarray  # [n] flat index of the pixel
     sources: np.ndarray  # [n, 4] flat indices of those it is made of; -1 for none
     weights: np.ndarray  # [n, 4] float32, which sum to 1
@@ -54,18 +56,20 @@ def fill_of(inverse: np.ndarray, inset: int = 0) -> Fill:
         rounds.append((holes[seen], hits[seen], weights[seen]))
         _apply(*rounds[-1], found.reshape(-1, 1))
         holes = holes[~seen]
+    ends = tuple(np.cumsum([len(filled) for filled, _, _ in rounds]).tolist())
     holes, sources, weights = (np.concatenate(parts) for parts in zip(*rounds, strict=True))
     around = np.full((holes.size, 9), NOTHING, np.int64)
     _find_around(inverse, found, holes, around)
     shares = (around != NOTHING).astype(F)
-    return Fill(holes, sources, weights, around, shares / shares.sum(axis=1, keepdims=True))
+    return Fill(ends, holes, sources, weights, around, shares / shares.sum(axis=1, keepdims=True))
 
 
 def apply_fill(fill: Fill, picture: np.ndarray, smoothings: int = 0) -> None:
     """Fill the holes of a picture [h, w, C] float32, contiguous, in place, and make smooth what is filled in."""
     if fill.holes.size:
         pixels = picture.reshape(-1, picture.shape[2])
-        _apply(fill.holes, fill.sources, fill.weights, pixels)
+        for first, last in pairwise(fill.rounds):
+            _apply(fill.holes[first:last], fill.sources[first:last], fill.weights[first:last], pixels)
         for _ in range(smoothings):
             _apply(fill.holes, fill.around, fill.shares, pixels)
 
@@ -142,6 +146,7 @@ def _find_around(inverse, filled, holes, around):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _apply(holes, sources, weights, pixels):
+    filled = np.empty((holes.size, pixels.shape[1]), np.float32)
     for k in range(holes.size):
         for c in range(pixels.shape[1]):
             base, total = F(np.nan), F(0)
@@ -151,4 +156,6 @@ def _apply(holes, sources, weights, pixels):
                     if base != base:
                         base = light
                     total += weights[k, way] * (light - base)  # (differences: flat light stays exactly flat)
-            pixels[holes[k], c] = base + total
+            filled[k, c] = base + total
+    for k in range(holes.size):
+        pixels[holes[k]] = filled[k]

@@ -94,17 +94,23 @@ def _place(x, y, width, height, shares, firsts, owns):
         across, down = min(max(x[i], _ZERO), x_last), min(max(y[i], _ZERO), y_last)
         left, top = np.int32(across), np.int32(down)
         a, b = across - F(left), down - F(top)
-        a1, b1 = _ONE - a, _ONE - b
-        x0, x3, y0, y3 = _SIXTH * a1 * a1 * a1, _SIXTH * a * a * a, _SIXTH * b1 * b1 * b1, _SIXTH * b * b * b
-        x1, y1 = _TWO_THIRDS - a * a * (_ONE - _HALF * a), _TWO_THIRDS - b * b * (_ONE - _HALF * b)
-        shares[i, 0], shares[i, 1], shares[i, 2], shares[i, 3] = x0, x1, _ONE - x0 - x1 - x3, x3
-        shares[i, 4], shares[i, 5], shares[i, 6], shares[i, 7] = y0, y1, _ONE - y0 - y1 - y3, y3
+        shares[i, 0], shares[i, 1], shares[i, 2], shares[i, 3] = spline_weights(a)
+        shares[i, 4], shares[i, 5], shares[i, 6], shares[i, 7] = spline_weights(b)
         firsts[i] = (top + (MARGIN - 1)) * (width + 2 * MARGIN) + left + (MARGIN - 1)
         owns[i] = (top + (b >= _HALF)) * width + left + (a >= _HALF)
 
 
 @njit(nogil=True, error_model="numpy", inline="always")
-def _keys(a):
+def spline_weights(a):
+    """The weights of four splines for a place a beyond the second."""
+    b = _ONE - a
+    w0, w3 = _SIXTH * b * b * b, _SIXTH * a * a * a
+    w1 = _TWO_THIRDS - a * a * (_ONE - _HALF * a)
+    return w0, w1, _ONE - w0 - w1 - w3, w3
+
+
+@njit(nogil=True, error_model="numpy", inline="always")
+def keys_weights(a):
     """The weights of four pixels for a place a beyond the second (Keys, a = -1/2)."""
     b = _ONE - a
     w0, w3 = -_HALF * a * b * b, -_HALF * a * a * b
@@ -125,7 +131,7 @@ def _sample_beside_cuts(pixels, x, y, near_cut, inverse, steep, begin, end, out)
             if not near_cut[own_y, own_x]:
                 continue
             left, top, depth, count = int(across), int(down), inverse[own_y, own_x], 0
-            weights_x, weights_y = _keys(across - F(left)), _keys(down - F(top))
+            weights_x, weights_y = keys_weights(across - F(left)), keys_weights(down - F(top))
             for m in range(4):
                 row = min(max(top + m - 1, 0), height - 1)
                 for n in range(4):

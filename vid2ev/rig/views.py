@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,16 +33,18 @@ from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.rig.sampling import pixel_means, sampled
 from vid2ev.rig.spline import Spline
 from vid2ev.rig.surface import Corners, Surface, corners_of, seen_of, surface_of
+from vid2ev.rig.tensor_spline import spline_of
+from vid2ev.rig.tensor_views import TensorLook
 
 INSET_PX = 2  # of the camera: what fills a hole comes from so far beyond its rim
-SMOOTHINGS = 4
+SMOOTHINGS = 5
 NEAREST_M = 1e-6  # depth below counts as zero
 
 
 class View(NamedTuple):
     """What a camera sees."""
 
-    light: np.ndarray  # [h, w] or [h, w, 3] float32
+    light: Any  # [h, w] or [h, w, 3] float32; of a tensor a tensor
     valid: np.ndarray  # [h, w] bool: all of the pixel is seen by the source as well
 
 
@@ -78,6 +80,7 @@ class Views:
     ):
         self.source, self.cameras, self.plane_m = source, list(cameras), plane_m
         self._bands = Bands(threads)
+        self._same = [is_same(source, *camera) for camera in self.cameras]
         self._far = [self._look_at_plane(*camera, math.inf, samples) for camera in self.cameras]
         self._fixed: list[Look | None] = [None] * len(self.cameras)
         for k, (camera, pose) in enumerate(self.cameras):
@@ -89,33 +92,53 @@ class Views:
         self._depth_m = np.zeros(0, np.float32)
         self._looks: list[Look | None] = []
         self._spline: Spline | None = None
+        self._uploaded: dict[int, tuple[Look, TensorLook]] = {}
 
     def needs_depth(self) -> bool:
         """Whether a camera has a translation, and there is no plane."""
         return any(look is None for look in self._fixed)
 
-    def see(self, light: np.ndarray, depth_m: np.ndarray | None = None) -> list[View]:
+    def see(self, light: Any, depth_m: np.ndarray | None = None) -> list[View]:
         """What each camera sees of light [h, w] or [h, w, 3] of the source; depth [h, w] m, used instead of a plane.
 
+        Light that is a tensor of torch is sampled on its device, the same to a few units in the last place of float32.
         As long as the depth stays the same from call to call, only light is sampled anew.  Raises UsageError for
         another size than the source's, and without a depth that is needed.
         """
         self._check(light, "light")
         looks = self.looks(depth_m)
-        if not all(is_same(self.source, *camera) for camera in self.cameras):
-            self._fit(light)
-        views = []
-        for (camera, pose), look in zip(self.cameras, looks, strict=True):
-            if is_same(self.source, camera, pose):
-                views.append(View(light, look.valid))
-                continue
-            assert self._spline
+        others = {k: look for k, look in enumerate(looks) if not self._same[k]}
+        sample = self._sampled if isinstance(light, np.ndarray) else self._sampled_on_device
+        seen = sample(light, others) if others else {}
+        return [View(seen.get(k, light), look.valid) for k, look in enumerate(looks)]
+
+    def _sampled(self, light: np.ndarray, looks: dict[int, Look]) -> dict[int, np.ndarray]:
+        """Light of an array, as cameras see it."""
+        self._fit(light)
+        assert self._spline
+        seen = {}
+        for k, look in looks.items():
             fine = sampled(self._spline, look.places.x, look.places.y, self._bands, *look.cuts)
             if look.fill is not None:
                 apply_fill(look.fill, fine, SMOOTHINGS)
-            seen = pixel_means(fine, len(look.places.x) // camera.size[1])
-            views.append(View(seen if light.ndim == 3 else seen[..., 0], look.valid))
-        return views
+            seen[k] = pixel_means(fine, self._samples(k, look)).reshape(*look.valid.shape, *light.shape[2:])
+        return seen
+
+    def _sampled_on_device(self, light: Any, looks: dict[int, Look]) -> dict[int, Any]:
+        """Light of a tensor, as cameras see it."""
+        spline, seen = spline_of(light), {}
+        for k, look in looks.items():
+            if k not in self._uploaded or self._uploaded[k][0] is not look:
+                x, y, _ = look.places
+                there = TensorLook(self.source.size, x, y, self._samples(k, look), look.fill, look.cuts, light.device)
+                self._uploaded[k] = look, there
+            view = self._uploaded[k][1].light(spline, SMOOTHINGS)
+            seen[k] = view.reshape(*look.valid.shape, *light.shape[2:])
+        return seen
+
+    def _samples(self, k: int, look: Look) -> int:
+        """Places across each pixel of a camera."""
+        return len(look.places.x) // self.cameras[k][0].size[1]
 
     def looks(self, depth_m: np.ndarray | None = None) -> list[Look]:
         """How the view of each camera is made."""
@@ -155,7 +178,7 @@ class Views:
         (camera, pose), far = self.cameras[k], self._far[k]
         if not pose.translation_m.any():
             return far
-        samples = len(far.places.x) // camera.size[1]
+        samples = self._samples(k, far)
         fine = camera.scaled_to((camera.size[0] * samples, camera.size[1] * samples)) if samples > 1 else camera
         x, y, inverse = seen_of(surface, fine, pose, self._bands)
         seen = inverse >= 0
