@@ -14,6 +14,9 @@ stay there, 16 frames at a time; the median of some runs, the card awaited befor
 The roofline is what must be moved of a pixel and frame: its light once (4 bytes), its state in and out once for 16
 frames; the share is that over the time, against a copy measured on the same card.
 
+Rendered: the pictures of a scene at 1280x720, 960 a second, painted on the card and seen there by the sensor `paper`,
+from the numbers of the world on the host to the events; and the painting alone.
+
 Last it prints the numbers by which `--device auto` chooses, as `vid2ev/sensors/devices.py` has them: nanoseconds for a
 pixel and step on a thread of the CPU and on the card, light carried along motion and the sensor `paper`, and what it
 takes until a card has made its first events.
@@ -36,6 +39,7 @@ SIZES = {"346x260": (346, 260), "1280x720": (1280, 720), "3840x2160": (3840, 216
 FRAMES, RUNS, FRAME_NS = 16, 7, 1_000_000
 BEGIN, END = "<!-- gpu: begin -->", "<!-- gpu: end -->"
 STEPS = 17  # from frame to frame, as many as `--subframes auto` takes of eight clips (the median)
+SCENES, SCENE_FPS, PICTURES = ("spinning-shapes", "room", "close-object"), 960, 64
 CLIPS, CLIP_FRAMES = 64, 256  # of training: 256x256, 9 frames of truth and 32 steps between each two
 
 
@@ -184,6 +188,66 @@ def step_ns(memory: Any | None) -> float:
     return 1e9 * statistics.median(taken[1:]) / (size[0] * size[1] * STEPS)
 
 
+def picture_parity(memory: Any, size: tuple[int, int]) -> list[str]:
+    """A line for each scene: how far its picture and flow are from those of the CPU."""
+    from vid2ev.scenes.reel_on_card import ReelOnCard
+    from vid2ev.scenes.scene_file import scene_names
+    from vid2ev.scenes.world import World
+
+    lines = []
+    for name in scene_names():
+        world = World.of(name, settings=[f"camera.size={list(size)}"])
+        times = world.duration_ns // 3, world.duration_ns // 2
+        reel = ReelOnCard(world, memory)
+        ours, theirs = next(iter(reel.pictures(times[:1]))), world.render(times[0])
+        there, flow = reel.flow(*times, ours), world.flow(*times, theirs)
+        pairs = {"light": (ours.light, theirs.light), "depth": (ours.depth, theirs.depth), "flow": (there[0], flow[0])}
+        off = [f"{what} {apart(memory.get(one) if what != 'flow' else one.cpu().numpy(), other)}"
+               for what, (one, other) in pairs.items()]  # fmt: skip
+        lines.append(f"{name}: {', '.join(off)}")
+    return lines
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> str:
+    """In how many numbers two arrays differ, and by how much at most."""
+    differs = ~((one == other) | (np.isnan(one) & np.isnan(other)))
+    return f"{differs.sum()} differ" + (f", by {np.abs(one - other)[differs].max():.2g}" if differs.any() else "")
+
+
+def rendered(torch: Any, memory: Any, name: str) -> str:
+    """How many times faster than real time a scene becomes events, and pictures alone."""
+    from vid2ev.scenes.reel_on_card import ReelOnCard
+    from vid2ev.scenes.world import World
+    from vid2ev.sensors.dvs_on_card import DvsOnCard
+    from vid2ev.stream.frames import Frame
+
+    size = SIZES["1280x720"]
+    world = World.of(name, settings=[f"camera.size={list(size)}"])
+    reel, card = ReelOnCard(world, memory), DvsOnCard(sensors()["paper"], size, 1, memory=memory)
+    instants_ns, clock = [k * 10**9 // SCENE_FPS for k in range(PICTURES)], [0]
+
+    def light() -> Any:
+        for picture, t_ns in zip(reel.pictures(instants_ns), instants_ns, strict=True):
+            yield Frame(torch.as_tensor(picture.light), t_ns).luminance
+
+    def paint() -> None:
+        for _ in light():
+            pass
+
+    def convert() -> None:
+        seen = list(light())
+        t_ns = [clock[0] + t for t in instants_ns]
+        clock[0] += 2 * instants_ns[-1]
+        card.restart(seen[0], t_ns[0])
+        for k in range(1, len(seen), FRAMES):
+            card.steps(torch.stack(seen[k : k + FRAMES]), t_ns[k : k + FRAMES])
+
+    real_s = PICTURES / SCENE_FPS
+    return (
+        f"rendered {name}: {real_s / seconds(torch, convert):.2f} x real time, {real_s / seconds(torch, paint):.2f} x"
+    )
+
+
 def copy_speed(torch: Any) -> float:
     """Bytes a second that a copy moves, both ways counted."""
     source = torch.zeros(1 << 28, device="cuda")
@@ -209,6 +273,7 @@ def main(into: Path | None, simulated: bool) -> None:
 
     if simulated:
         click.echo("\n".join(parity(memory_of("simulated"), (23, 11), 6)))
+        click.echo("\n".join(picture_parity(memory_of("simulated"), (14, 14))))
         return
     if missing := missing_for_cuda():
         click.echo(f"no GPU: {missing}; nothing of it is measured\nCPU_NS = {step_ns(None):.1f}")
@@ -218,6 +283,8 @@ def main(into: Path | None, simulated: bool) -> None:
     memory = memory_of("cuda")
     started = start_s(memory)
     click.echo("\n".join(parity(memory, SIZES["346x260"], 40)))
+    click.echo("\n".join(picture_parity(memory, SIZES["346x260"])))
+    click.echo("\n".join(rendered(torch, memory, name) for name in SCENES))
     copied = copy_speed(torch)
     rows = [
         speed(torch, memory, name, spec, size, kind, copied)

@@ -39,19 +39,24 @@ def details_of(snapshot: Snapshot, world: World, intrinsics: Intrinsics, camera:
 def places_of_details(snapshot: Snapshot, world: World, intrinsics: Intrinsics, camera: Pose) -> np.ndarray:
     """Those pixels one by one, int64 [n, 2], column and line; some may be there twice."""
     size = intrinsics.size[0] + 2, intrinsics.size[1] + 2
-    found = [np.zeros((0, 2), np.int64)]
-    focal = max(intrinsics.focal_px)
-    back = camera.inverse()
+    focal, back, points, kinds = max(intrinsics.focal_px), camera.inverse(), [np.zeros((0, 3))], ["mesh"]
+    found = []
     for thing, (x, y, z, radius) in zip(snapshot.things, world.ball, strict=True):
         if z - radius > 0 and radius * focal / z < SMALL_PX:
             centre = pixels_of(np.array([[x, y, z]]), intrinsics)
-            found += _around(centre, radius * focal / z + 1, size)
+            found.append(_around(centre, radius * focal / z + 1, size))
         elif (corners := _corners(thing)) is not None:
             here = back @ thing.pose
-            found += _around_corners(pixels_of(here.apply(corners), intrinsics), thing.shape.kind, size)
+            points.append(here.apply(corners))
+            kinds.append(thing.shape.kind)
             if thing.shape.kind == "cylinder":
-                rims = _rim_ends(thing, here.inverse().translation_m)
-                found += _around(pixels_of(here.apply(rims), intrinsics), AROUND, size)
+                points.append(here.apply(_rim_ends(thing, here.inverse().translation_m)))
+                kinds.append("mesh")
+    spots = np.split(pixels_of(np.concatenate(points), intrinsics), np.cumsum([len(some) for some in points[:-1]]))
+    sharp = [some for some, kind in zip(spots, kinds, strict=True) if kind != "cylinder"]
+    edges = [_thin_edges(some, size) for some, kind in zip(spots, kinds, strict=True) if kind != "mesh"]
+    found.append(_around(np.concatenate(sharp), AROUND, size))
+    found.append(_around(np.concatenate([np.zeros((0, 2)), *edges]), 0.5, size))
     return np.concatenate(found)
 
 
@@ -77,24 +82,22 @@ def _rim_ends(thing: Thing, eye: np.ndarray) -> np.ndarray:
     return np.concatenate([np.column_stack([around, [z, z]]) for z in (-half[2], half[2])])
 
 
-def _around_corners(corners: np.ndarray, kind: str, size: tuple[int, int]) -> list[np.ndarray]:
-    found = [] if kind == "cylinder" else _around(corners, AROUND, size)
-    if kind == "mesh" or not np.isfinite(corners).all():
-        return found
+def _thin_edges(corners: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Places [n, 2, px] along the edges between eight corners, if these are of a thing that is thin."""
     import cv2
 
-    _, sides, _ = cv2.minAreaRect(np.clip(corners, -1e6, 1e6).astype(np.float32))
-    if min(sides) < THIN_PX and max(sides) < 4 * max(size):
-        share = np.linspace(0, 1, int(2 * max(sides)) + 2)[:, None, None]
-        edges = corners[EDGES[:, 0]] * share + corners[EDGES[:, 1]] * (1 - share)
-        found += _around(edges.reshape(-1, 2), 0.5, size)
-    return found
+    if np.isfinite(corners).all():
+        _, sides, _ = cv2.minAreaRect(np.clip(corners, -1e6, 1e6).astype(np.float32))
+        if min(sides) < THIN_PX and max(sides) < 4 * max(size):
+            share = np.linspace(0, 1, int(2 * max(sides)) + 2)[:, None, None]
+            return (corners[EDGES[:, 0]] * share + corners[EDGES[:, 1]] * (1 - share)).reshape(-1, 2)
+    return np.zeros((0, 2))
 
 
-def _around(places: np.ndarray, around: float, size: tuple[int, int]) -> list[np.ndarray]:
+def _around(places: np.ndarray, around: float, size: tuple[int, int]) -> np.ndarray:
     """The pixels of a canvas of this size within `around` of places [n, 2, px], as a square."""
     steps = 1.5 + np.minimum(np.arange(-around, around + min(1.0, 2 * around), min(1.0, 2 * around)), around)
     columns, lines = (np.floor(np.add.outer(steps, places[:, axis])) for axis in range(2))
     columns, lines = np.broadcast_arrays(columns[:, None], lines[None])
     inside = (columns >= 0) & (columns < size[0]) & (lines >= 0) & (lines < size[1])
-    return [np.stack([columns[inside], lines[inside]], axis=1).astype(np.int64)]
+    return np.stack([columns[inside], lines[inside]], axis=1).astype(np.int64)

@@ -48,12 +48,10 @@ def flow(
     motions, (width, height) = motions_between(snapshot0, pose0, snapshot1, pose1), intrinsics.size
     plane, seen = np.empty((height, width, 2)), np.empty((height, width), np.uint8)
     carry_all(
-        numbers_of(snapshot1, pose1), motions, rays_of_pixels(intrinsics), picture0.depth, picture0.thing, plane, seen,
+        numbers_of(snapshot1, pose1), rays_of_pixels(intrinsics), picture0.depth, picture0.thing, motions, plane, seen,
         np.empty(STACK, np.int64),
     )  # fmt: skip
-    there = bent(plane, intrinsics)
-    shift = there - pixel_grid(intrinsics.size)
-    return Flow(shift.astype(np.float32), within(there, intrinsics.size) & (seen != 0))
+    return flow_to(bent(plane, intrinsics), seen, pixel_grid(intrinsics.size))
 
 
 def motions_between(snapshot0: Snapshot, pose0: Pose, snapshot1: Snapshot, pose1: Pose) -> np.ndarray:
@@ -70,7 +68,11 @@ def motions_between(snapshot0: Snapshot, pose0: Pose, snapshot1: Snapshot, pose1
     return np.array([np.column_stack([motion.rotation, motion.translation_m]) for motion in motions])
 
 
-def within(px: Any, size: tuple[int, int]) -> Any:
-    """Which places [..., 2] are within a picture of this size: arrays of numpy or torch."""
-    width, height = size
-    return (abs(px[..., 0] - (width - 1) / 2) <= width / 2) & (abs(px[..., 1] - (height - 1) / 2) <= height / 2)
+def flow_to(there: Any, seen: Any, grid: Any) -> Flow:
+    """The flow to places [H, W, 2 px] of which some are `seen`, from all pixels: arrays of numpy, or tensors."""
+    height, width = seen.shape
+    inside = abs(there[..., 0] - (width - 1) / 2) <= width / 2
+    inside = inside & (abs(there[..., 1] - (height - 1) / 2) <= height / 2)
+    shift = there - grid
+    single = shift.astype(np.float32) if isinstance(shift, np.ndarray) else shift.float()
+    return Flow(single, inside & (seen != 0))

@@ -13,15 +13,18 @@ import numpy as np
 
 from vid2ev.kernels.cuda.build import Build
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import bent_tensor, pixel_grid
+from vid2ev.scenes.flow import Flow, flow_to
 from vid2ev.scenes.lens import rays_of_pixels
-from vid2ev.scenes.rays.cuda.easel import STILL, Easel, Listed
+from vid2ev.scenes.rays.cuda.easel import STILL, Carried, Easel, Listed
 from vid2ev.scenes.rays.layout import World
 from vid2ev.scenes.rays.tiles import TILE
 from vid2ev.scenes.render import Picture, cells_of, tiles_of
 
 AT_A_TIME = 16  # pictures
+PIXELS = 1 << 24  # of all that are painted together, half a gigabyte: of large ones, fewer
 LISTS = 1 << 25  # numbers of things in the lists of all tiles, a quarter of a gigabyte: of many things, fewer pictures
-CARD = {"vid2ev.scenes.rays.compiler": "vid2ev.scenes.rays.cuda.device_compiler"}
+CARD, BUILT_ANEW = {"vid2ev.scenes.rays.compiler": "vid2ev.scenes.rays.cuda.device_compiler"}, ("vid2ev.scenes.rays",)
 SIMULATED = {"vid2ev.kernels.cuda.machine": "vid2ev.kernels.cuda.simulated_machine"}
 
 
@@ -64,14 +67,14 @@ class PainterOnCard:
     """
 
     def __init__(self, memory: Any, intrinsics: Intrinsics, samples: int):
-        self._memory, self._size, self._samples = memory, intrinsics.size, samples
+        self._memory, self._intrinsics, self._size, self._samples = memory, intrinsics, intrinsics.size, samples
         self._kernels = _kernels(memory.name, cells_of(samples))
         self._worlds, self._rays = WorldsOnCard(memory), memory.put(rays_of_pixels(intrinsics))
 
     def at_a_time(self, things: int) -> int:
         """How many pictures of so many things are painted at a time."""
-        down, across = tiles_of(self._size)
-        return max(1, min(AT_A_TIME, LISTS // max(1, down * across * things)))
+        (width, height), (down, across) = self._size, tiles_of(self._size)
+        return max(1, min(AT_A_TIME, PIXELS // (width * height), LISTS // max(1, down * across * things)))
 
     def paint(self, worlds: Sequence[World], details: Sequence[np.ndarray]) -> list[Picture]:
         """The pictures of some worlds, with their `places_of_details`, as arrays of the device.
@@ -88,6 +91,21 @@ class PainterOnCard:
             self._memory.launch(kernels.mixing, pixels, there, easel, listed)
             self._memory.launch(kernels.smooth, count * self._size[0] * self._size[1], there, easel, listed)
         return [Picture(easel.light[k], easel.depth[k, 1:-1, 1:-1], easel.thing[k]) for k in range(count)]
+
+    def flow(self, picture: Picture, then: World, motions: np.ndarray) -> Flow:
+        """Where the points of one of these pictures are in a world at another instant, after `flow.motions_between`.
+
+        Tensors of torch, on the device.
+        """
+        import torch
+
+        (width, height), memory = self._size, self._memory
+        plane, seen = memory.zeros((height, width, 2), np.float64), memory.zeros((height, width), np.uint8)
+        carried = Carried(self._rays, memory.light(picture.depth), picture.thing, memory.put(motions), plane, seen)
+        memory.launch(self._kernels.carry, width * height, self._worlds.put([then]), carried)
+        there = bent_tensor(torch.as_tensor(plane), self._intrinsics)
+        grid = torch.as_tensor(pixel_grid(self._size)).to(there)
+        return flow_to(there, torch.as_tensor(seen), grid)
 
     def _easel(self, details: Sequence[np.ndarray]) -> Easel:
         """What as many pictures are painted on, their details marked."""
@@ -112,5 +130,5 @@ class PainterOnCard:
 @cache
 def _kernels(kind: str, cells: tuple[int, int]) -> Any:
     """The kernels of a kind of memory; a simulated GPU calls the laws as they are compiled for a CPU."""
-    build = Build(SIMULATED, ()) if kind == "simulated" else Build(CARD, ("vid2ev.scenes.rays",))
+    build = Build(SIMULATED, ()) if kind == "simulated" else Build(CARD, BUILT_ANEW)
     return build.module("vid2ev.scenes.rays.cuda.kernels").kernels_of(cells)

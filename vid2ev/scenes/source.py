@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -35,8 +36,10 @@ class Request(NamedTuple):
 class SceneSource:
     """Frames of a world, as the reference camera sees it.
 
-    name   what it was opened by
-    fps    frames per second, instead of instants that follow the motion
+    name    what it was opened by
+    fps     frames per second, instead of instants that follow the motion
+    memory  of the device that paints the frames (`vid2ev.kernels.cuda.memory`), whose light is then a tensor of torch;
+            None for the CPU.  A world with a renderer of its own is not painted there
 
     Raises UsageError for a rate that cannot be meant.
     """
@@ -57,6 +60,7 @@ class SceneSource:
         self.size = world.intrinsics.size
         self._fps = None if fps is None else rate_of(fps)
         self._finer = 1.0
+        self.memory: Any = None
 
     @cached_property
     def instants(self) -> Instants:
@@ -108,14 +112,27 @@ class SceneSource:
 
     def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
         """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
+        instants_ns = self.instants_between(since_ns, until_ns, start)
+        if self.memory is not None and self.world.renderer is None:
+            return (yield from self._painted(instants_ns))
         reel = Reel(self.world)
         before: np.ndarray = np.empty(0)
-        for k in self._indices(since_ns, until_ns, start):
-            t_ns = self.instants[k]
+        for t_ns in instants_ns:
             picture, still = reel.picture(t_ns)
             light = picture.light if self.colour == "rgb" else picture.light @ LUMINANCE
             yield Frame(light, t_ns, still=None if still is None else Still(before, still))
             before = light
+
+    def _painted(self, instants_ns: list[int]) -> Iterator[Frame]:
+        """The frames at these instants, from a device."""
+        import torch
+
+        from vid2ev.scenes.reel_on_card import ReelOnCard
+
+        for t_ns, picture in zip(instants_ns, ReelOnCard(self.world, self.memory).pictures(instants_ns), strict=True):
+            light: Any = torch.as_tensor(picture.light)
+            frame = Frame(light, t_ns)
+            yield frame if self.colour == "rgb" else replace(frame, light=frame.luminance)
 
     def instants_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> list[int]:
         """The instants [ns] from `since_ns` to `until_ns`, both included, None without end; from index `start` on."""

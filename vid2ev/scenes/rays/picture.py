@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from vid2ev.scenes.rays.carry import carry
 from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.edges import light_of_parts, measure
 from vid2ev.scenes.rays.layout import JUMP, MESH, THING
@@ -48,6 +49,14 @@ def smooth(world, rays, line, column, cells, details, count, light, scratch):
     light[line - 1, column - 1, 0] = r
     light[line - 1, column - 1, 1] = g
     light[line - 1, column - 1, 2] = b
+
+
+@law
+def carry_pixel(world, line, column, rays, depth, thing, motions, plane, seen, stack):
+    """Where the point of a pixel (line 0 is the first of the picture) is at another instant."""
+    x, y = rays[line + 1, column + 1, 0], rays[line + 1, column + 1, 1]
+    there_x, there_y, visible = carry(world, motions, x, y, depth[line, column], thing[line, column], stack)
+    plane[line, column, 0], plane[line, column, 1], seen[line, column] = there_x, there_y, visible
 
 
 @law

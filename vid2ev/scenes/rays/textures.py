@@ -32,19 +32,22 @@ def colour_of(world, picture, u, v, ux, vx, uy, vy, wraps_u, wraps_v):
     long_u, long_v, long, short = axes(ux * width, vx * height, uy * width, vy * height)
     if not long < 1e9:
         long_u, long_v, long, short = 0.0, 0.0, 1e9, 1e9
-    if long <= 1.0:
-        return of_level(world, first, u, v, wraps_u, wraps_v)
     texel = max(short, long / LONGEST, 1.0)
     whole, size = 0, 1.0
     while 2.0 * size <= texel and whole + 1 < count:
         whole, size = whole + 1, 2.0 * size
     long_u, long_v = long_u / width, long_v / height
-    red, green, blue = along(world, first + whole, u, v, long_u, long_v, long, texel, wraps_u, wraps_v)
-    rest = texel / size - 1.0
-    if rest > 0.0 and whole + 1 < count:
-        r, g, b = along(world, first + whole + 1, u, v, long_u, long_v, long, 2.0 * size, wraps_u, wraps_v)
-        red, green, blue = red + rest * (r - red), green + rest * (g - green), blue + rest * (b - blue)
-    return red, green, blue
+    near = far = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+    rest, apart = texel / size - 1.0, texel
+    for level in range(2 if rest > 0.0 and whole + 1 < count else 1):
+        far = along(world, first + whole + level, u, v, long_u, long_v, long, apart, wraps_u, wraps_v)
+        if level == 0:
+            near, apart = far, 2.0 * size
+    return (
+        near[0] + rest * (far[0] - near[0]),
+        near[1] + rest * (far[1] - near[1]),
+        near[2] + rest * (far[2] - near[2]),
+    )
 
 
 @law
@@ -68,9 +71,7 @@ def axes(ux, vx, uy, vy):
 @law
 def along(world, level, u, v, axis_u, axis_v, long, apart, wraps_u, wraps_v):
     """The mean of a level's samples along the longer axis, a distance apart (both in texels of the first level)."""
-    if long <= LONG * apart:
-        return of_level(world, level, u, v, wraps_u, wraps_v)
-    reach = 0.5 * long / apart + 1.0 - 0.5 * LONG  # half the samples
+    reach = max(0.5 * long / apart + 1.0 - 0.5 * LONG, 1.0)  # half the samples
     side = np.int64(math.ceil(reach)) - 1  # (a GPU's is a float)
     axis_u, axis_v, one = axis_u * apart, axis_v * apart, np.float32(1.0)
     red, green, blue, sum_ = np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)

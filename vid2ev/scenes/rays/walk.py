@@ -6,9 +6,8 @@ other, so threads may share the bands in any way.
 
 from __future__ import annotations
 
-from vid2ev.scenes.rays.carry import carry
 from vid2ev.scenes.rays.compiler import walk
-from vid2ev.scenes.rays.picture import is_mixed, smooth, trace
+from vid2ev.scenes.rays.picture import carry_pixel, is_mixed, smooth, trace
 from vid2ev.scenes.rays.tiles import TILE, things_in_tile
 
 
@@ -52,10 +51,12 @@ def smooth_band(world, rays, first, last, wanted, cells, details, light, depth, 
 
 
 @walk
-def carry_all(world, motions, rays, depth, thing, plane, seen, stack):
-    """`carry` for all pixels of a picture: into plane float64 [H, W, 2] and seen uint8 [H, W]."""
+def carry_all(world, rays, depth, thing, motions, plane, seen, stack):
+    """Where the points of all pixels are at another instant, as of `carry`.
+
+    depth, thing  of the picture [H, W]; world and motions as of `carry`
+    plane         float64 [H, W, 2], the places; seen uint8 [H, W]
+    """
     for line in range(thing.shape[0]):
         for column in range(thing.shape[1]):
-            x, y = rays[line + 1, column + 1, 0], rays[line + 1, column + 1, 1]
-            there_x, there_y, visible = carry(world, motions, x, y, depth[line, column], thing[line, column], stack)
-            plane[line, column, 0], plane[line, column, 1], seen[line, column] = there_x, there_y, visible
+            carry_pixel(world, line, column, rays, depth, thing, motions, plane, seen, stack)

@@ -35,6 +35,17 @@ class Listed(NamedTuple):
     total: np.ndarray  # int64 [1]: how many
 
 
+class Carried(NamedTuple):
+    """Where the points of a picture are at another instant: see `walk.carry_all`."""
+
+    rays: np.ndarray
+    depth: np.ndarray
+    thing: np.ndarray
+    motions: np.ndarray
+    plane: np.ndarray
+    seen: np.ndarray
+
+
 @law
 def world_of(worlds, k):
     """The world of picture k, of a `World` in which all but what is `STILL` has a row for each picture."""

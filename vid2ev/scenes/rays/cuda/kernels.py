@@ -8,7 +8,7 @@ import numpy as np
 from numba import cuda
 
 from vid2ev.kernels.cuda.machine import jit
-from vid2ev.scenes.rays.cuda.threads import is_mixed_at, list_at, smooth_listed, trace_at
+from vid2ev.scenes.rays.cuda.threads import carry_at, is_mixed_at, list_at, smooth_listed, trace_at
 from vid2ev.scenes.rays.layout import STACK
 from vid2ev.scenes.rays.scratch import KEYS
 
@@ -22,6 +22,7 @@ class Kernels(NamedTuple):
     trace: Any  # for each pixel, tile by tile, as are those that follow
     mixing: Any
     smooth: Any
+    carry: Any  # takes the world of the second instant, and `Carried`; for each pixel, row by row
 
 
 def kernels_of(cells: tuple[int, int]) -> Kernels:
@@ -68,4 +69,9 @@ def kernels_of(cells: tuple[int, int]) -> Kernels:
                 thread, worlds, easel, listed, cells, stack, corners, across, down, depths, split, odd, keys, parts
             )
 
-    return Kernels(listing_kernel, trace_kernel, mixing_kernel, smooth_kernel)
+    @jit
+    def carry_kernel(worlds, carried):
+        stack = cuda.local.array(STACK, i64)
+        carry_at(cuda.grid(1), worlds, carried, stack)
+
+    return Kernels(listing_kernel, trace_kernel, mixing_kernel, smooth_kernel, carry_kernel)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from vid2ev.scenes.rays.compiler import law, walk
 from vid2ev.scenes.rays.cuda.easel import world_of
-from vid2ev.scenes.rays.picture import is_mixed, smooth, trace
+from vid2ev.scenes.rays.picture import carry_pixel, is_mixed, smooth, trace
 from vid2ev.scenes.rays.scratch import Scratch
 from vid2ev.scenes.rays.tiles import TILE, things_in_tile
 
@@ -58,6 +58,17 @@ def smooth_listed(
         world_of(worlds, k), easel.rays, line, column, cells, easel.details[k], listed.counts[k, tile], easel.light[k],
         scratch,
     )  # fmt: skip
+
+
+@walk
+def carry_at(thread, worlds, carried, stack):
+    """`carry` for a pixel, to the one world there is."""
+    line, column = thread // carried.thing.shape[1], thread % carried.thing.shape[1]
+    if line < carried.thing.shape[0]:
+        carry_pixel(
+            world_of(worlds, 0), line, column, carried.rays, carried.depth, carried.thing, carried.motions,
+            carried.plane, carried.seen, stack,
+        )  # fmt: skip
 
 
 @law
