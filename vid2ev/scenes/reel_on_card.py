@@ -58,9 +58,11 @@ class ReelOnCard:
 
     def flow(self, t0_ns: int, t1_ns: int, picture: Picture) -> Flow:
         """Where the pixels of the picture at t0 are at t1, as `World.flow` has it; tensors of torch, on the device."""
-        (snapshot0, pose0), (snapshot1, pose1) = self._seen(t0_ns), self._seen(t1_ns)
-        motions = motions_between(snapshot0, pose0, snapshot1, pose1)
-        return self._painter.flow(picture, numbers_of(snapshot1, pose1), motions)
+        return self.flow_between(self._seen(t0_ns), self._seen(t1_ns), picture)
+
+    def flow_between(self, before: tuple[Snapshot, Pose], after: tuple[Snapshot, Pose], picture: Picture) -> Flow:
+        """The same between any snapshots and poses of the camera (camera to world)."""
+        return self._painter.flow(picture, numbers_of(*after), motions_between(*before, *after))
 
     def _seen(self, t_ns: int) -> tuple[Snapshot, Pose]:
         return self.world.snapshot(t_ns), self.world.camera_pose(t_ns) @ self.pose_in_rig
