@@ -10,6 +10,7 @@ from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, LANE_COUNT, LOW, PITCH, STRIP, stride_of
 from vid2ev.kernels.naps import give_back
+from vid2ev.kernels.rows import RISEN, interval_of_row
 from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
 from vid2ev.kernels.settle import settle_lanes, shift_pixel
 from vid2ev.kernels.shots import aim
@@ -46,15 +47,38 @@ def hits_of(flagged, hits):
 
 
 @compiled
-def walk_tile(first_block, last_block, pixels, light, lut, naps, planes, flags, num, iv, work, out, tally):
-    """Advance blocks first_block ... last_block - 1 by one interval; returns (keys, their number).
+def walk_tile(
+    first_block, last_block, light, row, rows, lut, naps, planes, flags, num, floats, ints, ends, work, out, tally
+):
+    """Advance blocks first_block ... last_block - 1 through some frames; returns the keys of their events.
+
+    The light [., pixels] of frame k is in row `row` + k `rows`, its interval in row k of floats and ints
+    (`kernels.rows`); ends[k] becomes how many keys there are after it.
+    """
+    n, pixels = np.int64(0), np.int64(light.shape[1])
+    for k in range(ends.size):
+        if len(flags.leak) and floats[k, RISEN] > 0.0:
+            for pixel in range(first_block * BLOCK, min(last_block * BLOCK, pixels)):
+                shift_pixel(pixel, floats[k, RISEN], planes, flags, num, work)
+        iv = interval_of_row(floats[k], ints[k])
+        out, n = walk_blocks(
+            first_block, last_block, pixels, light[row + k * rows], lut, naps, planes, flags, num, iv, work, out, n,
+            tally,
+        )  # fmt: skip
+        ends[k] = n
+    return out
+
+
+@inner
+def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags, num, iv, work, out, n, tally):
+    """Advance blocks by one interval; returns (keys, their number).
 
     Flagged pixels are gathered over as many blocks as fill the lanes, so that the vector code has something to do.
     """
     stride = stride_of(flags)
     scratch, flagged, hits = work.scratch, work.flagged, work.hits
     keys, chance = np.empty(128, np.int64), np.empty(128, np.float64)
-    n, used, shots, forced = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
+    used, shots, forced = np.int64(0), np.int64(0), np.int64(0)
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
@@ -202,10 +226,3 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
         for first in range(0, size, LANE_COUNT):
             seen = scratch[NEW + first : NEW + min(first + LANE_COUNT, size)]
             settle_lanes(block, seen, first, seen.size, p0, t_ns, bad, random_phase, planes, flags, num, work)
-
-
-@compiled
-def shift_levels(pixels, by, planes, flags, num, work):
-    """Lower all memories by `by` nats: what the leak has risen since its reference is taken into them."""
-    for p in range(pixels):
-        shift_pixel(p, by, planes, flags, num, work)

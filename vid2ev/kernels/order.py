@@ -76,6 +76,18 @@ def unpack(keys, ends, share, shares, width, first_us, t, x, y, p, label):
         label[first + i] = np.uint8(mine[i] & np.uint64(3))
 
 
+@compiled
+def unpack_frames(keys, ends, first_us, width, t, x, y, p, label):
+    """Keys in no order to the arrays of `Events`: those of frame k, which begins at first_us[k], end at ends[k]."""
+    first = np.int64(0)
+    for k in range(ends.size):
+        last = ends[k]
+        unpack_keys(keys[first:last], width, first_us[k], t[first:last], x[first:last], y[first:last], p[first:last])
+        first = last
+    for i in range(min(keys.size, label.size)):
+        label[i] = np.uint8(keys[i] & np.uint64(3))
+
+
 @inner
 def share_of(keys, ends, share, shares):
     """Where a share of the time begins in each part: at what is that share of the longest part."""

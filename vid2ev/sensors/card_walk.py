@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.kernels.cuda.clips import Candidates, Clips, Listed, Sent, Start, Totals
-from vid2ev.kernels.cuda.rows import interval_row, sensor_row
+from vid2ev.kernels.rows import interval_row, sensor_row
 from vid2ev.kernels.layout import TALLIES, Flags, Numbers, Planes
 from vid2ev.sensors.card_events import CardEvents, Moments, events_of
 from vid2ev.sensors.clock import Step

@@ -79,26 +79,39 @@ def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
     )
 
 
-def planes_of(spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int) -> tuple[Planes, np.ndarray]:
-    """State of the pixels, yet without light, and the map of bad pixels (uint8: 1 hot, 2 cold)."""
+def planes_of(
+    spec: DvsSpec, flags: Flags, num: Numbers, width: int, height: int, old: Planes | None = None
+) -> tuple[Planes, np.ndarray]:
+    """State of the pixels, yet without light, and the map of bad pixels (uint8: 1 hot, 2 cold).
+
+    `old` planes of the same size and flags are used again.
+    """
     pixels = width * height
-    blocks = -(-pixels // BLOCK)
     if spec.hot_probability > 0 or spec.cold_probability > 0:
         bad = bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
     else:
         bad = np.zeros(pixels, np.uint8)
     remembers_events = bool(flags.refractory) or num.hot_rate_hz > 0
-    fields = records_of(pixels, flags, remembers_events)
+    if old is None or (len(old.t_last) == pixels) != remembers_events:
+        old = blank_planes(pixels, flags, remembers_events)
+    old.rest[...], old.count[...] = 0, 0
     if flags.mismatch:
-        fill_thresholds(fields["theta"], num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
-    planes = Planes(
+        fill_thresholds(old.theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+    hot = np.flatnonzero(bad == 1).astype(np.int32)
+    shade = shading_map(spec.shading, width, height).ravel() if flags.shading else old.shade
+    return old._replace(hot=hot, shade=shade), bad
+
+
+def blank_planes(pixels: int, flags: Flags, remembers_events: bool) -> Planes:
+    """Planes with room for the state of so many pixels."""
+    blocks = -(-pixels // BLOCK)
+    return Planes(
         fast=aligned(blocks * stride_of(flags), np.float32),
         rest=np.zeros(2 * PITCH * blocks if flags.poles and not flags.log_input else 0, np.float32),
-        **fields,
-        hot=np.flatnonzero(bad == 1).astype(np.int32),
-        shade=shading_map(spec.shading, width, height).ravel() if flags.shading else np.empty(0, np.float32),
+        **records_of(pixels, flags, remembers_events),
+        hot=np.empty(0, np.int32),
+        shade=np.empty(0, np.float32),
     )
-    return planes, bad
 
 
 def records_of(pixels: int, flags: Flags, remembers_events: bool) -> dict[str, np.ndarray]:

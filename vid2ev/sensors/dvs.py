@@ -3,34 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.kernels.cpu import settle_tile, shift_levels, walk_tile
-from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES
+from vid2ev.kernels.cpu import settle_tile, walk_tile
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Planes
 from vid2ev.kernels.naps import rouse
-from vid2ev.kernels.order import order_keys, unpack
+from vid2ev.kernels.rows import interval_rows
 from vid2ev.kernels.work import new_work
 from vid2ev.light.transfer import code_table
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
-from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of, planes_of
+from vid2ev.sensors.clock import Clock, Step
+from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.sleep import Sleep
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.still import Still, strip_count, told_of
+from vid2ev.stream.still import NOT_TOLD, Still, strip_count, told_of
+
+if TYPE_CHECKING:
+    from vid2ev.views.grid import Grid
 
 __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
-LEAK_REBASE_NAT = 0.5
-WORTH_THREADS = 1 << 15  # events that take longer to put in order than threads take to wake
+FRAMES = 16  # at a time: as many keys as stay in the cache
 STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
 
 
@@ -66,32 +70,37 @@ class Dvs:
     ):
         check_sensor(size, seed, camera, threads)
         width, height = size
-        self.spec, self.size, self.seed, self.camera, self.labels = (
-            spec,
-            (width, height),
-            seed,
-            camera,
-            labels,
-        )
-        self.transfer = transfer
-        self.effects = spec.effects()
-        self._flags = flags_of(spec, labels)
-        self._numbers = numbers_of(spec, seed, camera)
-        self._planes, self._bad = planes_of(spec, self._flags, self._numbers, width, height)
-        self._frames = EventFrames(spec, width, height, labels) if spec.frame_rate_hz > 0 else None
+        self.size, self.labels, self.transfer, self._skip = (width, height), labels, transfer, skip
+        self._tiles = Tiles(-(-width * height // BLOCK), threads)
+        self._work = [new_work() for _ in range(self._tiles.count)]
+        self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
+        self._tables: dict[Any, np.ndarray] = {}
+        self._be(spec, seed, camera)
+
+    def _be(self, spec: DvsSpec, seed: int, camera: int, flags: Flags | None = None, old: Planes | None = None) -> None:
+        """A sensor without light; in the planes of an old one of the same effects, if there is one."""
+        self.spec, self.seed, self.camera, self.effects = spec, seed, camera, spec.effects()
+        self._flags, self._numbers = flags or flags_of(spec, self.labels), numbers_of(spec, seed, camera)
+        self._planes, self._bad = planes_of(spec, self._flags, self._numbers, *self.size, old)
+        self._frames = EventFrames(spec, *self.size, self.labels) if spec.frame_rate_hz > 0 else None
         self._delayed = Delayed(spec.delay_us) if spec.delay_us > 0 else None
-        self._tallies = np.zeros((threads, TALLIES), np.int64)
+        self._tallies = np.zeros((self._tiles.count, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
         self._seen: np.ndarray | None = None  # the light of the last frame, as it was given
         self._leak_since_ns = 0
         self._step = 0
         self._fresh_noise = True
-        self._sleep = Sleep(width * height, skip and not self._flags.noise)
-        self._tiles = Tiles(-(-width * height // BLOCK), threads)
-        self._work = [new_work() for _ in range(self._tiles.count)]
-        self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
-        self._tables: dict[Any, np.ndarray] = {}
+        self._sleep = Sleep(self._bad.size, self._skip and not self._flags.noise)
+
+    def renew(self, spec: DvsSpec, seed: int = 0, camera: int = 0) -> None:
+        """Become another sensor, without light yet: what `Dvs(spec, size, seed, camera=camera, ...)` is, for less.
+
+        Its arrays serve again if the effects are the same.  Raises UsageError as `Dvs` does.
+        """
+        check_sensor(self.size, seed, camera, 1)
+        flags = flags_of(spec, self.labels)
+        self._be(spec, seed, camera, flags, self._planes if flags == self._flags else None)
 
     # ------------------------------------------------------------------------------------------------- light in
 
@@ -106,18 +115,34 @@ class Dvs:
         if self._t_ns is None:
             return self.restart(light, t_ns)
         flat, table = self._light(light)
-        t_ns = self._later(t_ns, self._t_ns)
-        self._rebase_leak(t_ns)
-        interval = interval_of(
-            self._flags, self._numbers, self._t_ns, t_ns, self._leak_since_ns, self._step, self._fresh_noise
-        )
-        self._sleep.begin(interval, told_of(still, self._seen))
-        events = self._events(self._walk(flat, table, interval), interval)
-        self._sleep.end()
-        self._t_ns, self._seen = t_ns, light
-        self._step += 1
-        self._fresh_noise = not interval.noise_resolved
-        return self._passed_on(events, t_ns)
+        sent = self._walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
+        self._seen = light
+        return self._passed_on(sent.ordered(0, self._tiles.each), t_ns)
+
+    def steps(self, light: np.ndarray, t_ns: Sequence[int]) -> list[Events]:
+        """`step` for each frame of light [frames, height, width] at t_ns [frames].
+
+        Faster than that if `skip` is off: some frames go through the walk at a time.
+        """
+        return list(self._each(light[:, None], 0, [int(t) for t in t_ns]))
+
+    def fill(self, grid: Grid, light: np.ndarray, t_ns: Sequence[int]) -> None:
+        """`steps`, but events go straight into a grid (`vid2ev.views.grid`), without being put in order.
+
+        The grid has then what it would have of the events of `steps`, to the bit.
+        """
+        self.fill_from(grid, light[:, None], 0, t_ns)
+
+    def fill_from(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int]) -> None:
+        """`fill` from one of the clips of light [frames, clips, height, width]."""
+        times = [int(t) for t in t_ns]
+        if self._delayed is not None or self._frames is not None:
+            for events in self._each(light, clip, times):
+                grid.add(events)
+            return
+        for sent, _ in self._through(light, clip, times):
+            for events in sent.unordered():
+                grid.add(self._counted(events))
 
     def restart(self, light: np.ndarray, t_ns: int) -> Events:
         """Settle in a frame of light at t_ns [int, ns], as after a cut: the light before it is forgotten.
@@ -240,11 +265,13 @@ class Dvs:
             raise UsageError(f"light of shape {shape}: expected ({height}, {width}), rows and columns of this sensor")
 
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Light [..., height, width] as [frames, pixels], with the table of its codes."""
         light = np.asarray(light)
-        self._check_shape(light.shape)
+        self._check_shape(light.shape[-2:])
+        pixels = self._bad.size
         if light.dtype.kind == "f":
             flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
-            return flat.reshape(-1), np.empty(0, np.float32)
+            return flat.reshape(-1, pixels), np.empty(0, np.float32)
         if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
             raise UsageError(
                 f"light of type {light.dtype}: expected floating point (linear light), or uint8 or uint16 with"
@@ -252,7 +279,7 @@ class Dvs:
             )
         if light.dtype not in self._tables:
             self._tables[light.dtype] = self._table(8 * light.dtype.itemsize)
-        return np.ascontiguousarray(light).reshape(-1), self._tables[light.dtype]
+        return np.ascontiguousarray(light).reshape(-1, pixels), self._tables[light.dtype]
 
     def _table(self, bits: int) -> np.ndarray:
         assert self.transfer is not None
@@ -263,7 +290,7 @@ class Dvs:
     def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
-                first, last, self._bad.size, flat, table, t_ns, self._bad, self.spec.random_phase, self._planes,
+                first, last, self._bad.size, flat[0], table, t_ns, self._bad, self.spec.random_phase, self._planes,
                 self._flags, self._numbers, self._work[k], self._tallies[k],
             )  # fmt: skip
 
@@ -273,28 +300,53 @@ class Dvs:
         self._fresh_noise = True
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
 
-    def _walk(self, flat: np.ndarray, table: np.ndarray, interval: Any) -> list[np.ndarray]:
+    def _steps_to(self, t_ns: Sequence[int]) -> list[Step]:
+        """The intervals up to each of these times, which are then over."""
+        assert self._t_ns is not None
+        clock = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise)
+        steps = [clock.step_to(self._later(t, clock.t_ns), self._flags, self._numbers) for t in t_ns]
+        self._t_ns, self._step, self._leak_since_ns = clock.t_ns, clock.step, clock.leak_since_ns
+        self._fresh_noise = clock.fresh_noise
+        return steps
+
+    def _each(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[Events]:
+        """The events of each frame of a clip."""
+        if self._t_ns is None and t_ns:
+            yield Events.empty(self.labels)  # (of the frame in which it settles)
+        for sent, times in self._through(light, clip, t_ns):
+            for k, t in enumerate(times):
+                yield self._passed_on(sent.ordered(k, self._tiles.each), t)
+
+    def _through(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[tuple[Sent, list[int]]]:
+        """What is sent in the frames of a clip of light [frames, clips, height, width], some at a time; their times."""
+        if self._t_ns is None and t_ns:
+            self.restart(light[0, clip], t_ns[0])
+            light, t_ns = light[1:], t_ns[1:]
+        flat, table = self._light(light)
+        clips, some = light.shape[1], 1 if self._sleep.naps.wanted else FRAMES
+        for first in range(0, len(t_ns), some):
+            times = t_ns[first : first + some]
+            yield self._walk(flat, first * clips + clip, clips, table, self._steps_to(times), NOT_TOLD), times
+        self._seen = None
+
+    def _walk(self, light: np.ndarray, row: int, rows: int, table: np.ndarray, steps: list[Step], told: Any) -> Sent:
+        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; one, if strips sleep."""
+        self._sleep.begin(steps[0][0], told)
+        if any(risen > 0.0 for _, risen in steps):
+            self._sleep.wake()
+        floats, ints = interval_rows(steps)
+        ends = np.zeros((self._tiles.count, len(steps)), np.int64)
+
         def walk(k: int, first: int, last: int) -> np.ndarray:
-            self._buffers[k], n = walk_tile(
-                first, last, self._bad.size, flat, table, self._sleep.naps, self._planes, self._flags, self._numbers,
-                interval, self._work[k], self._buffers[k], self._tallies[k],
+            self._buffers[k] = walk_tile(
+                first, last, light, row, rows, table, self._sleep.naps, self._planes, self._flags, self._numbers,
+                floats, ints, ends[k], self._work[k], self._buffers[k], self._tallies[k],
             )  # fmt: skip
-            return self._buffers[k][:n]
+            return self._buffers[k][: ends[k, -1]]
 
-        return self._tiles.each_blocks(walk)
-
-    def _events(self, parts: list[np.ndarray], interval: Any) -> Events:
-        ends = np.cumsum([0, *map(len, parts)])
-        n, count = int(ends[-1]), len(parts)
-        if n == 0:
-            return Events.empty(self.labels)
-        keys = np.empty(n, np.uint64)
-        t, x, y, p = np.empty(n, np.int64), np.empty(n, np.uint16), np.empty(n, np.uint16), np.empty(n, np.uint8)
-        label = np.empty(n if self.labels else 0, np.uint8)
-        each = self._tiles.each if n > WORTH_THREADS else lambda work: [work(k) for k in range(count)]
-        each(lambda k: order_keys(parts[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
-        each(lambda k: unpack(keys, ends, k, count, self.size[0], interval.first_us, t, x, y, p, label))
-        return Events(t, x, y, p, label if self.labels else None)
+        parts = self._tiles.each_blocks(walk)
+        self._sleep.end()
+        return Sent(parts, ends, [interval for interval, _ in steps], self.size[0], self.labels)
 
     def _passed_on(self, events: Events, t_ns: int) -> Events:
         """What of the events up to t_ns is sent by then, through all that comes behind the comparator."""
@@ -308,16 +360,6 @@ class Dvs:
         on = int(np.count_nonzero(events.p))
         self._polarities += (len(events) - on, on)
         return events
-
-    def _rebase_leak(self, t_ns: int) -> None:
-        """Keep the leak small against the levels, whose float32 copies the scan compares."""
-        assert self._t_ns is not None
-        rate = self._numbers.leak_nat_per_ns
-        if rate * (t_ns - self._leak_since_ns) > LEAK_REBASE_NAT and self._t_ns > self._leak_since_ns:
-            risen = rate * (self._t_ns - self._leak_since_ns)
-            shift_levels(self._bad.size, risen, self._planes, self._flags, self._numbers, self._work[0])
-            self._leak_since_ns = self._t_ns
-            self._sleep.wake()
 
     def _rouse(self, strips: np.ndarray) -> None:
         """Bring these strips up to the last frame, if they have slept."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import takewhile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import PITCH, stride_of
 from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.clock import Clock
 from vid2ev.sensors.dvs import STATE_PLANES, Dvs
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes
@@ -19,6 +18,9 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
+
+if TYPE_CHECKING:
+    from vid2ev.views.grid import Grid
 
 FRAMES = 16  # at a time: the state of a pixel is read and written once for as many
 
@@ -75,15 +77,14 @@ class DvsOnCard(Dvs):
             sent += self.steps(light, [frame.t_ns for frame in shot])
         return sent
 
+    def fill(self, grid: Grid, light: Any, t_ns: Sequence[int]) -> None:
+        """`Dvs.fill`; of a batch, `DvsBatch.fill` leaves the grids on the device."""
+        for events in self.steps(light, t_ns):
+            grid.add(events)
+
     def _some(self, light: Any, t_ns: list[int]) -> list[Events]:
         seen, _ = self._light(light)
-        assert self._t_ns is not None
-        clock, steps = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise), []
-        for t in t_ns:
-            steps.append(clock.step_to(self._later(t, clock.t_ns), self._flags, self._numbers))
-        sent = self._card.walk(seen, [steps])
-        self._t_ns, self._step, self._leak_since_ns = clock.t_ns, clock.step, clock.leak_since_ns
-        self._fresh_noise = clock.fresh_noise
+        sent = self._card.walk(seen, [self._steps_to(t_ns)])
         return [self._passed_on(sent.of(0, k), t) for k, t in enumerate(t_ns)]
 
     def state(self) -> dict[str, np.ndarray]:

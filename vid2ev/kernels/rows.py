@@ -1,4 +1,4 @@
-"""Numbers of sensors and of intervals as rows of tables, as many sensors and intervals go into one call."""
+"""Numbers of sensors and of intervals as rows of tables, as many of them go into one call."""
 
 from __future__ import annotations
 
@@ -43,6 +43,12 @@ def interval_row(iv: Any, risen: float) -> tuple[np.ndarray, np.ndarray]:
     ]  # fmt: skip
     ints = [iv.t0_ns, iv.first_us, iv.last_us, iv.noise_resolved, iv.step, 0]
     return np.array(floats, np.float64), np.array(ints, np.int64)
+
+
+def interval_rows(steps: Any) -> tuple[np.ndarray, np.ndarray]:
+    """(float64, int64), each [steps, .], of pairs of an `Interval` and what the leak has risen before it."""
+    rows = [interval_row(*step) for step in steps]
+    return np.array([floats for floats, _ in rows]), np.array([ints for _, ints in rows])
 
 
 @inner
