@@ -109,11 +109,11 @@ def bytes_per_step(spec: Any) -> float:
 
 def speed(torch: Any, memory: Any, name: str, spec: Any, size: tuple[int, int], kind: str, copied: float) -> dict:
     """What one sensor does with one kind of light."""
-    from vid2ev.sensors.batch import DvsBatch
+    from vid2ev.sensors.batch_on_card import DvsBatchOnCard
 
     light = torch.from_numpy(frames(kind, size, FRAMES + 1)).cuda()[:, None]
     there_and_back = light[1:], light[:-1].flip(0).contiguous()
-    batch, clock = DvsBatch([spec], size, [1], memory=memory), [0]
+    batch, clock = DvsBatchOnCard([spec], size, [1], memory=memory), [0]
     batch.restart(light[0], [0])
     sent = []
 
@@ -130,9 +130,10 @@ def speed(torch: Any, memory: Any, name: str, spec: Any, size: tuple[int, int], 
     }  # fmt: skip
 
 
-def clips_per_second(torch: Any, memory: Any, spec: Any) -> float:
-    """Training clips of 256x256 and 256 steps that a card makes events of in a second."""
-    from vid2ev.sensors.batch import DvsBatch
+def clips_per_second(torch: Any, memory: Any, spec: Any) -> tuple[float, float]:
+    """Training clips of 256x256 and 256 steps that a card makes events of in a second, and net counts of each step."""
+    from vid2ev.sensors.batch_on_card import DvsBatchOnCard
+    from vid2ev.sensors.card_grids import NetCountsOnCard
 
     one = torch.from_numpy(frames("busy", (256, 256), CLIP_FRAMES // 8 + 1)).cuda()
     steps = torch.arange(CLIP_FRAMES, device="cuda") / 8  # (an eighth of the busy pattern's motion in each)
@@ -141,13 +142,22 @@ def clips_per_second(torch: Any, memory: Any, spec: Any) -> float:
     light = some[:, None].expand(CLIP_FRAMES, CLIPS, 256, 256).contiguous()
     t_ns = np.repeat((FRAME_NS * np.arange(CLIP_FRAMES))[:, None], CLIPS, 1)
 
-    def run() -> None:
-        batch = DvsBatch([spec] * CLIPS, (256, 256), range(CLIPS), memory=memory)
+    batch = DvsBatchOnCard([spec] * CLIPS, (256, 256), range(CLIPS), memory=memory)
+    grids = NetCountsOnCard(memory, CLIPS, (256, 256), t_ns[:, 0] // 1000)
+
+    def run(straight: bool) -> None:
+        batch.renew([spec] * CLIPS, range(CLIPS))
         batch.restart(light[0], t_ns[0])
         for k in range(1, CLIP_FRAMES, FRAMES):
-            batch.steps(light[k : k + FRAMES], t_ns[k : k + FRAMES])
+            some = slice(k, k + FRAMES)
+            if straight:
+                batch.fill(grids, light[some], t_ns[some])
+            else:
+                batch.steps(light[some], t_ns[some])
+        if straight:
+            grids.take()
 
-    return CLIPS / seconds(torch, run)
+    return CLIPS / seconds(torch, lambda: run(False)), CLIPS / seconds(torch, lambda: run(True))
 
 
 def start_s(memory: Any) -> float:
@@ -255,8 +265,9 @@ def copy_speed(torch: Any) -> float:
     return 2 * source.numel() * 4 / seconds(torch, lambda: target.copy_(source))
 
 
-def table(rows: list[dict], device: str, copied: float, clips: float) -> str:
-    head = f"{device}, a copy moves {copied * 1e-9:.0f} GB/s; training clips (256x256, 256 steps): {clips:.0f}/s\n\n"
+def table(rows: list[dict], device: str, copied: float, clips: tuple[float, float]) -> str:
+    per_s = f"{clips[0]:.0f}/s to events, {clips[1]:.0f}/s straight to net counts"
+    head = f"{device}, a copy moves {copied * 1e-9:.0f} GB/s; training clips (256x256, 256 steps): {per_s}\n\n"
     lines = ["| sensor | size | light | Gpixel-steps/s | Mevents/s | of the roofline |", "|---|---|---|---|---|---|"]
     for row in rows:
         numbers = f"{row['gpixel']:.2f} | {row['mevents']:.1f} | {100 * row['share']:.0f} %"

@@ -221,3 +221,12 @@ def test_the_benchmark_of_gpus_says_in_one_line_that_there_is_none() -> None:
         pytest.skip("there is a GPU: the example would measure it for minutes")
     done = CliRunner().invoke(example("benchmark_gpu").main, [])
     assert done.exit_code == 0 and re.fullmatch(r"no GPU: .+; nothing is measured\n", done.output)
+
+
+def test_the_benchmark_of_clips_measures_each_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = example("benchmark_clips")
+    monkeypatch.setattr(module, "CLIPS", {"16x12 x2": ((16, 12), 2)})
+    done = CliRunner().invoke(module.main, ["--runs", "1"])
+    rows = [line.strip("| ").split(" | ") for line in done.output.splitlines()[2:]]
+    assert done.exit_code == 0 and [row[1] for row in rows] == ["paper", "ideal"]
+    assert all(float(row[2]) > 0.1 for row in rows)

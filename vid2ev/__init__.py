@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from vid2ev.errors import Vid2evError as Vid2evError
     from vid2ev.formats import read_events as read_events
     from vid2ev.instants import events_of as events_of
+    from vid2ev.sensors.batch import DvsBatch as DvsBatch
     from vid2ev.sensors.cis import Cis as Cis
     from vid2ev.sensors.cis_spec import CisSpec as CisSpec
     from vid2ev.sensors.dvs import Dvs as Dvs
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from vid2ev.stream.events import Label as Label
     from vid2ev.stream.exposures import Exposure as Exposure
     from vid2ev.stream.frames import Frame as Frame
+    from vid2ev.views.grid import NetCounts as NetCounts
+    from vid2ev.views.grid import Windows as Windows
 
     __version__: str
 
@@ -36,13 +39,16 @@ _HOME = {
     "CisSpec": "vid2ev.sensors.cis_spec",
     "DataError": "vid2ev.errors",
     "Dvs": "vid2ev.sensors.dvs",
+    "DvsBatch": "vid2ev.sensors.batch",
     "DvsSpec": "vid2ev.sensors.spec",
     "Events": "vid2ev.stream.events",
     "Exposure": "vid2ev.stream.exposures",
     "Frame": "vid2ev.stream.frames",
     "Label": "vid2ev.stream.events",
+    "NetCounts": "vid2ev.views.grid",
     "UsageError": "vid2ev.errors",
     "Vid2evError": "vid2ev.errors",
+    "Windows": "vid2ev.views.grid",
     "cis_names": "vid2ev.sensors.presets",
     "convert": "vid2ev.conversion",
     "events_of": "vid2ev.instants",

@@ -37,7 +37,7 @@ def compiled(function: Callable) -> Any:
 
 
 def inlined(function: Callable) -> Any:
-    """A law that is put into whatever calls it, however long: so a loop over pixels that calls it is vector code."""
+    """A law that is put into what calls it, however long it is: so a loop over pixels that does is vector code."""
     options = OPTIONS | {"forceinline": True}
     return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **options)(function))
 

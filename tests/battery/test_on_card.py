@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,15 @@ from hypothesis import strategies as st
 from vid2ev.errors import UsageError
 from vid2ev.kernels.cuda.clips import Sent
 from vid2ev.kernels.cuda.memory import Simulated
-from vid2ev.sensors.batch import DvsBatch
+from vid2ev.sensors.batch_on_card import DvsBatchOnCard
+from vid2ev.sensors.card_grids import NetCountsOnCard, VoxelsOnCard
 from vid2ev.sensors.devices import memory_of, missing_for_cuda
 from vid2ev.sensors.dvs import Dvs, DvsSpec
 from vid2ev.sensors.dvs_on_card import DvsOnCard
 from vid2ev.stream import Events, Frame
 from vid2ev.stream.still import Still, strip_count
+from vid2ev.views.grid import NetCounts, Windows
+from vid2ev.views.voxel import Voxel
 
 from .card_memories import memories
 from .combinations import COMPILED
@@ -119,7 +123,7 @@ def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(name, memory):
     sensors, seeds = [DvsSpec(**(base | change)) for change in changes], [5, 2**64 - 1, 0]
     frames = np.exp(rng.normal(0, 0.7, (7, 3, *SIZE[::-1]))).astype(np.float32)
     t_ns = np.cumsum(rng.integers(1e4, 4e6, (7, 3)), axis=0)
-    batch = DvsBatch(sensors, SIZE, seeds, memory=memory, cameras=[0, 1, 2], labels=labels)
+    batch = DvsBatchOnCard(sensors, SIZE, seeds, memory=memory, cameras=[0, 1, 2], labels=labels)
     batch.restart(frames[0], t_ns[0])
     parts = [batch.steps(frames[1:4], t_ns[1:4]), batch.steps(frames[4:], t_ns[4:])]
     for k, (spec, seed) in enumerate(zip(sensors, seeds, strict=True)):
@@ -135,7 +139,7 @@ def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(name, memory):
     rng, spec, labels = np.random.default_rng(6), COMPILED[name], LABELS[name]
     frames = np.exp(rng.normal(0, 0.7, (5, 2, *SIZE[::-1]))).astype(np.float32)
     t_ns = np.repeat(np.cumsum(rng.integers(1e4, 4e6, 5))[:, None], 2, axis=1)
-    batch = DvsBatch([spec, spec], SIZE, [8, 9], memory=memory, labels=labels)
+    batch = DvsBatchOnCard([spec, spec], SIZE, [8, 9], memory=memory, labels=labels)
     batch.restart(frames[0], t_ns[0])
     parts = [batch.steps(frames[1:3], t_ns[1:3]), batch.steps(frames[3:], t_ns[3:])]
     for k in range(2):
@@ -143,6 +147,40 @@ def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(name, memory):
         each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(5)][1:]
         assert sum(map(len, each)) > 50
         assert_same(each, [part.of(k, j) for part in parts for j in range(2)])
+
+
+@memories
+def test_grids_of_a_batch_are_those_of_its_clips(memory):
+    """Counts to the bit; voxels to what float32 sums of up to N events are off by, N 2**-24 of their own size."""
+    rng, spec, edges = np.random.default_rng(8), COMPILED["paper"], [1500, 2000, 2001, 4100, 9000]
+    windows = [[0, 6000], [1999, 2001], [3000, 3000], [3000, 90_000]]
+    frames = np.exp(rng.normal(0, 0.7, (7, 2, *SIZE[::-1]))).astype(np.float32)
+    t_ns = np.repeat(np.arange(7)[:, None] * 1_000_300, 2, axis=1)
+    for polarity in (False, True):
+        for bins in (1, 5):
+            batch = DvsBatchOnCard([spec] * 2, SIZE, [1, 2], memory=memory)
+            batch.renew([spec] * 2, [8, 9])
+            batch.restart(frames[0], t_ns[0])
+            counts = NetCountsOnCard(memory, 2, SIZE, edges, polarity=polarity)
+            voxels = VoxelsOnCard(memory, 2, SIZE, windows, bins, polarity=polarity)
+            batch.fill(counts, frames[1:4], t_ns[1:4])
+            batch.fill(counts, frames[4:], t_ns[4:])
+            batch.restart(frames[0], t_ns[0])
+            batch.renew([spec] * 2, [8, 9])
+            batch.restart(frames[0], t_ns[0])
+            batch.fill(voxels, frames[1:], t_ns[1:])
+            ours = [memory.get(grid.take()) for grid in (counts, voxels)]
+            for k in range(2):
+                alone, planes = Dvs(spec, SIZE, 8 + k), NetCounts(SIZE, edges, polarity=polarity)
+                views = Windows(SIZE, partial(Voxel, bins=bins, polarity=polarity), windows)
+                for events in alone.steps(frames[:, k], t_ns[:, k]):
+                    planes.add(events)
+                    views.add(events)
+                theirs = [planes.take(), views.take()]
+                assert np.abs(theirs[0]).sum() > 50 and ours[0].dtype == theirs[0].dtype
+                np.testing.assert_array_equal(ours[0][k], theirs[0])
+                np.testing.assert_allclose(ours[1][k], theirs[1], rtol=0, atol=30 * 30 * 2.0**-24)
+            assert not memory.get(counts.take()).any()
 
 
 @memories
@@ -158,9 +196,9 @@ def test_events_that_find_no_room_are_walked_again(memory):
 
 def test_what_cannot_be_is_said():
     with pytest.raises(UsageError, match="different effects"):
-        DvsBatch([COMPILED["paper"], COMPILED["nothing"]], SIZE, [1, 2], memory=Simulated())
+        DvsBatchOnCard([COMPILED["paper"], COMPILED["nothing"]], SIZE, [1, 2], memory=Simulated())
     with pytest.raises(UsageError, match="delay"):
-        DvsBatch([DvsSpec(delay_us=3.0)], SIZE, [1], memory=Simulated())
+        DvsBatchOnCard([DvsSpec(delay_us=3.0)], SIZE, [1], memory=Simulated())
     card = DvsOnCard(COMPILED["paper"], SIZE, 1, memory=Simulated())
     with pytest.raises(UsageError, match="light of shape"):
         card.steps(np.zeros((2, 3, 3), np.float32), [0, 1])

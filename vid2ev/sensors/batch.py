@@ -1,32 +1,49 @@
-"""DvsBatch: event cameras of one size on a GPU, each with its own clip, all clips some frames at a time."""
+"""DvsBatch: event cameras of one size, each with its own clip."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.sensors.card_events import CardEvents
-from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.clock import Clock, Step, pace_of
-from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
-from vid2ev.sensors.limits import check_sensor
-from vid2ev.sensors.pixel_planes import pixel_planes
+from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.tiles import Tiles
+from vid2ev.stream.events import Events
+
+if TYPE_CHECKING:
+    from vid2ev.views.grid import Grid
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class BatchEvents:
+    """Events of some frames of some clips."""
+
+    clips: list[list[Events]]
+
+    def of(self, clip: int, frame: int) -> Events:
+        """Those of one interval."""
+        return self.clips[clip][frame]
+
+    def __len__(self) -> int:
+        return sum(len(events) for clip in self.clips for events in clip)
 
 
 class DvsBatch:
-    """Event cameras of `size` (width, height), one for each of `specs`, which switch on the same effects.
+    """Event cameras of `size` (width, height), one for each of `specs`: with any parameters, effects and seeds.
 
-    seeds    of each, as of `Dvs`
-    cameras  numbers of each, as of `Dvs`; by default 0
-    memory   where they are (`vid2ev.kernels.cuda.memory`)
-    labels   give each event its cause
+    seeds     of each, as of `Dvs`
+    cameras   numbers of each, as of `Dvs`; by default 0
+    threads   clips worked on at a time
+    labels    give each event its cause
+    transfer  what uint8 or uint16 frames are coded with, as of `Dvs`
 
-    Raises UsageError for specs with different effects, or with effects that come behind the walk (delay, fixed rate).
+    Each clip has the events that a `Dvs` of its spec, seed and camera would have.  Raises UsageError as `Dvs` does.
     """
 
     def __init__(
@@ -35,52 +52,58 @@ class DvsBatch:
         size: tuple[int, int],
         seeds: Sequence[int],
         *,
-        memory: Any,
         cameras: Sequence[int] | None = None,
+        threads: int = 1,
         labels: bool = False,
+        transfer: str | None = None,
     ):
-        cameras = cameras if cameras is not None else [0] * len(specs)
-        for seed, camera in zip(seeds, cameras, strict=True):
-            check_sensor(size, seed, camera, 1)
-        self._flags = flags_of(specs[0], labels)
-        if any(flags_of(spec, labels) != self._flags for spec in specs):
-            raise UsageError("a batch of sensors with different effects: expected the same; make one of each kind")
-        if any(spec.delay_us > 0 or spec.frame_rate_hz > 0 for spec in specs):
-            raise UsageError("a batch of sensors with delay or fixed rate: expected neither; add them to the events")
-        self._numbers = [numbers_of(*each) for each in zip(specs, seeds, cameras, strict=True)]
-        each = [planes_of(spec, self._flags, num, *size) for spec, num in zip(specs, self._numbers, strict=True)]
-        planes = pixel_planes([planes for planes, _ in each], self._flags, size[0] * size[1])
-        bad = np.concatenate([bad for _, bad in each])
-        phases = [spec.random_phase for spec in specs]
-        self._walk = CardWalk(memory, self._flags, self._numbers, size, planes, bad, phases)
-        self._clocks: list[Clock] = []
-
-    def restart(self, light: Any, t_ns: Sequence[int]) -> None:
-        """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips]."""
-        steps = [clock.step for clock in self._clocks] or [0] * len(self._numbers)
-        self._clocks = [Clock(int(t), step) for t, step in zip(t_ns, steps, strict=True)]
-        self._walk.settle(light, [clock.t_ns for clock in self._clocks])
-
-    def steps(self, light: Any, t_ns: Any) -> CardEvents:
-        """Advance all through frames of light [frames, clips, height, width], linear, at t_ns [frames, clips].
-
-        Raises UsageError for times that are not after those before.
-        """
-        times = np.asarray(t_ns, np.int64)
-        before = np.array([[clock.t_ns for clock in self._clocks]], np.int64)
-        if (np.diff(np.concatenate([before, times]), axis=0) <= 0).any():
-            raise UsageError("frame times of a batch: expected each after the one before; sort the frames")
-        return self._walk.walk(light, self._steps(times))
-
-    def _steps(self, times: np.ndarray) -> list[list[Step]]:
-        """The steps of each clip; if all are the same, one list of them for all."""
-        first, same_times = self._clocks[0], bool((times[:, 0] == times.T).all())
-        same_pace = len({pace_of(num) for num in self._numbers}) == 1
-        if same_pace and same_times and all(clock == first for clock in self._clocks):
-            row = [first.step_to(int(t), self._flags, self._numbers[0]) for t in times[:, 0]]
-            self._clocks = [copy(first) for _ in self._clocks]
-            return [row] * len(self._clocks)
-        return [
-            [clock.step_to(int(t), self._flags, num) for t in column]
-            for clock, num, column in zip(self._clocks, self._numbers, times.T, strict=True)
+        self.size, options = size, {"labels": labels, "transfer": transfer, "skip": False}
+        self._sensors = [
+            Dvs(spec, size, seed, camera=camera, **options)  # type: ignore[arg-type]
+            for spec, seed, camera in zip(specs, seeds, cameras_of(specs, cameras), strict=True)
         ]
+        self._tiles = Tiles(len(self._sensors), threads)
+
+    def renew(self, specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None = None) -> None:
+        """Become other sensors, as many as before and without light yet, in the same arrays (`Dvs.renew`)."""
+        others = zip(self._sensors, specs, seeds, cameras_of(specs, cameras), strict=True)
+        for sensor, spec, seed, camera in others:
+            sensor.renew(spec, seed, camera)
+
+    def restart(self, light: np.ndarray, t_ns: Sequence[int]) -> None:
+        """Settle each sensor in a frame of light [clips, height, width] at its t_ns [clips]."""
+        self._checked(light[None])
+        self._all(lambda k: self._sensors[k].restart(light[k], t_ns[k]))
+
+    def steps(self, light: np.ndarray, t_ns: np.ndarray) -> BatchEvents:
+        """Advance all through frames of light [frames, clips, height, width] at t_ns [frames, clips].
+
+        A sensor without light settles in the first.  Raises UsageError for times that are not after those before.
+        """
+        light, times = self._checked(light), np.asarray(t_ns, np.int64)
+        return BatchEvents(self._all(lambda k: self._sensors[k].steps_of(light, k, times[:, k])))
+
+    def fill(self, grids: Sequence[Grid], light: np.ndarray, t_ns: np.ndarray) -> None:
+        """`steps`, but the events of each clip go straight into a grid of its own (`Dvs.fill`)."""
+        light, times = self._checked(light), np.asarray(t_ns, np.int64)
+        if len(grids) != len(self._sensors):
+            raise UsageError(f"{len(grids)} grids for {len(self._sensors)} clips: expected one for each")
+        self._all(lambda k: self._sensors[k].fill_of(grids[k], light, k, times[:, k]))
+
+    def _checked(self, light: Any) -> np.ndarray:
+        """Light as an array of as many clips as there are sensors, in one piece."""
+        light = np.ascontiguousarray(light)
+        clips, (width, height) = len(self._sensors), self.size
+        if light.ndim != 4 or light.shape[1:] != (clips, height, width):
+            raise UsageError(f"light of shape {light.shape}: expected (frames, {clips}, {height}, {width})")
+        return light
+
+    def _all(self, work: Callable[[int], R]) -> list[R]:
+        """[work(0), work(1) ...], of each clip, some at the same time."""
+        runs = self._tiles.each_blocks(lambda _, first, last: [work(k) for k in range(first, last)])
+        return [result for run in runs for result in run]
+
+
+def cameras_of(specs: Sequence[DvsSpec], cameras: Sequence[int] | None) -> Sequence[int]:
+    """The numbers of the cameras of a batch."""
+    return cameras if cameras is not None else [0] * len(specs)

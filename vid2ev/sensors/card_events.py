@@ -36,6 +36,25 @@ class Moments:
 
 
 @dataclass(frozen=True)
+class CardSent:
+    """Events of some clips in no order but that of each pixel: arrays of the device, int64."""
+
+    clip: Any
+    t: Any  # [us]
+    pixel: Any  # row x width + column
+    p: Any
+
+
+def sent_of(memory: Any, keys: Any, moments: Moments) -> CardSent:
+    """What keys (int64) say, in any order."""
+    moment = keys >> PIXEL_BITS
+    interval = memory.searchsorted(memory.put(moments.begins.reshape(-1)), moment) - 1
+    clip = interval // moments.begins.shape[1]
+    offset = memory.put((moments.first_us - moments.begins).reshape(-1))
+    return CardSent(clip, moment + offset[interval], (keys >> 3) & ((1 << 25) - 1), (keys >> 2) & 1)
+
+
+@dataclass(frozen=True)
 class CardEvents:
     """Events of some intervals of some clips, in order of clip, interval and (t, y, x): arrays of the device.
 
@@ -65,17 +84,14 @@ class CardEvents:
 
 def events_of(memory: Any, keys: Any, moments: Moments, width: int, labels: bool) -> CardEvents:
     """What ordered keys (int64) say."""
-    begins = memory.put(moments.begins.reshape(-1))
-    moment, pixel = keys >> PIXEL_BITS, (keys >> 3) & ((1 << 25) - 1)
-    interval = memory.searchsorted(begins, moment) - 1
-    t = moment - begins[interval] + memory.put(moments.first_us.reshape(-1))[interval]
-    y = pixel // width
-    ends = memory.get(memory.searchsorted(moment, begins + 1))
+    sent = sent_of(memory, keys, moments)
+    y = sent.pixel // width
+    ends = memory.get(memory.searchsorted(keys >> PIXEL_BITS, memory.put(moments.begins.reshape(-1) + 1)))
     return CardEvents(
-        t,
-        memory.cast(pixel - y * width, np.int32),
+        sent.t,
+        memory.cast(sent.pixel - y * width, np.int32),
         memory.cast(y, np.int32),
-        memory.cast((keys >> 2) & 1, np.uint8),
+        memory.cast(sent.p, np.uint8),
         memory.cast(keys & 3, np.uint8) if labels else None,
         np.append(ends, len(keys)),
         moments.begins.shape[1],

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from vid2ev.kernels.cuda.clips import Candidates, Clips, Listed, Sent, Start, Totals
-from vid2ev.kernels.rows import interval_row, sensor_row
 from vid2ev.kernels.layout import TALLIES, Flags, Numbers, Planes
-from vid2ev.sensors.card_events import CardEvents, Moments, events_of
+from vid2ev.kernels.rows import interval_row, sensor_row
+from vid2ev.sensors.card_events import CardEvents, CardSent, Moments, events_of, sent_of
 from vid2ev.sensors.clock import Step
 from vid2ev.sensors.proposed import none_proposed, proposed
 
@@ -72,14 +72,23 @@ class CardWalk:
 
     def walk(self, light: Any, steps: list[list[Step]]) -> CardEvents:
         """Advance through frames of light [frames, clips, height, width], by the steps [clips][frames]."""
+        keys, moments = self._through(light, steps)
+        return events_of(self.memory, self.memory.ordered(keys), moments, self._size[0], bool(self._flags.labels))
+
+    def sent(self, light: Any, steps: list[list[Step]]) -> CardSent:
+        """`walk`, but what is sent is not put in order."""
+        keys, moments = self._through(light, steps)
+        return sent_of(self.memory, self.memory.cast(keys, np.int64), moments)
+
+    def _through(self, light: Any, steps: list[list[Step]]) -> tuple[Any, Moments]:
+        """The keys of the events, in no order but that of each pixel, and what they count time from."""
         moments = Moments([[interval for interval, _ in row] for row in steps])
         light = self.memory.light(light).reshape(len(steps[0]), len(steps), self._pixels)
         seen = self._clips(light, steps, moments.bases())
         candidates = self._candidates(seen, steps)
         self._listed.count[:] = 0
         self.memory.launch(self._kernels.glance, self._total, seen, self._planes, self._listed, self._totals)
-        keys = self.memory.ordered(self._keys(seen, candidates))
-        return events_of(self.memory, keys, moments, self._size[0], bool(self._flags.labels))
+        return self._keys(seen, candidates), moments
 
     def _keys(self, seen: Clips, candidates: Candidates) -> Any:
         """Walk the pixels that are listed; again, with more room, where the keys of their events found none."""

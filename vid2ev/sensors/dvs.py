@@ -124,17 +124,21 @@ class Dvs:
 
         Faster than that if `skip` is off: some frames go through the walk at a time.
         """
-        return list(self._each(light[:, None], 0, [int(t) for t in t_ns]))
+        return self.steps_of(np.asarray(light)[:, None], 0, t_ns)
+
+    def steps_of(self, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> list[Events]:
+        """`steps` of one of the clips of light [frames, clips, height, width]."""
+        return list(self._each(light, clip, [int(t) for t in t_ns]))
 
     def fill(self, grid: Grid, light: np.ndarray, t_ns: Sequence[int]) -> None:
         """`steps`, but events go straight into a grid (`vid2ev.views.grid`), without being put in order.
 
         The grid has then what it would have of the events of `steps`, to the bit.
         """
-        self.fill_from(grid, light[:, None], 0, t_ns)
+        self.fill_of(grid, np.asarray(light)[:, None], 0, t_ns)
 
-    def fill_from(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int]) -> None:
-        """`fill` from one of the clips of light [frames, clips, height, width]."""
+    def fill_of(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> None:
+        """`fill` of one of the clips of light [frames, clips, height, width]."""
         times = [int(t) for t in t_ns]
         if self._delayed is not None or self._frames is not None:
             for events in self._each(light, clip, times):

@@ -47,9 +47,19 @@ class DvsOnCard(Dvs):
         transfer: str | None = None,
     ):
         super().__init__(spec, size, seed, camera=camera, labels=labels, transfer=transfer, skip=False)
-        self._memory, self._of_fast = memory, int(stride_of(self._flags)) // PITCH
-        planes, phase = self._planes_of_pixels(), [spec.random_phase]
-        self._card = CardWalk(memory, self._flags, [self._numbers], self.size, planes, self._bad, phase)
+        self._memory = memory
+        self._load()
+
+    def _load(self) -> None:
+        """The sensor onto the device."""
+        self._of_fast, planes = int(stride_of(self._flags)) // PITCH, self._planes_of_pixels()
+        phase = [self.spec.random_phase]
+        self._card = CardWalk(self._memory, self._flags, [self._numbers], self.size, planes, self._bad, phase)
+
+    def renew(self, spec: DvsSpec, seed: int = 0, camera: int = 0) -> None:
+        """`Dvs.renew`."""
+        super().renew(spec, seed, camera)
+        self._load()
 
     def step(self, light: Any, t_ns: int, still: Still | None = None) -> Events:
         """`Dvs.step`; light may be a tensor.  What is `still` saves nothing here: all pixels are glanced at."""
@@ -78,7 +88,7 @@ class DvsOnCard(Dvs):
         return sent
 
     def fill(self, grid: Grid, light: Any, t_ns: Sequence[int]) -> None:
-        """`Dvs.fill`; of a batch, `DvsBatch.fill` leaves the grids on the device."""
+        """`Dvs.fill`; `DvsBatchOnCard.fill` leaves the grids on the device."""
         for events in self.steps(light, t_ns):
             grid.add(events)
 

@@ -1,4 +1,4 @@
-"""Grids: what events become as they are sent, whatever the order of pixels: only those of a pixel come in order of time.
+"""Grids: what events become as they are sent: those of a pixel in order of time, pixels in any order.
 
     NetCounts   planes[k, y, x] = N_ON - N_OFF in (edges[k], edges[k + 1]]     int8 or int16 [n, height, width]
     Windows     a representation of each of some windows (start, stop], which may overlap: voxel grids, counts, frames
@@ -44,7 +44,12 @@ class NetCounts:
     """
 
     def __init__(
-        self, size: tuple[int, int], edges_us: Sequence[int] | np.ndarray, *, dtype: Any = np.int8, polarity: bool = False
+        self,
+        size: tuple[int, int],
+        edges_us: Sequence[int] | np.ndarray,
+        *,
+        dtype: Any = np.int8,
+        polarity: bool = False,
     ):
         self.size, self.dtype, self.edges_us = size, np.dtype(dtype), edges_of(edges_us)
         if self.dtype not in (np.int8, np.int16):
@@ -99,7 +104,7 @@ def windows_of(windows_us: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     """Windows, int64 [n, 2] [us]; raises UsageError for none, or such as end before they start."""
     windows = np.asarray(windows_us, np.int64)
     if windows.ndim != 2 or windows.shape[1:] != (2,) or len(windows) == 0 or (windows[:, 0] > windows[:, 1]).any():
-        raise UsageError(f"windows of shape {windows.shape}: expected [n, 2], from a start to a stop not before it [us]")
+        raise UsageError(f"windows of shape {windows.shape}: expected [n, 2], a start and a later stop [us]")
     return windows
 
 

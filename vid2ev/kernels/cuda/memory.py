@@ -61,6 +61,10 @@ class Simulated:
         """How many of the ascending numbers are less than each of the others."""
         return np.searchsorted(ascending, numbers)
 
+    def add_at(self, sums: Any, places: Any, values: Any) -> None:
+        """Add whole numbers to those at some places, as often as a place is named."""
+        np.add.at(sums, places, values)
+
     def cast(self, array: Any, dtype: Any) -> Any:
         """An array of another type."""
         return array.astype(dtype)
@@ -115,6 +119,9 @@ class Card:
 
     def searchsorted(self, ascending: Any, numbers: Any) -> Any:
         return self.torch.searchsorted(ascending, numbers)
+
+    def add_at(self, sums: Any, places: Any, values: Any) -> None:
+        sums.index_add_(0, places, values)
 
     def cast(self, array: Any, dtype: Any) -> Any:
         return array.to(getattr(self.torch, np.dtype(dtype).name))

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernels.rows import RISEN, interval_of_row
 from vid2ev.kernels.cuda.staged import Staged, send_waiting
 from vid2ev.kernels.forced import keep_likely
 from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import LAG1, NOT_FINITE, Planes, stride_of
+from vid2ev.kernels.rows import RISEN, interval_of_row
 from vid2ev.kernels.scan import (
     BRIGHTEST,
     NEW,

@@ -1,0 +1,130 @@
+"""Straight into grids is through events: the same planes, voxels and frames to the bit, whatever the sensor.
+
+To the bit, because each sum has the same terms in the same order: those of a pixel come in order of time either way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vid2ev import DvsSpec, UsageError, load_sensor
+from vid2ev.sensors.batch import DvsBatch
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.views.grid import NetCounts, Windows
+from vid2ev.views.requests import parse_representation
+
+SIZE, FRAMES = (61, 37), 40  # (two blocks of pixels; more frames than go through the walk at a time)
+SENSORS = {
+    "paper": DvsSpec(),
+    "v2e-noisy": load_sensor("v2e-noisy"),
+    "delayed": DvsSpec(delay_us=700.0),
+    "fixed rate": DvsSpec(frame_rate_hz=900.0),
+}
+KINDS = ("voxel:5", "voxel:1", "voxel:3,polarity,normalised", "counts", "frame:2", "time-surface", "sae")
+sensors = pytest.mark.parametrize("spec", SENSORS.values(), ids=SENSORS)
+
+
+def light_of(seed: int, clips: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Light [frames, clips, height, width] that jumps here and there, at times not on microseconds."""
+    rng = np.random.default_rng(seed)
+    light = np.exp(np.cumsum(rng.normal(0, 0.1, (FRAMES, clips, *SIZE[::-1])), axis=0)).astype(np.float32)
+    return light, 5_000_123 + np.cumsum(rng.integers(10_000, 2_000_000, (FRAMES, clips)), axis=0)
+
+
+def grids(events_us: np.ndarray, rng: np.random.Generator) -> list:
+    """Grids of each kind, with edges and windows anywhere, on events and off, empty ones and such as overlap."""
+    first, last = int(events_us.min()), int(events_us.max())
+    some = [*rng.choice(events_us, 4), *rng.integers(first - 3000, last + 3000, 4)]
+    edges = np.unique(some)
+    windows = [[first - 1, last], [first, first], *np.sort(rng.choice(some, (3, 2)), axis=1), [last + 10, last + 20]]
+    counts = [NetCounts(SIZE, edges), NetCounts(SIZE, edges, dtype=np.int16, polarity=True)]
+    return [*counts, *(Windows(SIZE, parse_representation(kind), windows) for kind in KINDS)]
+
+
+@sensors
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 2**32), threads=st.sampled_from([1, 2]), skip=st.booleans())
+def test_straight_into_grids_is_through_events(spec: DvsSpec, seed: int, threads: int, skip: bool) -> None:
+    light, t_ns = light_of(seed)
+    alone = Dvs(spec, SIZE, seed)
+    each = [alone.step(frame[0], int(t[0])) for frame, t in zip(light, t_ns, strict=True)]
+    t_us = np.concatenate([events.t for events in each])
+    assert len(t_us) > 1000
+    sensor = Dvs(spec, SIZE, seed, threads=threads, skip=skip)
+    for through, straight in zip(*(grids(t_us, np.random.default_rng(seed)) for _ in range(2)), strict=True):
+        for events in each:
+            through.add(events)
+        sensor.renew(spec, seed)
+        sensor.fill(straight, light[:15, 0], t_ns[:15, 0])
+        sensor.fill(straight, light[15:, 0], t_ns[15:, 0])
+        ours, theirs = straight.take(), through.take()
+        assert ours.dtype == theirs.dtype
+        np.testing.assert_array_equal(ours, theirs)
+        assert sensor.counts == alone.counts
+
+
+@sensors
+def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(spec: DvsSpec) -> None:
+    """With other effects, too; in new arrays and in old ones, one clip at a time and two."""
+    light, t_ns = light_of(3, clips=3)
+    specs, seeds, cameras = [spec, DvsSpec(threshold_on=0.3), spec], [5, 2**64 - 1, 5], [0, 0, 7]
+    new = DvsBatch(specs, SIZE, seeds, cameras=cameras)
+    old = DvsBatch(specs[::-1], SIZE, [1, 2, 3], threads=2)
+    old.steps(light[:3], t_ns[:3])
+    old.renew(specs, seeds, cameras)
+    for batch in (new, old):
+        batch.restart(light[0], t_ns[0])
+        parts = [batch.steps(light[1:9], t_ns[1:9]), batch.steps(light[9:], t_ns[9:])]
+        ours = [[parts[0].of(k, j) for j in range(8)] + [parts[1].of(k, j) for j in range(31)] for k in range(3)]
+        for k in range(3):
+            alone = Dvs(specs[k], SIZE, seeds[k], camera=cameras[k])
+            each = [alone.step(frame[k], int(t[k])) for frame, t in zip(light, t_ns, strict=True)][1:]
+            assert sum(map(len, each)) > 1000
+            for a, b in zip(ours[k], each, strict=True):
+                for name in "txyp":
+                    np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+        assert sum(map(len, parts)) == sum(len(events) for clip in ours for events in clip)
+
+
+def test_a_batch_fills_a_grid_of_each_clip() -> None:
+    light, t_ns = light_of(4, clips=2)
+    batch = DvsBatch([DvsSpec()] * 2, SIZE, [1, 2])
+    filled = [NetCounts(SIZE, t_ns[:, k] // 1000) for k in range(2)]
+    batch.fill(filled, light, t_ns)
+    for k, grid in enumerate(filled):
+        expected, alone = NetCounts(SIZE, t_ns[:, k] // 1000), Dvs(DvsSpec(), SIZE, 1 + k)
+        for events in alone.steps(light[:, k], t_ns[:, k]):
+            expected.add(events)
+        planes = grid.take()
+        np.testing.assert_array_equal(planes, expected.take())
+        counts = alone.counts
+        assert planes.sum(dtype=np.int64) == counts["on"] - counts["off"] and planes.dtype == np.int8
+        assert not grid.take().any()
+
+
+def test_counts_stay_at_the_end_of_their_type() -> None:
+    spec = load_sensor("ideal", ["threshold_on=0.01", "threshold_off=0.01"])
+    for factor, end in ((1e4, 127), (1e-4, -128)):
+        sensor, grid = Dvs(spec, (2, 1)), NetCounts((2, 1), [0, 1000])
+        sensor.fill(grid, np.array([[[1.0, 1.0]], [[factor, 1.0]]]), [0, 1_000_000])
+        np.testing.assert_array_equal(grid.take(), [[[end, 0]]])
+
+
+def test_what_cannot_be_is_said() -> None:
+    batch = DvsBatch([DvsSpec()] * 2, SIZE, [1, 2])
+    light, t_ns = light_of(0, clips=2)
+    with pytest.raises(UsageError, match="1 grids for 2 clips"):
+        batch.fill([NetCounts(SIZE, [0, 1])], light, t_ns)
+    with pytest.raises(UsageError, match="expected \\(frames, 2, 37, 61\\)"):
+        batch.steps(light[:, :1], t_ns)
+    with pytest.raises(UsageError, match="expected a later one"):
+        batch.steps(light[::-1], t_ns[::-1])
+    with pytest.raises(UsageError, match="each after the one before"):
+        NetCounts(SIZE, [0, 5, 5])
+    with pytest.raises(UsageError, match="expected int8 or int16"):
+        NetCounts(SIZE, [0, 5], dtype=np.uint8)
+    with pytest.raises(UsageError, match="a start and a later stop"):
+        Windows(SIZE, parse_representation("counts"), [[3, 2]])

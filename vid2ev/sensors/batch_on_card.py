@@ -1,0 +1,99 @@
+"""DvsBatchOnCard: event cameras of one size on a GPU, each with its own clip, all clips some frames at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.sensors.batch import cameras_of
+from vid2ev.sensors.card_events import CardEvents
+from vid2ev.sensors.card_walk import CardWalk
+from vid2ev.sensors.clock import Clock, Step, pace_of
+from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
+from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.pixel_planes import pixel_planes
+from vid2ev.sensors.spec import DvsSpec
+
+
+class DvsBatchOnCard:
+    """Event cameras of `size` (width, height), one for each of `specs`, which switch on the same effects.
+
+    seeds    of each, as of `Dvs`
+    cameras  numbers of each, as of `Dvs`; by default 0
+    memory   where they are (`vid2ev.kernels.cuda.memory`)
+    labels   give each event its cause
+
+    Raises UsageError for specs with different effects, or with effects that come behind the walk (delay, fixed rate).
+    """
+
+    def __init__(
+        self,
+        specs: Sequence[DvsSpec],
+        size: tuple[int, int],
+        seeds: Sequence[int],
+        *,
+        memory: Any,
+        cameras: Sequence[int] | None = None,
+        labels: bool = False,
+    ):
+        self.size, self.labels, self._memory = size, labels, memory
+        self.renew(specs, seeds, cameras)
+
+    def renew(self, specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None = None) -> None:
+        """Become other sensors, without light yet.  Raises UsageError as when made."""
+        cameras, size = cameras_of(specs, cameras), self.size
+        for seed, camera in zip(seeds, cameras, strict=True):
+            check_sensor(size, seed, camera, 1)
+        self._flags = flags_of(specs[0], self.labels)
+        if any(flags_of(spec, self.labels) != self._flags for spec in specs):
+            raise UsageError("a batch of sensors with different effects: expected the same; make one of each kind")
+        if any(spec.delay_us > 0 or spec.frame_rate_hz > 0 for spec in specs):
+            raise UsageError("a batch of sensors with delay or fixed rate: expected neither; use a DvsBatch")
+        self._numbers = [numbers_of(*each) for each in zip(specs, seeds, cameras, strict=True)]
+        each = [planes_of(spec, self._flags, num, *size) for spec, num in zip(specs, self._numbers, strict=True)]
+        planes = pixel_planes([planes for planes, _ in each], self._flags, size[0] * size[1])
+        bad = np.concatenate([bad for _, bad in each])
+        phases = [spec.random_phase for spec in specs]
+        self._walk = CardWalk(self._memory, self._flags, self._numbers, size, planes, bad, phases)
+        self._clocks: list[Clock] = []
+
+    def restart(self, light: Any, t_ns: Sequence[int]) -> None:
+        """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips]."""
+        steps = [clock.step for clock in self._clocks] or [0] * len(self._numbers)
+        self._clocks = [Clock(int(t), step) for t, step in zip(t_ns, steps, strict=True)]
+        self._walk.settle(light, [clock.t_ns for clock in self._clocks])
+
+    def steps(self, light: Any, t_ns: Any) -> CardEvents:
+        """Advance all through frames of light [frames, clips, height, width], linear, at t_ns [frames, clips].
+
+        Raises UsageError for times that are not after those before.
+        """
+        return self._walk.walk(light, self._checked_steps(t_ns))
+
+    def fill(self, grids: Any, light: Any, t_ns: Any) -> None:
+        """`steps`, but events go straight into the grids of all clips (`card_grids`), which stay on the device."""
+        grids.add(self._walk.sent(light, self._checked_steps(t_ns)))
+
+    def _checked_steps(self, t_ns: Any) -> list[list[Step]]:
+        times = np.asarray(t_ns, np.int64)
+        before = np.array([[clock.t_ns for clock in self._clocks]], np.int64)
+        if (np.diff(np.concatenate([before, times]), axis=0) <= 0).any():
+            raise UsageError("frame times of a batch: expected each after the one before; sort the frames")
+        return self._steps(times)
+
+    def _steps(self, times: np.ndarray) -> list[list[Step]]:
+        """The steps of each clip; if all are the same, one list of them for all."""
+        first, same_times = self._clocks[0], bool((times[:, 0] == times.T).all())
+        same_pace = len({pace_of(num) for num in self._numbers}) == 1
+        if same_pace and same_times and all(clock == first for clock in self._clocks):
+            row = [first.step_to(int(t), self._flags, self._numbers[0]) for t in times[:, 0]]
+            self._clocks = [copy(first) for _ in self._clocks]
+            return [row] * len(self._clocks)
+        return [
+            [clock.step_to(int(t), self._flags, num) for t in column]
+            for clock, num, column in zip(self._clocks, self._numbers, times.T, strict=True)
+        ]
