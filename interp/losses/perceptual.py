@@ -2,9 +2,9 @@
 
 With a file of VGG16's weights, as torchvision names them, the features are its relu4_3.  Without, which is the
 default and needs no download, it is a stand-in: a network of the same layout with an eighth of the channels and
-random weights that are always the same, and the features of all four levels.  They are oriented, bounded in size and
-over several scales, but they have learnt nothing: numbers of networks trained with it must not be compared with those
-of networks trained with VGG16.
+random weights that are always the same, and the features of all four levels.  Its first filters add up to 0, so that it
+sees structure, over several scales, and not how bright it is.  But it has learnt nothing: numbers of networks trained
+with it must not be compared with those of networks trained with VGG16.
 
 Source: Johnson et al. (2016), "Perceptual losses for real-time style transfer and super-resolution", ECCV; VGG16,
 Simonyan and Zisserman (2015), "Very deep convolutional networks for large-scale image recognition", ICLR.
@@ -78,6 +78,10 @@ def _randomise(layers: nn.Sequential) -> None:
             with torch.no_grad():
                 layer.weight.copy_(torch.randn(layer.weight.shape, generator=generator) * (2 / fan_in) ** 0.5)
                 nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
+    first = layers[0].weight
+    assert isinstance(first, torch.Tensor)
+    with torch.no_grad():
+        first -= first.mean((2, 3), keepdim=True)
 
 
 def _load(layers: nn.Sequential, path: Path) -> None:

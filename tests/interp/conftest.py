@@ -1,4 +1,4 @@
-"""One thread for each process of tests: two that wait for one another take ten times as long on busy cores."""
+"""One thread for each process of tests: two of torch's that wait for one another take ten times as long."""
 
 import pytest
 import torch
