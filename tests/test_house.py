@@ -214,16 +214,18 @@ def test_every_command_has_help_and_stands_in_the_readme(name: str) -> None:
     assert f"vid2ev {name}" in README
 
 
-def test_the_readme_is_true(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("folder", [ROOT, CLIENT])
+def test_the_readme_is_true(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each Python block runs, all in one namespace, and prints what the text block after it shows."""
     monkeypatch.chdir(ROOT)
-    blocks = re.findall(r"```python\n(.*?)```(?:\s*```text\n(.*?)```)?", README, re.DOTALL)
+    page = (folder / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```(?:\s*```text\n(.*?)```)?", page, re.DOTALL)
     assert blocks
     namespace: dict[str, object] = {}
     for code, expected in blocks:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
-            exec(compile(code, "README.md", "exec"), namespace)
+            exec(compile(code, str(folder / "README.md"), "exec"), namespace)
         assert printed.getvalue().strip() == expected.strip()
 
 

@@ -23,7 +23,7 @@ import torch
 
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
-from interp.representation.event_counts import EventCounts
+from interp.representation.event_counts import EventCounts, before_and_after
 
 DARK = 1e-3
 DARKEST, BRIGHTEST = math.log(DARK) - 0.6, 0.1  # of logs of light [nat]; real edges span 3 to 5
@@ -54,13 +54,14 @@ class Candidates:
 @in_full_precision
 def integrated(light_0: torch.Tensor, light_1: torch.Tensor, events: EventCounts, times: torch.Tensor) -> Candidates:
     """What the events make of the luminance of both frames, [B, 1, H, W], at times [B, N]."""
-    start, stop = torch.zeros_like(times), torch.ones_like(times)
-    before, after = events.number(start, times), events.number(times, stop)
+    windows = before_and_after(times)
+    before, after = events.number(*windows).chunk(2, 1)
+    risen, to_rise = events.change(*windows).chunk(2, 1)
     drift = (before + EVEN_EVENTS * times[..., None, None]) / (before + after + EVEN_EVENTS)
     logs = [torch.log(light.clamp(min=0) + DARK) for light in (light_0, light_1)]
     top = torch.maximum(*logs).amax((1, 2, 3), keepdim=True).clamp(min=BRIGHTEST)  # of light above white its brightest
-    forward = torch.minimum((logs[0] + events.change(start, times)).clamp(min=DARKEST), top)
-    backward = torch.minimum((logs[1] - events.change(times, stop)).clamp(min=DARKEST), top)
+    forward = torch.minimum((logs[0] + risen).clamp(min=DARKEST), top)
+    backward = torch.minimum((logs[1] - to_rise).clamp(min=DARKEST), top)
     return Candidates(forward[:, :, None], backward[:, :, None], drift[:, :, None])
 
 

@@ -71,8 +71,7 @@ class EventCounts:
 
         Backwards what got darker gets brighter: signs and bins are turned around, so that both halves look alike.
         """
-        ends = torch.zeros_like(times), torch.ones_like(times)
-        before, after = self.voxels(ends[0], times, bins), self.voxels(times, ends[1], bins)
+        before, after = self.voxels(*before_and_after(times), bins).chunk(2, 1)
         return torch.cat([-before.flip(2), after], dim=2)
 
     def whole(self, bins: int) -> torch.Tensor:
@@ -106,6 +105,11 @@ class EventCounts:
     def stacked(counts: Sequence[EventCounts]) -> EventCounts:
         """Several as one batch; they must have one size and one number of sub-intervals."""
         return EventCounts(torch.cat([one.off_on for one in counts]), torch.cat([one.contrast for one in counts]))
+
+
+def before_and_after(times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Start and stop [B, 2 N] of the windows from the first frame to each of the times [B, N], then from those on."""
+    return torch.cat([torch.zeros_like(times), times], 1), torch.cat([times, torch.ones_like(times)], 1)
 
 
 def count_events(

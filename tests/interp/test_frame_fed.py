@@ -41,6 +41,15 @@ def test_any_size_comes_back_as_it_went_in(name: str, size: tuple[int, int]) -> 
     assert made.weights.shape[-2:] == size and torch.isfinite(made.images).all()
 
 
+def test_frames_go_on_as_their_border_and_events_end() -> None:
+    first, second = frames(1, (5, 20))
+    pair = network("rrin_events").prepare(first, second, EventCounts(torch.ones(1, 2, 3, 5, 20), torch.ones(1, 2)))
+    assert pair.frame_0.shape[-2:] == (16, 32) and torch.equal(pair.frame_0[..., :5, :20], first)
+    assert torch.equal(pair.frame_1[..., 20:], pair.frame_1[..., 19:20].expand(-1, -1, -1, 12))
+    assert torch.equal(pair.frame_1[..., 5:, :], pair.frame_1[..., 4:5, :].expand(-1, -1, 11, -1))
+    assert float(pair.events.off_on.sum()) == 2 * 3 * 5 * 20
+
+
 @pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in ("timelens", "rrin_events_light")])
 def test_a_fresh_network_is_a_cross_fade_at_any_size(name: str) -> None:
     # so nothing is resampled, shifted or mixed with what was put around
