@@ -75,6 +75,8 @@ CLIENT_FLOORS = {
     "losses": 5,
     "weights": 5,
     "work": 5,
+    "data": 5,
+    "commands": 8,
 }
 PACKAGES = {"vid2ev": FLOORS, "interp": CLIENT_FLOORS}
 

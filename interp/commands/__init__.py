@@ -1,0 +1,1 @@
+"""The commands of interp: `vid2ev` finds them through their entry points."""

@@ -1,0 +1,108 @@
+"""`vid2ev dataset`: recordings to train and to score with, and a data card."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from interp.data.dataset import Report
+
+SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
+
+
+@click.command(short_help="Make a data set of recordings, with frames to rebuild.")
+@click.argument("directory", type=click.Path(file_okay=False, path_type=Path), metavar="DIR")
+@click.option(
+    "--from", "videos", multiple=True, metavar="VIDEO",
+    help="Of real videos, or a folder of them, in place of rendered scenes; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--slowdown", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, metavar="F",
+    help="The videos play F times slower than the world went.",
+)  # fmt: skip
+@click.option(
+    "--preset", type=click.Choice(["varied", "paper"]), default="varied", show_default=True,
+    help="varied: sensors drawn for each scene, 30 to 240 frames a second; paper: its Table I, 30 to 960.",
+)  # fmt: skip
+@click.option(
+    "--count", type=click.IntRange(1, 10**6), metavar="N",
+    help="Scenes.  [default: 8, of the paper's 180, of videos all that they have]",
+)  # fmt: skip
+@click.option(
+    "--layout", type=click.Choice(["own", "hsergb", "bsergb"]), default="own", show_default=True,
+    help="Recordings of vid2ev, or the files of HS-ERGB or BS-ERGB.",
+)  # fmt: skip
+@click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Pixels of rendered scenes.")
+@click.option(
+    "--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Another seed, other scenes."
+)
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Scenes made at a time.  [default: as many as cores]")
+@click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
+@click.option("--json", "as_json", is_flag=True, help="Print what is in it as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def dataset(
+    directory: Path,
+    videos: tuple[str, ...],
+    size: str,
+    jobs: int | None,
+    resume: bool,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Make DIR: short recordings of a frame camera and an event camera, with what there was between the frames.
+
+    Each is a folder in DIR; README.md there is a data card.  `vid2ev train --data DIR` trains with it.
+    """
+    from pydantic import ValidationError
+
+    from interp.data.dataset import write_dataset
+    from interp.data.dataset_spec import DatasetSpec
+    from vid2ev.commands.batch import sources_in
+    from vid2ev.errors import UsageError
+    from vid2ev.sensors.tiles import usable_cores
+
+    found = tuple(source for video in videos for source in sources_in(video))
+    try:
+        spec = DatasetSpec(videos=found, size=_size(size), **options)
+    except ValidationError as error:
+        raise UsageError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
+    with _bar(quiet or as_json) as report:
+        facts = write_dataset(directory, spec, resume=resume, jobs=jobs or usable_cores(), report=report)
+    if as_json:
+        click.echo(json.dumps(facts, indent=2))
+    elif not quiet:
+        click.echo(f"{directory}: {facts['scenes']} scenes, {facts['samples']:,} samples, {facts['events']:,} events")
+        for name, reason in facts["left_out"].items():
+            click.echo(f"left out: {name}: {reason}", err=True)
+
+
+def _size(text: str) -> tuple[int, int]:
+    from vid2ev.errors import UsageError
+
+    width, times, height = text.partition("x")
+    if not (times and width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= 16):
+        raise UsageError(f"size '{text}': expected WIDTHxHEIGHT of at least 16, such as 640x480")
+    return int(width), int(height)
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Report]:
+    """A progress bar on a terminal: scenes."""
+    from tqdm import tqdm
+
+    with tqdm(total=None, bar_format=SCENES, leave=False, disable=quiet or None) as shown:
+
+        def report(done: int, count: int, name: str) -> None:
+            shown.total = count
+            shown.set_postfix_str(name, refresh=False)
+            shown.update(done - shown.n)
+
+        yield report

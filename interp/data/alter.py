@@ -1,0 +1,93 @@
+"""Clips altered: parts, mirror images, time backwards, still parts, sensors that are known less well.
+
+All but the last three are exact: the clip of the altered light is the altered clip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from interp.data.chance import Range
+from interp.data.clip import Clip
+
+
+def cropped(clip: Clip, left: int, top: int, size: tuple[int, int]) -> Clip:
+    """A part of `size` (width, height); left, top and size are multiples of `coarser`."""
+    width, height = size
+    each = clip.coarser
+    rows, columns = slice(top, top + height), slice(left, left + width)
+    below, beside = slice(top // each, (top + height) // each), slice(left // each, (left + width) // each)
+    return replace(
+        clip,
+        truth=clip.truth[:, rows, columns],
+        keys=clip.keys[:, rows, columns],
+        off_on=clip.off_on[:, :, below, beside],
+    )
+
+
+def mirrored(clip: Clip) -> Clip:
+    """Left and right exchanged."""
+    return replace(clip, truth=clip.truth[:, :, ::-1], keys=clip.keys[:, :, ::-1], off_on=clip.off_on[..., ::-1])
+
+
+def turned(clip: Clip, quarters: int) -> Clip:
+    """Turned by quarters of a circle."""
+    truth, keys = (np.rot90(frames, quarters, (1, 2)) for frames in (clip.truth, clip.keys))
+    return replace(clip, truth=truth, keys=keys, off_on=np.rot90(clip.off_on, quarters, (2, 3)))
+
+
+def backwards(clip: Clip) -> Clip:
+    """With time running backwards: ON for OFF, and the threshold of each for that of the other."""
+    return replace(
+        clip,
+        truth=clip.truth[::-1],
+        keys=clip.keys[::-1],
+        off_on=clip.off_on[::-1, ::-1],
+        contrast=clip.contrast[::-1],
+    )
+
+
+def stilled(clip: Clip, still: np.ndarray, quality: int | None = None) -> Clip:
+    """Nothing happens where `still` [H, W, bool]: what the first key instant shows stays, and there are no events.
+
+    quality   of a JPEG that the still part went through, as in films; None for none.  Light beyond codes stays as it is
+    """
+    truth, keys, off_on = (np.array(each) for each in (clip.truth, clip.keys, clip.off_on))
+    first = truth[0] if quality is None or truth.dtype != np.uint8 else _coded(truth[0], quality)
+    noise = keys.astype(np.int16) - truth[[0, -1]] if truth.dtype == np.uint8 else None
+    truth[:, still] = first[still]
+    if noise is None:
+        keys[1, still] = keys[0, still]
+    else:  # (the noise of both key frames stays as it was where they saw an instant; blur goes)
+        small = np.abs(noise).max(axis=(0, 3)) < BLURRED
+        for key, own in zip(keys, noise, strict=True):
+            key[still] = np.clip(first.astype(np.int16) + own * small[..., None], 0, 255).astype(np.uint8)[still]
+    each = clip.coarser
+    off_on[:, :, still[each // 2 :: each, each // 2 :: each]] = 0
+    return replace(clip, truth=truth, keys=keys, off_on=off_on)
+
+
+def thinned(clip: Clip, draw: np.random.Generator, share: float) -> Clip:
+    """With a share of the events lost."""
+    return replace(clip, off_on=draw.binomial(clip.off_on, 1 - share).astype(np.uint8))
+
+
+def misjudged(clip: Clip, draw: np.random.Generator, error: Range) -> Clip:
+    """With thresholds believed to be some factor of what they are, OFF and ON apart."""
+    off, on = (value * float(draw.uniform(*error)) for value in clip.contrast)
+    return replace(clip, contrast=(off, on))
+
+
+BLURRED = 24  # codes: what key frames differ by from an instant is blur and no noise
+
+
+def _coded(codes: np.ndarray, quality: int) -> np.ndarray:
+    """Codes [H, W, 3] after a JPEG."""
+    import cv2
+
+    coded = cv2.imencode(".jpg", np.ascontiguousarray(codes[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    decoded = cv2.imdecode(coded, cv2.IMREAD_COLOR)
+    assert decoded is not None  # (it was coded just now)
+    return decoded[..., ::-1]

@@ -1,0 +1,43 @@
+"""The data card of a data set: what is in it, in the form of the paper's Table I, and what has to be known of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+KNOWN = """\
+* Frames of the truth are the light of an instant, without exposure and noise. The frame camera's exposures have their
+  middles at such instants.
+* Events are simulated from the very light that the truth is made of. That is kinder to every method that uses events
+  than a real recording is, to those that add them up most of all.
+* Scenes are independent of each other but for textures: the same photographs come again."""
+FILMED = """\
+* {filmed} Frames of the truth between filmed ones are made along the estimated motion, so where a film has fewer than
+  {interpolated:g} frames a second after the slowdown, they are no more true than that.
+* Films have been exposed, developed and compressed before; the cameras look at the result."""
+
+
+def card_text(facts: dict[str, Any]) -> str:
+    """The card of a data set's facts, in Markdown."""
+    spec, videos = facts["spec"], facts["spec"]["videos"]
+    rows = {
+        "Source": f"{len(videos)} videos, {spec['slowdown']:g} times slower than the world" if videos else "simulator",
+        "Scenes": facts["scenes"],
+        "CIS fps": f"{facts['cis_fps']:g}",
+        "Interpolated fps": f"{facts['interpolated_fps']:g}",
+        "Samples": f"{facts['samples']} ({spec['frames']} CIS frames a scene)",
+        "DVS/CIS disparity": f"<= {facts['disparity_mm']:g} mm" if facts["disparity_mm"] else "0 mm",
+        "Events": facts["events"],
+        "Sensors": "those of the paper" if spec["preset"] == "paper" else "drawn anew for every scene",
+        "Layout": spec["layout"],
+        "Seed": spec["seed"],
+    }
+    table = "\n".join(f"| {name} | {value} |" for name, value in rows.items())
+    known = KNOWN
+    if videos:
+        known += "\n" + FILMED.format(filmed="They are real films.", interpolated=facts["interpolated_fps"])
+    left_out = "\n".join(f"* {name}: {reason}" for name, reason in facts["left_out"].items())
+    return (
+        f"# Data card\n\nMade by vid2ev {facts['versions']['vid2ev']}; `dataset.json` has the same and each scene.\n\n"
+        f"| | |\n| --- | --- |\n{table}\n\n## What has to be known\n\n{known}\n"
+        + (f"\n## Left out\n\n{left_out}\n" if left_out else "")
+    )

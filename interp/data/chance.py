@@ -1,0 +1,33 @@
+"""Chance as a function of what it is asked for: the same seed and name, the same draws, whoever asks and when."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+Range = tuple[float, float]
+
+
+def chance(seed: int, *name: object) -> np.random.Generator:
+    """A generator of its own (Philox) for a seed and a name, such as chance(0, "clip", 17)."""
+    digest = hashlib.sha256(repr((seed, *name)).encode()).digest()
+    return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "big")))
+
+
+def uniform(draw: np.random.Generator, ends: Range) -> float:
+    """Anywhere in a range."""
+    return float(draw.uniform(*ends))
+
+
+def log_uniform(draw: np.random.Generator, ends: Range) -> float:
+    """The same in the logarithm; both ends are above 0."""
+    low, high = ends
+    return low * (high / low) ** float(draw.random())
+
+
+def one_of(draw: np.random.Generator, shares: Sequence[float]) -> int:
+    """An index, with chances in these proportions."""
+    ends = np.cumsum(shares)
+    return int(np.searchsorted(ends, draw.random() * ends[-1], side="right"))

@@ -1,0 +1,82 @@
+"""Clips: what lies between two key frames, and the file that keeps one."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import DataError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clip:
+    """One gap between two key frames.
+
+    truth      what the frame camera would have seen at K + 1 instants, even in time, both ends included, without
+               exposure and noise: sRGB codes uint8, or linear light float16, [K + 1, H, W, 3]
+    keys       the two key frames as the frame camera gave them, sRGB codes uint8 [2, H, W, 3]; the instants of the ends
+               are the middles of their exposures
+    off_on     OFF and ON events in each of S equal sub-intervals, uint8 [2, S, h, w]
+    contrast   what an OFF and an ON event stand for, nominally [nat]
+    gap_us     from key frame to key frame [us]
+    about      where it comes from, and the event camera's place: ready for JSON
+    """
+
+    truth: np.ndarray
+    keys: np.ndarray
+    off_on: np.ndarray
+    contrast: tuple[float, float]
+    gap_us: int
+    about: dict[str, Any]
+
+    @property
+    def multiple(self) -> int:
+        """K: intervals between the frames of truth."""
+        return len(self.truth) - 1
+
+    @property
+    def coarser(self) -> int:
+        """Pixels of the frames per pixel of the event camera, across."""
+        return self.truth.shape[2] // self.off_on.shape[3]
+
+
+def write_clip(path: Path, clip: Clip) -> None:
+    """Write a clip to a file that is there as a whole or not at all; the same clip gives the same bytes.
+
+    It is not waited for to reach the disk: what a crash of the machine loses is made again.
+    """
+    about = json.dumps(clip.about, sort_keys=True).encode()
+    arrays = {"truth": clip.truth, "keys": clip.keys, "off_on": clip.off_on}
+    kinds: list[Any] = [(name, array.dtype, array.shape) for name, array in arrays.items()]
+    kinds += [("contrast", np.float64, (2,)), ("gap_us", np.int64), ("about", f"S{max(len(about), 1)}")]
+    record = np.zeros((), np.dtype(kinds))
+    for name, value in (arrays | {"contrast": clip.contrast, "gap_us": clip.gap_us, "about": about}).items():
+        record[name] = value
+    beside = path.with_name(f"{path.name}.{os.getpid()}.new")
+    try:
+        with open(beside, "wb") as file:
+            np.lib.format.write_array(file, record, allow_pickle=False)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def read_clip(path: Path) -> Clip:
+    """A clip whose arrays stay in its file until they are looked at.
+
+    Raises FileNotFoundError where there is none, DataError for a file that is no clip.
+    """
+    try:
+        record = np.load(path, mmap_mode="r", allow_pickle=False)
+        about = json.loads(bytes(record["about"].item()))
+        gap_us, contrast = int(record["gap_us"]), tuple(float(value) for value in record["contrast"])
+        return Clip(record["truth"], record["keys"], record["off_on"], contrast, gap_us, about)  # type: ignore[arg-type]
+    except FileNotFoundError:
+        raise
+    except (ValueError, IndexError, KeyError, EOFError, OSError) as error:
+        raise DataError(f"{path} is no clip ({error}); remove it, and it is made again") from error

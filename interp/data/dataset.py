@@ -1,0 +1,175 @@
+"""Data sets: recordings made as `vid2ev convert` makes them, in a folder that is there as a whole or not at all.
+
+DIR.partial/         while it is being made; the same command with --resume goes on
+    job.json         what is made; only the same is ever continued
+    NAME/            each recording as it is finished
+    parts/NAME/      of other layouts: what a recording is written from
+DIR/                 NAME/ ..., dataset.json, README.md (the data card)
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from interp.data.card import card_text
+from interp.data.dataset_spec import DatasetSpec, Scene, scenes_of
+from interp.data.layouts import open_sequence
+from interp.data.layouts.own import Own
+from vid2ev import DataError, UsageError, convert
+from vid2ev.recording.disk import lock, sync, whole_file, writing
+from vid2ev.recording.manifest import difference, read_manifest, versions
+
+FACTS = "dataset.json"
+Report = Callable[[int, int, str], object]  # scenes done, of how many, and the last one's name
+
+
+class Made(NamedTuple):
+    """A recording of a data set: its facts for the card, or why it could not be made."""
+
+    name: str
+    facts: dict[str, Any]
+    failed: str = ""
+
+
+def write_dataset(
+    directory: Path, spec: DatasetSpec, *, resume: bool = False, jobs: int = 1, report: Report | None = None
+) -> dict[str, Any]:
+    """Make a data set; returns its facts, which dataset.json and the data card have.
+
+    jobs     processes that make a scene each; they change nothing but the time it takes
+    resume   go on where an interrupted run was; a finished data set is left as it is
+    Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, or
+    no scene can be made.
+    """
+    job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")}))
+    if directory.exists():
+        return _finished(directory, job, resume)
+    made_in = directory.with_name(f"{directory.name}.partial")
+    if (made_in / "job.json").exists() and not resume:
+        raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
+    scenes = scenes_of(spec)
+    with writing(directory):
+        made_in.mkdir(parents=True, exist_ok=True)
+        handle = lock(made_in)
+        try:
+            _begin(made_in / "job.json", job, directory)
+            made = sorted(_all(scenes, made_in, spec, jobs, report))
+            facts = _facts(job, spec, made)
+            _publish(made_in, directory, facts)
+        finally:
+            os.close(handle)
+    return facts
+
+
+def _all(scenes: list[Scene], folder: Path, spec: DatasetSpec, jobs: int, report: Report | None) -> Iterator[Made]:
+    """All recordings, in whatever order they come."""
+    make = partial(make_scene, folder=folder, layout=spec.layout, multiple=spec.multiple)
+    if jobs == 1:
+        coming: Iterator[Made] = map(make, scenes)
+        yield from _told(coming, len(scenes), report)
+        return
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as processes:
+        futures = [processes.submit(make, scene) for scene in scenes]
+        yield from _told((future.result() for future in as_completed(futures)), len(scenes), report)
+
+
+def _told(coming: Iterator[Made], count: int, report: Report | None) -> Iterator[Made]:
+    for done, made in enumerate(coming, 1):
+        if report:
+            report(done, count, made.name)
+        yield made
+
+
+def make_scene(scene: Scene, folder: Path, layout: str, multiple: int) -> Made:
+    """One recording in a folder, if it is not there yet."""
+    target = folder / scene.name
+    source = target if layout == "own" else folder / "parts" / scene.name
+    try:
+        if not target.exists():
+            source.parent.mkdir(exist_ok=True)
+            convert(scene.video, source, pictures="png", preview=False, resume=True, threads=1, **scene.options)
+            if layout != "own":
+                from interp.data.layouts.writing import write_sequence
+
+                write_sequence(Own(source), target, layout)
+                shutil.rmtree(source)
+        return Made(scene.name, facts_of(target, multiple, scene))
+    except (DataError, UsageError) as error:
+        return Made(scene.name, {}, str(error))
+
+
+def facts_of(folder: Path, multiple: int, scene: Scene) -> dict[str, Any]:
+    """What the card says of a recording."""
+    sequence = open_sequence(folder)
+    frames = len(sequence.times_us)
+    keys = len(sequence.key_frames) if isinstance(sequence, Own) else (frames - 1) // multiple + 1
+    cameras = {camera.name: camera for camera in scene.options["rig"].cameras}
+    start_us, stop_us = sequence.covered_us
+    x_mm, y_mm, _ = cameras["dvs"].translation_mm
+    return {
+        "video": Path(scene.video).name, "key_frames": keys, "samples": max(keys - 1, 0) * multiple, "frames": frames,
+        "events": len(sequence.events(start_us - 1, stop_us).t), "disparity_mm": round((x_mm**2 + y_mm**2) ** 0.5, 3),
+        "size": list(sequence.size),
+    }  # fmt: skip
+
+
+def _facts(job: dict[str, Any], spec: DatasetSpec, made: list[Made]) -> dict[str, Any]:
+    whole, left_out = (
+        [each for each in made if not each.failed],
+        {each.name: each.failed for each in made if each.failed},
+    )
+    if not whole:
+        name, reason = next(iter(left_out.items()), ("none", "nothing was asked for"))
+        raise DataError(f"no scene could be made; the first, {name}: {reason}")
+    rates = {"cis_fps": spec.cis_fps, "interpolated_fps": spec.cis_fps * spec.multiple}
+    sums = {key: sum(each.facts[key] for each in whole) for key in ("samples", "events")}
+    disparity = max(each.facts["disparity_mm"] for each in whole)
+    scenes = {each.name: each.facts for each in whole}
+    return (
+        job
+        | {"scenes": len(whole)}
+        | rates
+        | sums
+        | {"disparity_mm": disparity, "of_scenes": scenes, "left_out": left_out}
+    )
+
+
+def _publish(made_in: Path, directory: Path, facts: dict[str, Any]) -> None:
+    """Put a finished data set in its place, at once."""
+    shutil.rmtree(made_in / "parts", ignore_errors=True)
+    for name, text in ((FACTS, json.dumps(facts, indent=2)), ("README.md", card_text(facts))):
+        with whole_file(made_in / name) as file:
+            file.write(f"{text.rstrip()}\n".encode())
+    (made_in / "job.json").unlink()
+    (made_in / "lock").unlink(missing_ok=True)
+    made_in.rename(directory)
+    sync(directory.absolute().parent)
+
+
+def _begin(path: Path, job: dict[str, Any], directory: Path) -> None:
+    """Note what is made; what was begun must be the same."""
+    if path.exists():
+        if changed := difference(read_manifest(path), job):
+            raise UsageError(f"{directory} was begun with {changed}; --resume needs the options it was begun with")
+        return
+    with whole_file(path) as file:
+        file.write(json.dumps(job, indent=2).encode())
+
+
+def _finished(directory: Path, job: dict[str, Any], resume: bool) -> dict[str, Any]:
+    """The facts of a data set that is there."""
+    if not resume:
+        raise UsageError(f"{directory} exists; choose another folder, or remove it")
+    path = directory / FACTS
+    facts = read_manifest(path) if path.is_file() else {}
+    if changed := difference({key: facts.get(key) for key in job}, job):
+        raise UsageError(f"{directory} is another data set ({changed}); choose another folder")
+    return facts

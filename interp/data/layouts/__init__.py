@@ -1,0 +1,62 @@
+"""Recordings on disk as sequences of frames and events: own ones, HS-ERGB and BS-ERGB.
+
+What a folder is, its content says.  A new layout is a class that satisfies `Sequence`, and a line in `_kind`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from interp.data.layouts.ergb import LAYOUTS, Ergb
+from interp.data.layouts.own import MANIFEST, Own
+from interp.data.layouts.sequence import Placed, Sequence, Windows, windows
+from vid2ev.errors import DataError, UsageError
+
+__all__ = ["Placed", "Sequence", "Windows", "open_sequence", "sequences_in", "windows"]
+
+DEEPEST = 5  # folders below the one that is given
+
+
+def open_sequence(folder: str | Path) -> Sequence:
+    """The sequence in a folder.  Raises UsageError for a folder that is none, DataError for one that is damaged."""
+    folder = Path(folder)
+    kind = _kind(folder)
+    if kind is None:
+        raise UsageError(
+            f"{folder} is no recording; expected one of vid2ev convert, or in the HS-ERGB or BS-ERGB layout"
+        )
+    return Own(folder) if kind == "own" else Ergb(folder, kind)
+
+
+def sequences_in(folder: str | Path) -> tuple[list[Path], dict[str, str]]:
+    """The folders of sequences in a folder and below it, in order, and those that cannot be used, with the reason.
+
+    Raises UsageError where there are none.
+    """
+    found, unusable = list[Path](), dict[str, str]()
+    for path in _below(Path(folder), DEEPEST):
+        try:
+            open_sequence(path)
+        except DataError as error:
+            unusable[str(path)] = str(error)
+        else:
+            found.append(path)
+    if not found and not unusable:
+        raise UsageError(f"{folder}: no recordings in it; expected some of vid2ev, HS-ERGB or BS-ERGB")
+    return found, unusable
+
+
+def _kind(folder: Path) -> str | None:
+    if (folder / MANIFEST).is_file():
+        return "own"
+    return next(
+        (name for name, of in LAYOUTS.items() if all((folder / part).is_dir() for part in (of.images, of.events))), None
+    )
+
+
+def _below(folder: Path, depth: int) -> list[Path]:
+    if _kind(folder):
+        return [folder]
+    if depth == 0 or not folder.is_dir():
+        return []
+    return [found for child in sorted(folder.iterdir()) if child.is_dir() for found in _below(child, depth - 1)]

@@ -1,0 +1,112 @@
+"""HS-ERGB and BS-ERGB: a folder of pictures with their times, and a folder of event files.
+
+    HS-ERGB   SEQUENCE/images_corrected/000000.png, timestamp.txt     SEQUENCE/events_aligned/000000.npz   x y t p
+    BS-ERGB   SEQUENCE/images/000000.png, timestamp.txt               SEQUENCE/events/000000.npz   x y timestamp
+              polarity
+
+Times are microseconds, one to a line.  Some folders have more pictures than times, or more times than pictures: the
+first ones belong together.  Some have lines above the times that are none.  Events lie on the pictures, between
+pixels; what lies beyond is dropped where they are counted (`Placed.within`), never moved to the border.
+
+Sources: Tulyakov et al., "Time Lens", CVPR 2021, and "Time Lens++", CVPR 2022, and the READMEs of their data.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from interp.data.layouts.event_parts import EventParts, numbered
+from interp.data.layouts.sequence import Placed
+from vid2ev.errors import DataError
+
+
+class Names(NamedTuple):
+    """What a layout calls its folders and the columns of its event files."""
+
+    images: str
+    events: str
+    columns: tuple[str, str, str, str]  # x, y, t, p
+    events_after: bool  # file n has the events after picture n, not before it
+
+
+LAYOUTS = {
+    "hsergb": Names("images_corrected", "events_aligned", ("x", "y", "t", "p"), False),
+    "bsergb": Names("images", "events", ("x", "y", "timestamp", "polarity"), True),
+}
+MOMENT = 0.25  # of the time between pictures
+STAMPS = ("timestamp.txt", "timestamps.txt")
+
+
+class Ergb:
+    """A sequence in one of the two layouts.
+
+    Raises DataError for a folder that has no pictures, or no times for them.
+    """
+
+    contrast: tuple[float, float] | None = None
+
+    def __init__(self, folder: Path, layout: str):
+        names = LAYOUTS[layout]
+        self.name, self.folder, self.remarks = folder.name, folder, list[str]()
+        self._images = numbered(folder / names.images, ".png")
+        stamps = self._stamps(folder / names.images)
+        if not self._images or not len(stamps):
+            raise DataError(f"{folder}: {len(self._images)} pictures and {len(stamps)} times; expected some of both")
+        if len(self._images) != len(stamps):
+            self.remarks.append(
+                f"{len(self._images)} pictures and {len(stamps)} times: the first {min(len(self._images), len(stamps))}"
+                " are taken for pairs"
+            )
+        count = min(len(self._images), len(stamps))
+        self._images, self.times_us = self._images[:count], stamps[:count]
+        self.size = self.frame(0).shape[1::-1]
+        self.event_size = self.size
+        self._parts = EventParts(folder / names.events, self.size)
+        self.remarks += self._parts.remarks
+
+    @property
+    def covered_us(self) -> tuple[int, int]:
+        """From the first event to the last; a picture taken a moment before or after is not left out for it."""
+        typical_us = float(np.median(np.diff(self.times_us))) if len(self.times_us) > 1 else 0.0
+        moment_us = int(MOMENT * typical_us)
+        return self._parts.first_us - moment_us, self._parts.last_us + moment_us
+
+    @property
+    def unknown_us(self) -> list[tuple[int, int]]:
+        """What files that cannot be read may have held."""
+        return self._parts.unknown_us
+
+    def frame(self, k: int) -> np.ndarray:
+        """Picture k, red, green, blue."""
+        import cv2
+
+        picture = cv2.imread(str(self._images[k]), cv2.IMREAD_COLOR)
+        if picture is None:
+            raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
+        return picture[..., ::-1]
+
+    def key(self, k: int) -> np.ndarray:
+        """Picture k."""
+        return self.frame(k)
+
+    def events(self, start_us: int, stop_us: int) -> Placed:
+        """The events in (start_us, stop_us]."""
+        return self._parts.between(start_us, stop_us)
+
+    def _stamps(self, folder: Path) -> np.ndarray:
+        """The times [us] of the pictures; what is no number is counted."""
+        path = next((folder / name for name in STAMPS if (folder / name).exists()), None)
+        if path is None:
+            raise DataError(f"{folder}: no {STAMPS[0]}; expected the times of its pictures, one to a line")
+        times, strange = [], 0
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:
+                times.append(round(float(line.split()[0])) if line.strip() else None)
+            except (ValueError, OverflowError):
+                strange += 1
+        if strange:
+            self.remarks.append(f"{strange} lines of {path.name} are no times")
+        return np.array([t for t in times if t is not None], np.int64)

@@ -1,0 +1,97 @@
+"""Sequences: frames and events of one recording on disk, whatever its layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vid2ev import Events
+
+
+class Placed(NamedTuple):
+    """Events at places between pixels: t int64 [us] in order, x and y float32 [px], p 1 for ON and 0 for OFF, uint8."""
+
+    t: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    p: np.ndarray
+
+    def within(self, size: tuple[int, int]) -> tuple[Events, int]:
+        """Those that fall into pixels of a sensor, each in the nearest, and how many others there are."""
+        x, y = np.floor(self.x + np.float32(0.5)), np.floor(self.y + np.float32(0.5))
+        inside = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1])
+        kept = Events(self.t[inside], x[inside].astype(np.uint16), y[inside].astype(np.uint16), self.p[inside])
+        return kept, len(inside) - len(kept)
+
+
+class Sequence(Protocol):
+    """Frames and events on one clock.
+
+    name         of its folder
+    size         width and height of the frames [px]
+    event_size   the same of the event camera
+    times_us     when the frames were taken, int64; not always increasing in files of the field
+    contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    remarks      what cannot be used, with numbers, one sentence each; more may come while events are read
+    """
+
+    name: str
+    size: tuple[int, int]
+    event_size: tuple[int, int]
+    times_us: np.ndarray
+    contrast: tuple[float, float] | None
+    remarks: list[str]
+
+    @property
+    def covered_us(self) -> tuple[int, int]:
+        """The first and the last instant of which events are known; the same where there are none."""
+
+    @property
+    def unknown_us(self) -> list[tuple[int, int]]:
+        """Stretches of that time of which events are not known, as their file cannot be read."""
+
+    def frame(self, k: int) -> np.ndarray:
+        """Frame k, sRGB codes uint8 [H, W, 3].  Raises DataError."""
+
+    def key(self, k: int) -> np.ndarray:
+        """Frame k as a frame camera gave it that is not as fast as the frames; frame k where there is no such camera.
+        Raises DataError."""
+
+    def events(self, start_us: int, stop_us: int) -> Placed:
+        """The events in (start_us, stop_us].  Raises DataError for files that cannot be read."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Where a sequence has a frame, `multiple - 1` to rebuild, and a frame, with events all the way.
+
+    first     indices of the first frames, int64
+    unusable  why other indices are none: reason and number
+    """
+
+    first: np.ndarray
+    unusable: dict[str, int]
+
+
+def windows(sequence: Sequence, multiple: int, every: int = 1) -> Windows:
+    """The windows of a sequence that begin with each `every`-th frame."""
+    times = sequence.times_us
+    begin, end = sequence.covered_us
+    good, unusable = [], dict[str, int]()
+    for k in range(0, max(0, len(times) - multiple), every):
+        part = times[k : k + multiple + 1]
+        if (np.diff(part) <= 0).any():
+            reason = "times of the frames do not increase"
+        elif part[-1] > end:
+            reason = "the events end before the last frame"
+        elif part[0] < begin:
+            reason = "the events begin after the first frame"
+        elif any(since < part[-1] and until > part[0] for since, until in sequence.unknown_us):
+            reason = "a file of events cannot be read"
+        else:
+            good.append(k)
+            continue
+        unusable[reason] = unusable.get(reason, 0) + 1
+    return Windows(np.array(good, np.int64), unusable)

@@ -1,0 +1,128 @@
+"""A pool of clips: a folder that keeps what `made` gives while it is drawn from.
+
+    FOLDER/NAME/000123.npy     clip 123 of the settings, seed and version that NAME stands for
+
+The folder is a cache of a pure function and no more: whatever is missing is made again, so that nothing depends on who
+made a clip, when, or whether the process was killed meanwhile.
+
+Samples are drawn from a window of clips that slides: sample i sees clips low(i) to high(i) - 1,
+
+    high(i) = begin + floor(fresh i)        low(i) = max(0, high(i) - most)
+
+Who draws a sample at which high(i) steps on makes a clip that is needed some time later, so that the processes that
+load samples share the work, and removes one that is needed no more.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.making import made
+from interp.data.settings import ClipSettings
+from vid2ev.errors import UsageError
+from vid2ev.recording.disk import writing
+
+AHEAD = 48  # clips that are made before they are drawn from
+KEPT = 48  # clips behind the window that a slower process may still look at
+VERSION = 1  # of what `made` makes: raise it when clips of a number change
+
+Report = Callable[[int, int], object]  # clips made, of how many
+
+
+class Pool:
+    """Clips of settings and a seed in a folder.
+
+    begin   clips that there are before the first sample
+    most    clips in the window; each of 128x128 pixels takes 1.6 MB
+    fresh   clips that join it with each sample
+    Raises UsageError for a window that cannot be.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: ClipSettings,
+        seed: int,
+        *,
+        begin: int = 256,
+        most: int = 1500,
+        fresh: float = 0.02,
+    ):
+        if not 1 <= begin <= most or fresh < 0:
+            raise UsageError(
+                f"a window of {begin} to {most} clips, {fresh} fresh ones a sample: expected 1 <= begin <= most"
+            )
+        self.settings, self.seed, self.begin, self.most, self.fresh = settings, seed, begin, most, fresh
+        self.folder = folder / f"{settings.name}-{seed}-{VERSION}"
+        with writing(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True)
+
+    def window(self, sample: int) -> range:
+        """The clips that a sample may be drawn from."""
+        high = self.begin + int(self.fresh * sample)
+        return range(max(0, high - self.most), high)
+
+    def clip(self, number: int) -> Clip:
+        """A clip, made if it is not there.  Raises DataError where the folder cannot be written."""
+        path = self._path(number)
+        try:
+            return read_clip(path)
+        except FileNotFoundError:
+            clip = made(self.settings, self.seed, number)
+            with writing(path):
+                write_clip(path, clip)
+            return clip
+
+    def step(self, sample: int) -> None:
+        """What drawing a sample is due: a clip of later, if the window steps on here."""
+        here, after = self.window(sample), self.window(sample + 1)
+        for number in range(here.stop, after.stop):
+            if not self._path(number + AHEAD).exists():
+                self.clip(number + AHEAD)
+            self._path(number - self.most - KEPT).unlink(missing_ok=True)
+
+    def fill(self, sample: int, jobs: int = 1, report: Report | None = None) -> None:
+        """Make what samples from this one on need at first, with some processes, and remove what they do not."""
+        window = self.window(sample)
+        wanted = {*range(window.start, window.stop + AHEAD)}
+        for path in self.folder.glob("*.npy"):
+            if path.stem.isdecimal() and int(path.stem) not in wanted:
+                path.unlink(missing_ok=True)
+        missing = [number for number in sorted(wanted) if not self._path(number).exists()]
+        if not missing:
+            return
+        if jobs == 1:
+            for done, number in enumerate(missing, 1):
+                self.clip(number)
+                if report:
+                    report(done, len(missing))
+            return
+        # (processes that are not forked: threads of torch and numba do not survive it)
+        with ProcessPoolExecutor(jobs, get_context("spawn"), _alone) as processes:
+            making = [processes.submit(_make, self, number) for number in missing]
+            for done, future in enumerate(as_completed(making), 1):
+                future.result()
+                if report:
+                    report(done, len(missing))
+
+    def _path(self, number: int) -> Path:
+        return self.folder / f"{number:06d}.npy"
+
+
+def _make(pool: Pool, number: int) -> None:
+    pool.clip(number)
+
+
+def _alone() -> None:
+    """One thread for each process: they share the cores."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+    import cv2
+    import torch
+
+    torch.set_num_threads(1)
+    cv2.setNumThreads(1)

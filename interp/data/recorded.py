@@ -1,0 +1,105 @@
+"""Clips cut from recordings on disk: real ones, and those that `vid2ev dataset` wrote."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from interp.candidates.contrast import with_fitted_contrast
+from interp.data.chance import chance
+from interp.data.clip import Clip
+from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
+from interp.data.settings import ClipSettings
+from interp.data.tensors import as_tensor
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts, count_events
+from vid2ev.errors import DataError, UsageError
+
+
+def recorded(settings: ClipSettings, seed: int, number: int, multiple: int) -> Clip:
+    """A clip of a recording, drawn for its number: any window, any part of the picture.
+
+    Raises UsageError where no recording has a window of the multiple, or is as large as a clip.
+    """
+    draw = chance(seed, "recorded", number)
+    places = _places(settings.recording_folders, multiple, settings.size)
+    folder, first = places[int(draw.integers(len(places)))]
+    sequence = _opened(folder)
+    left, top = (int(draw.integers(have - want + 1)) for have, want in zip(sequence.size, settings.size, strict=True))
+    return clip_of(
+        sequence, int(first[int(draw.integers(len(first)))]), multiple, settings.bins, (left, top, *settings.size)
+    )
+
+
+def clip_of(
+    sequence: Sequence, first: int, multiple: int, bins: int = 32, part: tuple[int, int, int, int] | None = None
+) -> Clip:
+    """The clip of a window of a sequence; `part` is left, top, width and height of the picture, all of it by default.
+
+    Where nobody knows the thresholds, `contrast` is fitted to the key frames.  Of a sequence whose event camera has
+    another size, left and top move to whole pixels of it; the sizes must be whole multiples of each other.
+    """
+    left, top, width, height = part or (0, 0, *sequence.size)
+    coarser = _coarser(sequence)
+    left, top, width, height = (value - value % coarser for value in (left, top, width, height))
+    rows, columns = slice(top, top + height), slice(left, left + width)
+    truth = np.stack([sequence.frame(first + k)[rows, columns] for k in range(multiple + 1)])
+    keys = np.stack([sequence.key(k)[rows, columns] for k in (first, first + multiple)])
+    start_us, stop_us = (int(sequence.times_us[k]) for k in (first, first + multiple))
+    placed = sequence.events(start_us, stop_us)
+    shifted = placed._replace(x=placed.x - left // coarser, y=placed.y - top // coarser)
+    size = width // coarser, height // coarser
+    events, _ = shifted.within(size)
+    counted = count_events(events, size, start_us, stop_us, bins)
+    counts = np.minimum(counted.off_on[0].numpy(), 255).astype(np.uint8)
+    contrast = sequence.contrast or _fitted(keys, counted, coarser)
+    about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
+    return Clip(truth, keys, counts, contrast, stop_us - start_us, about | {"coarser": coarser})
+
+
+def _fitted(keys: np.ndarray, counted: EventCounts, coarser: int) -> tuple[float, float]:
+    """OFF and ON thresholds that explain the key frames best."""
+    frames = as_tensor(keys)[:, None]
+    laid = counted if coarser == 1 else over(counted, (keys.shape[1], keys.shape[2]))
+    off, on = with_fitted_contrast(frames[0], frames[1], laid).contrast[0].tolist()
+    return off, on
+
+
+def _coarser(sequence: Sequence) -> int:
+    (width, height), (across, down) = sequence.size, sequence.event_size
+    if width % across or height % down or width // across != height // down:
+        raise UsageError(
+            f"{sequence.name}: events of {across}x{down} and frames of {width}x{height}; expected whole multiples"
+        )
+    return width // across
+
+
+@lru_cache(maxsize=32)
+def _opened(folder: str) -> Sequence:
+    return open_sequence(folder)
+
+
+@lru_cache(maxsize=8)
+def _places(folders: tuple[str, ...], multiple: int, size: tuple[int, int]) -> list[tuple[str, np.ndarray]]:
+    """Sequences as large as a clip, each with the first frames of its windows; in order of their names."""
+    found, reasons = list[tuple[str, np.ndarray]](), list[str]()
+    for folder in folders:
+        paths, unusable = sequences_in(folder)
+        reasons += unusable.values()
+        for path in paths:
+            try:
+                sequence = _opened(str(path))
+                if min(have - want for have, want in zip(sequence.size, size, strict=True)) < 0:
+                    reasons.append(f"{path}: frames of {sequence.size[0]}x{sequence.size[1]} are smaller than clips")
+                    continue
+                window = windows(sequence, multiple)
+            except DataError as error:
+                reasons.append(str(error))
+                continue
+            reasons += [f"{path}: {count} windows: {reason}" for reason, count in window.unusable.items()]
+            if len(window.first):
+                found.append((str(path), window.first))
+    if not found:
+        raise UsageError(f"no window of {multiple + 1} frames in {', '.join(folders)}: {'; '.join(reasons[:3])}")
+    return found

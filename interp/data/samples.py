@@ -1,0 +1,132 @@
+"""Samples: what networks are trained with, sample i a function of (settings, seed, i) alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from pydantic import BaseModel, ConfigDict, Field
+from torch.utils.data import Dataset
+
+from interp.data import alter
+from interp.data.chance import Range, chance, uniform
+from interp.data.clip import Clip
+from interp.data.pool import Pool
+from interp.data.settings import ClipSettings
+from interp.data.tensors import Sample, as_tensor, tensors
+from vid2ev.errors import UsageError
+
+
+class SampleSettings(BaseModel):
+    """How samples are drawn from clips."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    size: int = Field(default=96, ge=16, description="width and height [px]")
+    targets: int = Field(default=2, ge=1, le=31, description="instants to rebuild")
+    backwards: float = Field(default=0.5, ge=0, le=1, description="share of samples in which time runs backwards")
+    still: float = Field(default=0.35, ge=0, le=1, description="share with a part in which nothing happens")
+    all_still: float = Field(default=0.03, ge=0, le=1, description="share in which nothing happens anywhere")
+    compressed: float = Field(default=0.5, ge=0, le=1, description="share of the still parts that went through a JPEG")
+    quality: tuple[int, int] = Field(default=(40, 95), description="of that JPEG")
+    thinned: float = Field(default=0.15, ge=0, le=1, description="share that has lost events")
+    lost: Range = Field(default=(0.0, 0.1), description="share of the events that these have lost")
+    threshold_error: Range = Field(default=(0.9, 1.1), description="thresholds that are believed, over those that are")
+
+
+UNALTERED = SampleSettings(backwards=0, still=0, all_still=0, thinned=0, threshold_error=(1, 1))
+
+
+class Samples(Dataset[Sample]):
+    """Samples 0 ... length - 1 of a pool, for frame-fed networks.
+
+    frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
+    off_on     [2, S, h, w] OFF and ON events of S sub-intervals, in the geometry of the frames: uint8; float16 if some
+               event cameras stand elsewhere
+    contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
+    times      [N] float32, instants from 0 to 1, both left out, in order
+    truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
+
+    Raises UsageError for samples that do not fit into clips.
+    """
+
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
+        check_fits(pool.settings, settings.size)
+        if settings.targets >= min(pool.settings.multiples):
+            raise UsageError(
+                f"{settings.targets} targets of clips with {min(pool.settings.multiples) - 1} frames in between:"
+                " expected no more"
+            )
+        self.pool, self.settings, self._length = pool, settings, length
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> Sample:
+        if not 0 <= index < self._length:
+            raise IndexError(index)
+        self.pool.step(index)
+        clip, draw = drawn_clip(self.pool, self.settings, index)
+        chosen = np.sort(1 + draw.permutation(clip.multiple - 1)[: self.settings.targets])
+        return tensors(clip, self.pool.settings) | {
+            "times": torch.from_numpy((chosen / clip.multiple).astype(np.float32)),
+            "truth": as_tensor(clip.truth[chosen]),
+        }
+
+
+def check_fits(clips: ClipSettings, side: int) -> None:
+    """Raise UsageError unless squares of so many pixels fit into clips, also in pixels of coarser event cameras."""
+    if side > min(clips.size):
+        raise UsageError(
+            f"samples of {side} pixels from clips of {clips.size[0]}x{clips.size[1]}: expected smaller ones"
+        )
+    if clips.rigs > 0 and any(side % each for each in clips.coarser):
+        raise UsageError(f"samples of {side} pixels with event cameras coarser by {clips.coarser}: expected multiples")
+
+
+def drawn_clip(pool: Pool, settings: SampleSettings, index: int) -> tuple[Clip, np.random.Generator]:
+    """The clip of a sample, cut and altered, and the generator for what else is drawn."""
+    draw, window = chance(pool.seed, "sample", index), pool.window(index)
+    clip = pool.clip(int(draw.integers(window.start, window.stop)))
+    height, width = clip.truth.shape[1:3]
+    left, top = (
+        clip.coarser * int(draw.integers((side - settings.size) // clip.coarser + 1)) for side in (width, height)
+    )
+    return altered(alter.cropped(clip, left, top, (settings.size, settings.size)), settings, draw), draw
+
+
+def altered(clip: Clip, settings: SampleSettings, draw: np.random.Generator) -> Clip:
+    """A square clip altered by chance."""
+    if draw.random() < 0.5:
+        clip = alter.mirrored(clip)
+    clip = alter.turned(clip, int(draw.integers(4)))
+    if draw.random() < settings.backwards:
+        clip = alter.backwards(clip)
+    if (u := draw.random()) < settings.still + settings.all_still:
+        still = _region(draw, clip.truth.shape[1]) if u < settings.still else np.ones(clip.truth.shape[1:3], bool)
+        compressed = draw.random() < settings.compressed
+        quality = int(draw.integers(settings.quality[0], settings.quality[1] + 1))
+        clip = alter.stilled(clip, still, quality if compressed else None)
+    if draw.random() < settings.thinned:
+        clip = alter.thinned(clip, draw, uniform(draw, settings.lost))
+    return alter.misjudged(clip, draw, settings.threshold_error)
+
+
+def _region(draw: np.random.Generator, side: int) -> np.ndarray:
+    """A part of a square: what is on one side of a line, a round part, or all but that."""
+    y, x = np.indices((side, side)) / side - 0.5
+    if draw.random() < 0.5:
+        angle = draw.uniform(0, 2 * np.pi)
+        return x * np.cos(angle) + y * np.sin(angle) > draw.uniform(-0.4, 0.4)
+    centre, radius = draw.uniform(-0.4, 0.4, 2), draw.uniform(0.15, 0.5)
+    inside = np.hypot(x - centre[0], y - centre[1]) < radius
+    return inside if draw.random() < 0.5 else ~inside
+
+
+def describe(pool: Pool, settings: SampleSettings) -> dict[str, Any]:
+    """All that decides the samples, ready for JSON."""
+    window = {"begin": pool.begin, "most": pool.most, "fresh": pool.fresh}
+    return {
+        "clips": pool.settings.model_dump(mode="json"), "samples": settings.model_dump(mode="json"), "seed": pool.seed
+    } | {"window": window}  # fmt: skip

@@ -1,0 +1,61 @@
+"""Samples of frames one after the other, for recurrent networks; of HDR light, clipped as a frame sensor clips it.
+
+Each sequence is seen by a frame sensor of its own, drawn from the ranges in which the paper trains its HDR network
+(section III.A.4): darkest I16 from 0 to 16000, slope from 15 to 60 I16 per code, noise from 0 to 5.2 codes of 10 bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch.utils.data import Dataset
+
+from interp.data.chance import Range, uniform
+from interp.data.pool import Pool
+from interp.data.samples import SampleSettings, check_fits, drawn_clip
+from interp.data.sensor_ranges import frame_sensor
+from interp.data.tensors import Sample, as_tensor, tensors
+from vid2ev import Cis
+from vid2ev.errors import UsageError
+
+DARKEST: Range = (0.0, 16000.0)  # I16 of code 0
+SLOPE: Range = (15.0, 60.0)  # I16 per code
+NOISE_LSB: Range = (0.0, 5.2)
+
+
+class Sequences(Dataset[Sample]):
+    """Sequences 0 ... length - 1 of a pool: all K + 1 frames of a clip.
+
+    As of `Samples`, but for
+    truth     [K + 1, 3, h, w] float32: sRGB codes, or linear light, as the clips have it
+    clipped   [K + 1, 3, h, w] float32, only of linear light: the codes of a frame sensor, 0 ... 1, of even slope
+
+    Raises UsageError for clips of several lengths, and for samples that do not fit into clips.
+    """
+
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
+        check_fits(pool.settings, settings.size)
+        if len(set(pool.settings.multiples)) > 1:
+            raise UsageError(f"sequences of clips with multiples {pool.settings.multiples}: expected one, such as 32")
+        self.pool, self.settings, self._length = pool, settings, length
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> Sample:
+        if not 0 <= index < self._length:
+            raise IndexError(index)
+        self.pool.step(index)
+        clip, draw = drawn_clip(self.pool, self.settings, index)
+        sample = tensors(clip, self.pool.settings) | {"truth": as_tensor(clip.truth)}
+        if clip.truth.dtype != np.uint8:
+            sample["clipped"] = clipped(clip.truth, draw)
+        return sample
+
+
+def clipped(light: np.ndarray, draw: np.random.Generator) -> torch.Tensor:
+    """Linear light [N, H, W, 3] as a frame sensor of the paper's ranges sees it: [N, 3, H, W], codes from 0 to 1."""
+    spec = frame_sensor(1000, 0.0, uniform(draw, DARKEST), uniform(draw, SLOPE), uniform(draw, NOISE_LSB))
+    cis = Cis(spec, (light.shape[2], light.shape[1]), int(draw.integers(1 << 62)))
+    codes = [each.codes for k, frame in enumerate(light) for each in cis.step(frame.astype(np.float32), 1_000_000 * k)]
+    return torch.from_numpy(np.moveaxis(np.stack(codes), -1, 1).astype(np.float32) / spec.top)

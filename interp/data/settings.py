@@ -1,0 +1,103 @@
+"""What clips are made of: one frozen record, which with a seed and a number decides every bit of a clip."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from interp.data.chance import Range
+from interp.data.sensor_ranges import SENSORS, SensorRanges
+from vid2ev.scenes.scene_file import scene_names
+from vid2ev.scenes.textures import PHOTOGRAPHS
+
+HELD_OUT = ("coffee", "motorcycle", "gravel", "rocket")  # photographs that are kept for validation
+TRAINED_ON = tuple(name for name in PHOTOGRAPHS if name not in HELD_OUT)
+SOURCES = ("scenes", "photographs", "videos", "recordings")
+
+
+class ClipSettings(BaseModel):
+    """How clips are made.
+
+    Raises `pydantic.ValidationError` for what does not go together.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    size: tuple[int, int] = Field(default=(128, 128), description="width and height of the frames [px]")
+    multiples: tuple[int, ...] = Field(
+        default=(8,), description="frames to rebuild per key frame: of 4, 8, 16, 32, each as often"
+    )
+    bins: int = Field(default=32, description="sub-intervals that events are counted in; a multiple of all multiples")
+    scenes: float = Field(default=0.4, ge=0, description="share of clips of rendered scenes")
+    photographs: float = Field(
+        default=0.6, ge=0, description="share of clips of photographs in motion, one before the other"
+    )
+    videos: float = Field(default=0.0, ge=0, description="share of clips of real videos")
+    recordings: float = Field(default=0.0, ge=0, description="share of clips of recordings on disk")
+    video_files: tuple[str, ...] = Field(default=(), description="real videos")
+    recording_folders: tuple[str, ...] = Field(
+        default=(), description="recordings: own, or in the HS-ERGB or BS-ERGB layout"
+    )
+    slowdown: float = Field(default=1.0, gt=0, description="how many times slower than the world the videos play")
+    scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), description="of the scenes")
+    textures: tuple[str, ...] = Field(default=TRAINED_ON, description="photographs: bundled ones by name, or files")
+    environments: tuple[str, ...] = Field(default=(), description="HDR pictures of all that is around, for scenes")
+    motion: tuple[tuple[float, float, float], ...] = Field(
+        default=((0.6, 4, 24), (0.2, 0.5, 4), (0.2, 24, 60)),
+        description="share of clips, and motion per key frame from, to [px]",
+    )
+    step_px: float = Field(
+        default=1.5, gt=0, description="the most that things move from picture to picture, while there are bins"
+    )
+    gap_ms: Range = Field(default=(8.0, 60.0), description="from key frame to key frame, even in the logarithm [ms]")
+    rigs: float = Field(default=0.0, ge=0, le=1, description="share of clips whose event camera stands elsewhere")
+    baseline_mm: Range = Field(default=(0.0, 15.0), description="how far from the frame camera [mm]")
+    coarser: tuple[int, ...] = Field(
+        default=(1, 2, 3), description="pixels of frames per pixel of events, across, in rigs"
+    )
+    sensors: SensorRanges = Field(default=SensorRanges(), description="ranges of the sensors")
+    light: Literal["srgb", "linear"] = Field(
+        default="srgb", description="truth: sRGB codes of 8 bits, or unclipped linear light"
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> ClipSettings:
+        if not self.multiples or not set(self.multiples) <= {4, 8, 16, 32}:
+            raise ValueError(f"multiples {self.multiples}: expected some of 4, 8, 16, 32")
+        if self.bins % max(self.multiples) or self.bins > 64:
+            raise ValueError(f"bins {self.bins}: expected a multiple of {max(self.multiples)} up to 64")
+        if sum(self.shares) <= 0:
+            raise ValueError("no clips: expected a share of scenes, photographs, videos or recordings above 0")
+        if self.videos > 0 and not self.video_files:
+            raise ValueError("videos without video_files: expected one or more")
+        if self.recordings > 0 and not self.recording_folders:
+            raise ValueError("recordings without recording_folders: expected one or more")
+        if any(side % factor for side in self.size for factor in self.coarser) and self.rigs > 0:
+            raise ValueError(f"size {self.size}: expected a multiple of {self.coarser} both ways, for coarser sensors")
+        return self
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Of `SOURCES`."""
+        return self.scenes, self.photographs, self.videos, self.recordings
+
+    @property
+    def name(self) -> str:
+        """A short name; settings that differ have others."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
+
+
+PRESETS = {
+    "default": ClipSettings(),
+    # The paper's sensors: Table I's rig, 30 to 960 frames per second, noise and range of section III.B.2.
+    # The paper's rig, rates and sensors: Table I and section III.B.2.
+    "paper": ClipSettings(
+        size=(144, 144), multiples=(32,), gap_ms=(33.312, 33.344), rigs=1.0, sensors=SENSORS["paper"]
+    ),
+    # HDR: truth is unclipped light; frames are clipped where a sample is drawn (`sequences.py`).
+    "hdr": ClipSettings(
+        light="linear", scenes=0.6, photographs=0.4, scene_names=("low-light", "specular", "flicker", "room")
+    ),
+}  # fmt: skip

@@ -1,0 +1,104 @@
+"""Real videos as shots: every K-th frame a key frame, what the film shows in between the truth.
+
+The event camera sees the very stream that the truth is of: the film's frames, and light carried along the motion
+between them as `vid2ev convert` does it.  So events know nothing that the truth does not show, and nothing of what the
+film did not see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from interp.data.chance import chance
+from interp.data.settings import ClipSettings
+from interp.data.shot import Beside, coarse
+from vid2ev import Frame, UsageError, open_source
+from vid2ev.sources import Source
+from vid2ev.upsample import make_upsampler
+from vid2ev.upsample.cuts import CutDetector
+
+TRIES = 8  # places in films that are looked at for one without a cut
+SMALLER = (1, 2, 3)  # pixels of the film per pixel of a clip, across
+THRESHOLD = 0.15  # nat, that motion is looked for with
+
+
+class VideoShot:
+    """A shot of a real video, drawn for a clip.
+
+    gap_us   from key frame to key frame [us]
+    Raises UsageError for videos that are too short or too small, DataError for those that cannot be read.
+    """
+
+    exposed = True
+
+    def __init__(self, settings: ClipSettings, seed: int, number: int, beside: Beside, multiple: int):
+        draw = chance(seed, "video", number)
+        for _ in range(TRIES):
+            name = settings.video_files[int(draw.integers(len(settings.video_files)))]
+            source = _opened(name)
+            start_s, part = _place(source, name, settings.size, multiple, draw)
+            self._frames = _read(source, start_s, multiple + 3, part, settings.size, name)
+            cuts = CutDetector(THRESHOLD)
+            if not any(cuts.begins_shot(a, b) for a, b in pairwise(self._frames)):
+                break
+        self._multiple, self._beside = multiple, beside
+        gap_ns = (self._frames[multiple + 1].t_ns - self._frames[1].t_ns) / settings.slowdown
+        self.gap_us = settings.bins * max(1, round(gap_ns / 1000 / settings.bins))
+        middle = self._frames[(multiple + 2) // 2 :][:2]
+        self.moved_px = multiple * (make_upsampler("flow", 2).between(*middle).shift_px or 0.0)
+        self.about: dict[str, Any] = {"source": "video", "video": name, "start_s": start_s, "part": list(part)}
+
+    def pictures(self, steps: int, first: int, last: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """The light of both cameras (`Shot`); up to a frame of the film before the gap, and one after it."""
+        each = steps // self._multiple
+        upsampler = make_upsampler("flow", each)
+        stream = [self._frames[0]]
+        for a, b in pairwise(self._frames):
+            stream += upsampler.between(a, b).frames
+        for j in range(first, last + 1):
+            frame = stream[j + each]
+            yield frame.light, coarse(frame.luminance, self._beside.coarser)
+
+
+@lru_cache(maxsize=16)
+def _opened(name: str) -> Source:
+    return open_source(name, colour="rgb")
+
+
+def _place(
+    source: Source, name: str, size: tuple[int, int], multiple: int, draw: np.random.Generator
+) -> tuple[float, tuple[int, int, int, int]]:
+    """A start [s] and a part (left, top, width, height) of a film."""
+    count, seconds = source.frames_expected, source.duration_expected_s
+    if not count or not seconds or count < multiple + 4:
+        raise UsageError(f"{name}: {count} frames; expected at least {multiple + 4} for clips of {multiple}")
+    fits = [each for each in SMALLER if all(each * want <= have for want, have in zip(size, source.size, strict=True))]
+    if not fits:
+        raise UsageError(f"{name}: {source.size[0]}x{source.size[1]} pixels; expected at least {size[0]}x{size[1]}")
+    smaller = fits[int(draw.integers(len(fits)))]
+    wanted = smaller * size[0], smaller * size[1]
+    left, top = (int(draw.integers(have - want + 1)) for have, want in zip(source.size, wanted, strict=True))
+    return float(draw.uniform(0, seconds * (1 - (multiple + 4) / count))), (left, top, *wanted)
+
+
+def _read(
+    source: Source, start_s: float, count: int, part: tuple[int, int, int, int], size: tuple[int, int], name: str
+) -> list[Frame]:
+    """So many frames of a part of a film, at the size of a clip."""
+    from vid2ev.sources.cut import Divisible
+
+    left, top, width, height = part
+    coming = source.frames_between(round(1e9 * start_s), None) if isinstance(source, Divisible) else source.frames()
+    frames = []
+    for frame in coming:
+        light = frame.light[top : top + height, left : left + width]
+        planes = [coarse(np.ascontiguousarray(light[..., c]), width // size[0]) for c in range(3)]
+        frames.append(Frame(np.stack(planes, axis=-1), frame.t_ns))
+        if len(frames) == count:
+            return frames
+    raise UsageError(f"{name}: {len(frames)} frames after {start_s:.3f} s, expected {count}; give a longer film")

@@ -1,0 +1,184 @@
+"""`vid2ev dataset`: recordings as `convert` makes them, whole or not at all, with a card that tells the truth."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from interp.commands.dataset import dataset
+from interp.data.dataset import make_scene, write_dataset
+from interp.data.dataset_spec import DatasetSpec, scenes_of
+from interp.data.layouts import open_sequence, windows
+from interp.data.layouts.own import Own
+from interp.data.recorded import clip_of
+from vid2ev import DataError, UsageError, open_source
+
+QUICK = {"count": 2, "size": (32, 24), "frames": 3}
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A film of 1.2 s at 30 frames a second: as slow as 4 times, it was 0.3 s at 120."""
+    path = tmp_path_factory.mktemp("film") / "film.npz"
+    frames = [frame.light for frame in open_source("synthetic:moving-edge,size=32x24,fps=30,duration_s=1.2").frames()]
+    np.savez(path, frames=np.stack(frames).astype(np.float32), fps=30)
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("data") / "set"
+    write_dataset(directory, DatasetSpec(**QUICK))
+    return directory
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(dataset, [str(each) for each in arguments])
+
+
+def test_a_data_set_has_recordings_and_a_card(made: Path) -> None:
+    facts = json.loads((made / "dataset.json").read_text())
+    assert sorted(path.name for path in made.iterdir()) == [
+        "README.md", "close-object-00000", "dataset.json", "flicker-00001",
+    ]  # fmt: skip
+    assert (facts["scenes"], facts["samples"], facts["cis_fps"], facts["interpolated_fps"]) == (
+        2,
+        2 * 2 * 8,
+        30.0,
+        240.0,
+    )
+    card = (made / "README.md").read_text()
+    assert "| Scenes | 2 |" in card and "| Samples | 32 (3 CIS frames a scene) |" in card
+    assert 0 < facts["disparity_mm"] <= 15
+
+
+def test_key_frames_have_their_middles_where_there_is_truth(made: Path) -> None:
+    for path in (made / "close-object-00000", made / "flicker-00001"):
+        sequence = open_sequence(path)
+        assert isinstance(sequence, Own)
+        assert np.diff(sequence.key_frames).tolist() == [8, 8]
+        assert list(windows(sequence, 8).first)[:1] == [0]
+        clip = clip_of(sequence, sequence.key_frames[0], 8)
+        assert clip.contrast == sequence.contrast and clip.off_on.any()
+        # The key frame is the truth at its instant but for noise, blur and what it clips.
+        apart = np.abs(clip.keys.astype(int) - clip.truth[[0, -1]])
+        assert np.median(apart) <= 6
+
+
+def test_the_papers_set_is_that_of_table_i() -> None:
+    spec = DatasetSpec(preset="paper")
+    scenes = scenes_of(spec.model_copy(update={"count": 16}))
+    assert len({scene.name for scene in scenes}) == 16
+    assert (spec.frames - 1) * spec.multiple == 192 and spec.cis_fps * spec.multiple == 960
+    for scene in scenes:
+        cameras = {camera.name: camera for camera in scene.options["rig"].cameras}
+        assert np.hypot(*cameras["dvs"].translation_mm[:2]) <= 15
+        assert not cameras["cis"].translation_mm[0] and not cameras["instants"].translation_mm[0]
+        assert set(cameras["dvs"].set) <= {"mismatch", "follower_tau_us"}  # (by the last bit of 0.015, of 100)
+        assert cameras["instants"].set["frame_rate_hz"] == 960 and cameras["instants"].set["noise_lsb"] == 0
+
+
+def test_films_are_cut_into_scenes_of_the_right_speed(film: Path, tmp_path: Path) -> None:
+    result = run(tmp_path / "set", "--from", film, "--slowdown", 4, "--count", 1, "--jobs", 1, "--json")
+    assert result.exit_code == 0, result.output
+    facts = json.loads(result.output)
+    name, scene = next(iter(facts["of_scenes"].items()))
+    assert facts["disparity_mm"] == 0 and scene["samples"] == 48 and scene["key_frames"] == 7
+    sequence = open_sequence(tmp_path / "set" / name)
+    assert np.diff(sequence.times_us).mean() == pytest.approx(1e6 / 240, abs=1)
+    assert "They are real films." in (tmp_path / "set" / "README.md").read_text()
+
+
+def test_a_film_that_is_too_short_is_refused(film: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected at least"):
+        write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), slowdown=10))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("layout", ["hsergb", "bsergb"])
+def test_other_layouts_hold_the_same(made: Path, tmp_path: Path, layout: str) -> None:
+    result = run(tmp_path / "set", "--layout", layout, "--count", 1, "--size", "32x24", "--jobs", 1, "-q")
+    assert result.exit_code == 0, result.output
+    assert result.output == ""
+    scene = scenes_of(DatasetSpec(layout=layout, count=1, size=(32, 24)))[0]
+    assert not any(scene.options["rig"].cameras[0].translation_mm)
+    make_scene(scene, tmp_path, "own", 8)
+    ours, theirs = open_sequence(tmp_path / scene.name), open_sequence(tmp_path / "set" / scene.name)
+    np.testing.assert_array_equal(ours.times_us, theirs.times_us)
+    np.testing.assert_array_equal(ours.frame(20), theirs.frame(20))
+    between = int(ours.times_us[3]), int(ours.times_us[40])
+    for name in "txyp":
+        np.testing.assert_array_equal(getattr(ours.events(*between), name), getattr(theirs.events(*between), name))
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from interp.data.dataset import write_dataset
+from interp.data.dataset_spec import DatasetSpec
+
+write_dataset(Path(sys.argv[1]), DatasetSpec.model_validate_json(sys.argv[2]),
+              report=lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+"""
+
+
+def test_what_was_killed_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    directory, spec = tmp_path / "set", DatasetSpec(**QUICK)
+    done = subprocess.run([sys.executable, "-c", KILLED, str(directory), spec.model_dump_json()], capture_output=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert not directory.exists() and (tmp_path / "set.partial" / "close-object-00000").is_dir()
+    with pytest.raises(UsageError, match="--resume continues it"):
+        write_dataset(directory, spec)
+    with pytest.raises(UsageError, match="needs the options it was begun with"):
+        write_dataset(directory, spec.model_copy(update={"seed": 1}), resume=True)
+    again = write_dataset(directory, spec, resume=True)
+    assert again == json.loads((made / "dataset.json").read_text())
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+    for path in made.rglob("*"):
+        if path.is_file() and path.name != "manifest.json":  # (which says when it was made)
+            assert path.read_bytes() == (directory / path.relative_to(made)).read_bytes(), path
+    assert write_dataset(directory, spec, resume=True) == again  # (a finished one is left as it is)
+
+
+def test_what_is_there_is_left_alone(made: Path) -> None:
+    with pytest.raises(UsageError, match="exists; choose another folder"):
+        write_dataset(made, DatasetSpec(**QUICK))
+    with pytest.raises(UsageError, match="is another data set"):
+        write_dataset(made, DatasetSpec(**(QUICK | {"seed": 5})), resume=True)
+
+
+def test_scenes_that_cannot_be_made_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from interp.data import dataset as module
+
+    real = module.convert
+
+    def fails(video: str, *arguments: object, **options: object) -> object:
+        if "flicker" in video:
+            raise DataError("no lamp")
+        return real(video, *arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "convert", fails)
+    facts = write_dataset(tmp_path / "set", DatasetSpec(**QUICK))
+    assert facts["left_out"] == {"flicker-00001": "no lamp"} and facts["scenes"] == 1
+    assert "* flicker-00001: no lamp" in (tmp_path / "set" / "README.md").read_text()
+    monkeypatch.setattr(module, "convert", lambda *_, **__: (_ for _ in ()).throw(DataError("nothing at all")))
+    with pytest.raises(DataError, match=r"no scene could be made.*nothing at all"):
+        write_dataset(tmp_path / "none", DatasetSpec(**QUICK))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--slowdown", "4"], ["--size", "large"], ["--size", "8x8"], ["--from", "nowhere.mp4"], ["--count", "0"]],
+)
+def test_what_cannot_be_meant_is_one_sentence_and_exit_code_2(tmp_path: Path, arguments: list[str]) -> None:
+    result = run(tmp_path / "set", *arguments)
+    said = result.exception if isinstance(result.exception, UsageError) else result
+    assert said is not None and said.exit_code == 2, result.output
+    assert not list(tmp_path.iterdir())
