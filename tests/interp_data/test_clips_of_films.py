@@ -1,0 +1,76 @@
+"""Clips of films, and what networks are validated with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from interp.data.making import made
+from interp.data.sensor_ranges import SENSORS
+from interp.data.settings import HELD_OUT, TRAINED_ON, ClipSettings
+from interp.data.validation import SEED, held_out, validation_clips
+from vid2ev import UsageError, open_source
+from vid2ev.light.eight_bits import srgb_codes
+
+REAL = Path(__file__).parents[3] / "shared" / "data" / "videos" / "nasa_13013.mp4"
+FILMS = {"scenes": 0.0, "photographs": 0.0, "videos": 1.0, "size": (32, 24), "sensors": SENSORS["clean"]}
+
+
+def film(path: Path, count: int = 40, size: str = "64x48") -> str:
+    """A film of an edge that moves, at 50 frames a second."""
+    text = f"synthetic:moving-edge,size={size},fps=50,duration_s={(count - 1) / 50},speed=40"
+    light = np.stack([frame.light for frame in open_source(text).frames()])
+    np.savez(path, frames=np.repeat(light[..., None], 3, axis=3).astype(np.float32), fps=50)
+    return str(path)
+
+
+def test_the_truth_is_what_the_film_shows(tmp_path: Path) -> None:
+    name = film(tmp_path / "film.npz")
+    frames = np.stack([srgb_codes(frame.light) for frame in open_source(name, colour="rgb").frames()])
+    for number in range(4):
+        clip = made(ClipSettings(**FILMS, video_files=(name,)), 0, number)
+        left, top, width, _ = clip.about["part"]
+        assert clip.gap_us == 160_000 and clip.about["gain"] == 1.0
+        if width == 32:  # (a part that was not made smaller)
+            shown = frames[:, top : top + 24, left : left + 32]
+            starts = [k for k in range(len(shown) - 8) if np.abs(shown[k : k + 9].astype(int) - clip.truth).max() <= 1]
+            assert starts, "the nine frames stand in the film, one after the other; codes of 10 bits may round by one"
+
+
+def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:
+    settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz"),), slowdown=4)
+    assert made(settings, 0, 0).gap_us == 40_000
+
+
+@pytest.mark.parametrize(("count", "size", "said"), [(11, "64x48", "at least 12"), (40, "24x48", "at least 32x24")])
+def test_films_that_are_too_short_or_small_are_refused(tmp_path: Path, count: int, size: str, said: str) -> None:
+    settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz", count, size),))
+    with pytest.raises(UsageError, match=said):
+        made(settings, 0, 0)
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="no ../shared/data")
+def test_a_real_film_is_cut_where_nothing_is_cut(tmp_path: Path) -> None:
+    settings = ClipSettings(**(FILMS | {"size": (96, 96)}), video_files=(str(REAL),))
+    clips = [made(settings, 0, number) for number in range(4)]
+    assert len({clip.about["start_s"] for clip in clips}) == 4
+    for clip in clips:
+        assert 319_000 < clip.gap_us < 321_000  # (8 frames at 25 a second)
+        np.testing.assert_array_equal(clip.keys, clip.truth[[0, -1]])
+
+
+def test_validation_sees_what_training_does_not(tmp_path: Path) -> None:
+    settings = ClipSettings(size=(32, 24), sensors=SENSORS["clean"], scene_names=("spinning-shapes",))
+    assert set(held_out(settings).textures) == set(HELD_OUT) and not set(HELD_OUT) & set(TRAINED_ON)
+    name = film(tmp_path / "film.npz")
+    clips = validation_clips(settings, 3, [name], each=2)
+    assert [clip.about["source"] for clip in clips[3:]] == ["video", "video"]
+    assert {clip.about["source"] for clip in clips[:3]} <= {"scene", "photographs"}
+    again = validation_clips(settings, 3)
+    for one, other in zip(clips, again, strict=False):
+        np.testing.assert_array_equal(one.truth, other.truth)
+        assert one.about == other.about
+    assert SEED != 0
+    assert made(settings, 0, 0).about != clips[0].about
