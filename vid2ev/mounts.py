@@ -120,9 +120,14 @@ class Mount:
             return DvsOnCard(spec, self.size, self.seed, memory=memory, camera=number, labels=labels)
         return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip)
 
-    def cis(self, threads: int = 1) -> Cis:
+    def cis(self, threads: int = 1, device: Device = CPU) -> Cis:
         """The frame sensor, before its first frame."""
         assert isinstance(self.sensor.spec, CisSpec)
+        if device.name != "cpu":
+            from vid2ev.sensors.cis_on_card import CisOnCard
+
+            memory = memory_of(device.name)
+            return CisOnCard(self.sensor.spec, self.size, self.seed, memory=memory, camera=self.number)
         return Cis(self.sensor.spec, self.size, self.seed, camera=self.number, threads=threads)
 
     def describe(self) -> dict[str, Any]:

@@ -169,7 +169,7 @@ class Recorder:
 
     def _track(self, mount: Mount, threads: int, skip: bool) -> Track:
         if mount.kind == "cis":
-            return CisTrack(mount.cis(threads), self.folder, self.outputs, within=mount.within)
+            return CisTrack(mount.cis(threads, self.device), self.folder, self.outputs, within=mount.within)
         source = self.recipe.source
         return DvsTrack(
             mount.dvs(self.recipe.labels, threads, skip, self.device),

@@ -11,7 +11,6 @@ from vid2ev.recording.exposures import ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.upload import downloaded
 
 
 class CisTrack:
@@ -35,7 +34,7 @@ class CisTrack:
     def add(self, frame: Frame) -> None:
         """The next frame, and the exposures that it completes."""
         self._begun = True
-        for exposure in self.cis.exposures(downloaded(frame)):
+        for exposure in self.cis.exposures(frame):
             self._files.add(exposure)
             self.last_us = exposure.end_ns // 1000
 
