@@ -197,6 +197,41 @@ def test_light_along_motion_moves_events_by_a_microsecond(tmp_path, gathering, c
     assert_about_the_same(tmp_path / "one", tmp_path / "other", 10_000)
 
 
+SCENE = """
+[scene]
+duration_s = 0.012
+samples = 1
+background = [0.02, 0.02, 0.02]
+ambient = 1.0
+[camera]
+size = [14, 14]
+fov_deg = 80
+[[objects]]
+name = "ball"
+kind = "sphere"
+size_m = [1, 1, 1]
+trajectory = { kind = "keyframes", times_s = [0, 1], positions_m = [[-0.5, 0, 2], [60, 0, 2]] }
+"""
+
+
+@pytest.mark.parametrize("pair", [False, True])
+def test_a_scene_is_painted_on_the_card(tmp_path, gathering, pair):
+    """Pictures in the simulator are those of the CPU to the bit; the luminance that is mixed of them is rounded
+    otherwise."""
+    cameras = (Camera(name="a", kind="dvs"), Camera(name="b", kind="dvs", translation_mm=(30.0, 0.0, 0.0)))
+    options: dict[str, Any] = {"sensor": "ideal", "fps": 500, "preview": False}
+    options |= {"rig": Rig(cameras=cameras), "truth": "depth,flow", "truth_rate_hz": 500.0} if pair else {}
+    (tmp_path / "ball.toml").write_text(SCENE)
+    convert(tmp_path / "ball.toml", tmp_path / "one", **options)
+    convert(tmp_path / "ball.toml", tmp_path / "other", device="simulated", **options)
+    for name in ("a", "b") if pair else ("",):
+        assert_about_the_same(tmp_path / "one" / name, tmp_path / "other" / name, 20, most_us=5)
+        for kind in ("depth", "flow") if pair else ():
+            files = [sorted((tmp_path / made / name / "truth" / kind).iterdir()) for made in ("one", "other")]
+            assert files[0]
+            assert all(one.read_bytes() == other.read_bytes() for one, other in zip(*files, strict=True))
+
+
 @pytest.mark.slow
 def test_all_of_it_with_a_simulated_card(tmp_path):
     options = {"sensor": "ideal", "subframes": 2, "preview": False}

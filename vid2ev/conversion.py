@@ -83,10 +83,10 @@ def convert(
     check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
-    if scene := scene_of(recipe.source):
-        scene.world.afresh = not skip
     threads = threads or usable_cores()
     where = device_for(device, recipe.work, threads)
+    if scene := scene_of(recipe.source):
+        scene.world.afresh, scene.memory = not skip, where.memory
     planner = Planner(recipe, tolerance, threads, where) if effects == "auto" else None
     recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:

@@ -26,7 +26,7 @@ from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
-from vid2ev.stream.upload import Upload, downloaded
+from vid2ev.stream.upload import Upload, as_array, downloaded
 from vid2ev.truth import Truth, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
@@ -91,13 +91,14 @@ def events_of(
 def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
     """The frames of the source as a camera sees them, read again, in 8 bits of sRGB: to be kept beside its events."""
     sight = Sight(recipe.rig.source, [mount], recipe.plane_m)
+    seen: Iterable[tuple[int, Any]]
     if recipe.source.dense and not sight.free:
         stage = Stage(recipe.source, [mount])
-        seen = ((t_ns, stage.pictures(t_ns)[0][0].light) for t_ns in stage.instants_ns)
+        seen = zip(stage.instants_ns, (picture.light for ((picture, _),) in stage.pictures()), strict=True)
     else:
-        seen = ((frame.t_ns, sight.views(frame)[0].light) for frame in recipe.source.frames())
+        seen = ((frame.t_ns, sight.views(downloaded(frame))[0].light) for frame in recipe.source.frames())
     for t_ns, light in seen:
-        yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(light))
+        yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(as_array(light)))
 
 
 def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
@@ -124,18 +125,19 @@ def _rendered(recipe: Recipe, start: int, upload: Upload | None) -> Generator[In
     stage, wanted = Stage(recipe.source, recipe.mounts), recipe.truth
     due = with_next(stage.instants_ns, wanted) if wanted else {}
     before: tuple[Frame, ...] = ()
-    for t_ns in stage.instants_ns[start:]:
-        (seen, stills), truth = zip(*stage.pictures(t_ns), strict=True), tuple[Truth, ...]()
+    for t_ns, pictures in zip(stage.instants_ns[start:], stage.pictures(start), strict=True):
+        (seen, stills), truth = zip(*pictures, strict=True), tuple[Truth, ...]()
         if wanted and t_ns in due:
-            truth = wanted.of_pictures(stage.world, t_ns, due[t_ns], seen, recipe.mounts)
-        lights = [picture.light for picture in seen]
+            known = [each._make(map(as_array, each)) for each in seen]
+            truth = wanted.of_pictures(stage.world, t_ns, due[t_ns], known, recipe.mounts)
+        lights = [upload.light(picture.light) if upload else picture.light for picture in seen]
         frames = arriving(Frame(lights[0], t_ns), lights, recipe.mounts, recipe.bayer)
         if before:  # (what reaches a pixel is a function of the light there)
             frames = tuple(
                 replace(frame, still=None if still is None else Still(last.light, still))
                 for frame, last, still in zip(frames, before, stills, strict=True)
             )
-        yield Instant(tuple(map(upload.frame, frames)) if upload else frames, t_ns, truth=truth)
+        yield Instant(frames, t_ns, truth=truth)
         before = frames
 
 
@@ -155,9 +157,10 @@ def _intervals(recipe: Recipe, start: int, upload: Upload | None) -> Generator[I
     upsampler, straight = recipe.upsampler(upload), NoUpsampling()
     cuts = CutDetector(recipe.threshold)
     before: Frame | None = None
-    # (whether there is a cut after frame `start` depends on the frame before it, too)
+    # (whether there is a cut after frame `start` depends on the frame before it, too; a scene is a single shot)
     for index, frame in enumerate(recipe.source.frames(max(start - 1, 0)), max(start - 1, 0)):
-        cut = before is not None and cuts.begins_shot(before, frame) and recipe.cuts == "restart"
+        shot = before is not None and not recipe.source.dense and cuts.begins_shot(before, frame)
+        cut = shot and recipe.cuts == "restart"
         if index == start:
             yield Interval(iter([frame]))
         elif before is not None and index > start:

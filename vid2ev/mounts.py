@@ -13,7 +13,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
-from vid2ev.sensors.devices import CPU, Device, memory_of
+from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
@@ -116,8 +116,7 @@ class Mount:
         if device.name != "cpu":
             from vid2ev.sensors.dvs_on_card import DvsOnCard
 
-            memory = memory_of(device.name)
-            return DvsOnCard(spec, self.size, self.seed, memory=memory, camera=number, labels=labels)
+            return DvsOnCard(spec, self.size, self.seed, memory=device.memory, camera=number, labels=labels)
         return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip)
 
     def cis(self, threads: int = 1, device: Device = CPU) -> Cis:
@@ -126,8 +125,7 @@ class Mount:
         if device.name != "cpu":
             from vid2ev.sensors.cis_on_card import CisOnCard
 
-            memory = memory_of(device.name)
-            return CisOnCard(self.sensor.spec, self.size, self.seed, memory=memory, camera=self.number)
+            return CisOnCard(self.sensor.spec, self.size, self.seed, memory=device.memory, camera=self.number)
         return Cis(self.sensor.spec, self.size, self.seed, camera=self.number, threads=threads)
 
     def describe(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from vid2ev.errors import UsageError
 from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
 from vid2ev.rig.views import View, Views, is_same
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.render import Picture
@@ -75,19 +76,28 @@ class Stage:
                 "a rig sees all of a scene: leave --crop, --size and --slowdown out; set its camera's size"
             )
         self.world, self._mounts = scene.world, mounts
-        self._reels: dict[tuple[object, ...], Reel] = {}
+        self._memory = None if scene.world.renderer else scene.memory  # (another renderer is not asked on a device)
         self.instants_ns = scene.instants_between(*(source.ends_ns() if isinstance(source, Cut) else (None, None)))
 
-    def pictures(self, t_ns: int) -> list[tuple[Picture, np.ndarray | None]]:
-        """What each camera sees at an instant, and which strips have not changed since the last one that was asked for
-        (`scenes.reel`); cameras with the same view share it."""
-        seen: dict[tuple[object, ...], tuple[Picture, np.ndarray | None]] = {}
+    def pictures(self, start: int = 0) -> Iterator[list[tuple[Picture, np.ndarray | None]]]:
+        """What each camera sees at each instant from number `start` on, and which strips have not changed since the one
+        before (`scenes.reel`; on a device nobody asks); cameras with the same view share it."""
         keys = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in self._mounts]
-        for key, mount in zip(keys, self._mounts, strict=True):
-            if key not in seen:
-                reel = self._reels.setdefault(key, Reel(self.world, mount.intrinsics, mount.pose))
-                seen[key] = reel.picture(t_ns)
-        return [seen[key] for key in keys]
+        views = {key: mount.view for key, mount in zip(keys, self._mounts, strict=True)}
+        seen = {key: self._of_view(view, self.instants_ns[start:]) for key, view in views.items()}
+        for pictures in zip(*seen.values(), strict=True):
+            of_key = dict(zip(seen, pictures, strict=True))
+            yield [of_key[key] for key in keys]
+
+    def _of_view(
+        self, view: tuple[Intrinsics, Pose], instants_ns: Sequence[int]
+    ) -> Iterator[tuple[Picture, np.ndarray | None]]:
+        """The pictures of a camera."""
+        if self._memory is None:
+            return map(Reel(self.world, *view).picture, instants_ns)
+        from vid2ev.scenes.reel_on_card import ReelOnCard
+
+        return ((picture, None) for picture in ReelOnCard(self.world, self._memory, *view).pictures(instants_ns))
 
 
 def arriving(

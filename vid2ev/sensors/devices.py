@@ -42,6 +42,11 @@ class Device:
         """The device of torch's that light is on; None: light is in arrays."""
         return {"cuda": "cuda", SIMULATED: "cpu"}.get(self.name)
 
+    @property
+    def memory(self) -> Any:
+        """Its memory, as of `memory_of`; None for the CPU."""
+        return None if self.name == "cpu" else memory_of(self.name)
+
     def describe(self) -> dict[str, str]:
         """The device, ready for JSON."""
         return {"asked": self.asked, "used": self.name, "why": self.why}

@@ -40,6 +40,11 @@ class Upload:
         return replace(frame, light=self.light(frame.light), still=None)
 
 
+def as_array(light: Any) -> np.ndarray:
+    """Light, or whatever a device holds, as an array; the very array if it is one."""
+    return light if isinstance(light, np.ndarray) else light.cpu().numpy()  # type: ignore[no-any-return]
+
+
 def downloaded(frame: Frame) -> Frame:
     """The frame with its light as an array; the very frame if that is one."""
-    return frame if isinstance(frame.light, np.ndarray) else replace(frame, light=frame.light.cpu().numpy())
+    return frame if isinstance(frame.light, np.ndarray) else replace(frame, light=as_array(frame.light))
