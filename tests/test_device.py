@@ -145,6 +145,22 @@ def test_shots_are_those_of_the_cpu(tmp_path, gathering, clip_with_a_cut, cuts):
     assert_same(tmp_path / "one", tmp_path / "other")
 
 
+def test_views_are_those_of_the_cpu(tmp_path, gathering):
+    """A turned camera before a plane; its light is sampled where it is, within some float32 units in the last place."""
+    cameras = (
+        Camera(name="here", kind="dvs"),
+        Camera(name="beside", kind="dvs", translation_mm=(40.0, 0.0, 0.0), rotation_deg=(0.0, 1.0, 3.0)),
+    )
+    rig = Rig(source=Source(fov_deg=60.0), cameras=cameras)
+    options = OPTIONS | {"rig": rig, "depth": "plane:2", "overrides": ["crossing_noise=0"], "truth": "depth,mask"}
+    convert(CLIP, tmp_path / "one", **options)
+    convert(CLIP, tmp_path / "other", device="simulated", **options)
+    for name in ("here", "beside"):
+        assert_about_the_same(tmp_path / "one" / name, tmp_path / "other" / name, 1000, most_us=5)
+        masks = [sorted((tmp_path / made / name / "truth" / "mask").iterdir()) for made in ("one", "other")]
+        assert all(one.read_bytes() == other.read_bytes() for one, other in zip(*masks, strict=True))
+
+
 def raw(recording: Path) -> np.ndarray:
     """The pictures of the frame camera of a recording, codes of its ADC."""
     paths = sorted((recording / "cis" / "raw").glob("*.png"))

@@ -106,7 +106,7 @@ def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[In
     if recipe.source.dense and (recipe.truth or not sight.free):
         return (yield from _rendered(recipe, start, upload))
     wanted, before_ns = recipe.truth, None
-    made = _light(recipe, start, upload if sight.free else None)  # (views are made on the CPU)
+    made = _light(recipe, start, upload)
     with closing(made if sight.free else ahead(made, FRAMES_AHEAD)) as light:
         for frame, limited, shift_px in light:
             views, truth = sight.views(frame), tuple[Truth, ...]()
@@ -116,7 +116,6 @@ def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[In
                     truth = wanted.of_views(frame, recipe.rig.source, recipe.plane_m, recipe.mounts, masks)
                 before_ns = frame.t_ns
             frames = arriving(frame, [view.light for view in views], recipe.mounts, recipe.bayer)
-            frames = tuple(map(upload.frame, frames)) if upload else frames
             yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth, shift_px, frame.depth)
 
 
