@@ -38,26 +38,15 @@ class SampleSettings(BaseModel):
 UNALTERED = SampleSettings(backwards=0, still=0, all_still=0, thinned=0, threshold_error=(1, 1))
 
 
-class Samples(Dataset[Sample]):
-    """Samples 0 ... length - 1 of a pool, for frame-fed networks.
+class Drawn(Dataset[Sample]):
+    """Samples 0 ... length - 1 of a pool.
 
-    frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
-    off_on     [2, S, h, w] OFF and ON events of S sub-intervals, in the geometry of the frames: uint8; float16 if some
-               event cameras stand elsewhere
-    contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
-    times      [N] float32, instants from 0 to 1, both left out, in order
-    truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
-
-    Raises UsageError for samples that do not fit into clips.
+    Drawing one may make a clip that is due for later (`pool`).  Raises UsageError for samples that do not fit into
+    clips.
     """
 
     def __init__(self, pool: Pool, settings: SampleSettings, length: int):
         check_fits(pool.settings, settings.size)
-        if settings.targets >= min(pool.settings.multiples):
-            raise UsageError(
-                f"{settings.targets} targets of clips with {min(pool.settings.multiples) - 1} frames in between:"
-                " expected no more"
-            )
         self.pool, self.settings, self._length = pool, settings, length
 
     def __len__(self) -> int:
@@ -68,11 +57,37 @@ class Samples(Dataset[Sample]):
             raise IndexError(index)
         self.pool.step(index)
         clip, draw = drawn_clip(self.pool, self.settings, index)
+        return tensors(clip, self.pool.settings) | self.truth(clip, draw)
+
+    def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
+        """What else a sample has of its clip."""
+        raise NotImplementedError
+
+
+class Samples(Drawn):
+    """Samples for frame-fed networks.
+
+    frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
+    off_on     [2, S, h, w] OFF and ON events of S sub-intervals, in the geometry of the frames: uint8; float16 if some
+               event cameras stand elsewhere
+    contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
+    times      [N] float32, instants from 0 to 1, both left out, in order
+    truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
+    """
+
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
+        super().__init__(pool, settings, length)
+        if settings.targets >= min(pool.settings.multiples):
+            raise UsageError(
+                f"{settings.targets} targets of clips with {min(pool.settings.multiples) - 1} frames in between:"
+                " expected no more"
+            )
+
+    def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
+        """Instants, and what was there."""
         chosen = np.sort(1 + draw.permutation(clip.multiple - 1)[: self.settings.targets])
-        return tensors(clip, self.pool.settings) | {
-            "times": torch.from_numpy((chosen / clip.multiple).astype(np.float32)),
-            "truth": as_tensor(clip.truth[chosen]),
-        }
+        times = torch.from_numpy((chosen / clip.multiple).astype(np.float32))
+        return {"times": times, "truth": as_tensor(clip.truth[chosen])}
 
 
 def check_fits(clips: ClipSettings, side: int) -> None:

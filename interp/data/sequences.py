@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch.utils.data import Dataset
 
 from interp.data.chance import Range, uniform
+from interp.data.clip import Clip
 from interp.data.pool import Pool
-from interp.data.samples import SampleSettings, check_fits, drawn_clip
+from interp.data.samples import Drawn, SampleSettings
 from interp.data.sensor_ranges import frame_sensor
-from interp.data.tensors import Sample, as_tensor, tensors
+from interp.data.tensors import Sample, as_tensor
 from vid2ev import Cis
 from vid2ev.errors import UsageError
 
@@ -23,34 +23,24 @@ SLOPE: Range = (15.0, 60.0)  # I16 per code
 NOISE_LSB: Range = (0.0, 5.2)
 
 
-class Sequences(Dataset[Sample]):
-    """Sequences 0 ... length - 1 of a pool: all K + 1 frames of a clip.
+class Sequences(Drawn):
+    """All K + 1 frames of a clip; `frames`, `off_on` and `contrast` as of `Samples`, but
 
-    As of `Samples`, but for
     truth     [K + 1, 3, h, w] float32: sRGB codes, or linear light, as the clips have it
     clipped   [K + 1, 3, h, w] float32, only of linear light: the codes of a frame sensor, 0 ... 1, of even slope
 
-    Raises UsageError for clips of several lengths, and for samples that do not fit into clips.
+    Raises UsageError for clips of several lengths, too.
     """
 
     def __init__(self, pool: Pool, settings: SampleSettings, length: int):
-        check_fits(pool.settings, settings.size)
+        super().__init__(pool, settings, length)
         if len(set(pool.settings.multiples)) > 1:
             raise UsageError(f"sequences of clips with multiples {pool.settings.multiples}: expected one, such as 32")
-        self.pool, self.settings, self._length = pool, settings, length
 
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, index: int) -> Sample:
-        if not 0 <= index < self._length:
-            raise IndexError(index)
-        self.pool.step(index)
-        clip, draw = drawn_clip(self.pool, self.settings, index)
-        sample = tensors(clip, self.pool.settings) | {"truth": as_tensor(clip.truth)}
-        if clip.truth.dtype != np.uint8:
-            sample["clipped"] = clipped(clip.truth, draw)
-        return sample
+    def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
+        """All frames, and what a frame sensor makes of them."""
+        clips = {"clipped": clipped(clip.truth, draw)} if clip.truth.dtype != np.uint8 else {}
+        return {"truth": as_tensor(clip.truth)} | clips
 
 
 def clipped(light: np.ndarray, draw: np.random.Generator) -> torch.Tensor:

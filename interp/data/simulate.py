@@ -4,6 +4,15 @@ The key frames are at 0 and at the gap, in the middle of their exposures.  Pictu
 more moves: to sensors light is a straight line between two.  The event camera watches from an eighth of the gap before
 the first key frame on at least, so that its poles have the lag that motion gives them; events count from the key frame
 on.
+
+What few pictures cost, against 32 a gap, with motion of 4 to 14 px, an ideal event sensor and K = 8: sums of events up
+to the frames to rebuild differ by so many nats (rms), and so many of the events are others.
+
+    steps of     photographs          scenes
+    1.5 px       0.013 nat, 1.8 %     0.024 nat, 5.6 %
+    0.75 px      0.006 nat, 0.5 %     0.014 nat, 2.0 %
+
+That thresholds are 0.15 nat apart alone makes 0.043 nat.
 """
 
 from __future__ import annotations
