@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,9 @@ LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless",
 HEAD = 1 << 20  # bytes at the start of a file by which it is known
 
 
-def versions() -> dict[str, str]:
-    """The versions of what takes part in making events."""
-    return {"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}
+def versions(more: Sequence[str] = ()) -> dict[str, str]:
+    """The versions of what takes part in making events, and of more distributions."""
+    return {"python": platform.python_version()} | {name: _version(name) for name in (*LIBRARIES, *more)}
 
 
 def machine() -> dict[str, Any]:

@@ -19,6 +19,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import DataError, UsageError, clause, nearest
+from vid2ev.requests import setting
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
 
@@ -89,8 +90,8 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
     sensor = read_sensor(name_or_path, kind)
     values = dict(sensor.values)
     for override in overrides:
-        key, value = _parse_override(override, kind)
-        values[key] = value
+        key, value = setting(override, kind.example)
+        values[key.removeprefix(f"{kind.table}.")] = value
     try:
         return kind.spec(**values)
     except ValidationError as error:
@@ -169,28 +170,6 @@ def _comments(text: str, kind: Kind) -> dict[str, str]:
             found[assignment[1]] = " ".join(block)
         block = []
     return found
-
-
-def _parse_override(text: str, kind: Kind) -> tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    key = key.strip().removeprefix(f"{kind.table}.")
-    if not equals or not key or not value.strip():
-        raise UsageError(f"Setting '{text}' is not of the form key=value; write for example {kind.example}.")
-    return key, _parse_value(value.strip())
-
-
-def _parse_value(text: str) -> Any:
-    """A TOML value; else a number as Python reads it (`.2`); else the text itself."""
-    try:
-        parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
-        parsed = {}
-    if list(parsed) == ["value"]:
-        return parsed["value"]
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
