@@ -25,7 +25,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 FLOORS = {
     "errors": 0,
     "toml_text": 0,
-    "requests": 0,
+    "requests": 1,
     "kernel_cache": 0,
     "kernel_flags": 0,
     "kernel_extending": 0,
@@ -76,6 +76,7 @@ CLIENT_FLOORS = {
     "weights": 5,
     "work": 5,
     "data": 5,
+    "train": 7,
     "commands": 8,
 }
 PACKAGES = {"vid2ev": FLOORS, "interp": CLIENT_FLOORS}

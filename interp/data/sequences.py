@@ -13,7 +13,7 @@ from interp.data.chance import Range, uniform
 from interp.data.clip import Clip
 from interp.data.pool import Pool
 from interp.data.samples import Drawn, SampleSettings
-from interp.data.sensor_ranges import frame_sensor
+from interp.data.sensor_ranges import WHITE, frame_sensor
 from interp.data.tensors import Sample, as_tensor
 from vid2ev import Cis
 from vid2ev.errors import UsageError
@@ -28,6 +28,7 @@ class Sequences(Drawn):
 
     truth     [K + 1, 3, h, w] float32: sRGB codes, or linear light, as the clips have it
     clipped   [K + 1, 3, h, w] float32, only of linear light: the codes of a frame sensor, 0 ... 1, of even slope
+    range     [2] float32, beside these: the light of codes 0 and 1
 
     Raises UsageError for clips of several lengths, too.
     """
@@ -39,13 +40,15 @@ class Sequences(Drawn):
 
     def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
         """All frames, and what a frame sensor makes of them."""
-        clips = {"clipped": clipped(clip.truth, draw)} if clip.truth.dtype != np.uint8 else {}
+        clips = clipped(clip.truth, draw) if clip.truth.dtype != np.uint8 else {}
         return {"truth": as_tensor(clip.truth)} | clips
 
 
-def clipped(light: np.ndarray, draw: np.random.Generator) -> torch.Tensor:
-    """Linear light [N, H, W, 3] as a frame sensor of the paper's ranges sees it: [N, 3, H, W], codes from 0 to 1."""
+def clipped(light: np.ndarray, draw: np.random.Generator) -> Sample:
+    """`clipped` and `range` of a sequence: linear light [N, H, W, 3] as a sensor of the paper's ranges sees it."""
     spec = frame_sensor(1000, 0.0, uniform(draw, DARKEST), uniform(draw, SLOPE), uniform(draw, NOISE_LSB))
     cis = Cis(spec, (light.shape[2], light.shape[1]), int(draw.integers(1 << 62)))
     codes = [each.codes for k, frame in enumerate(light) for each in cis.step(frame.astype(np.float32), 1_000_000 * k)]
-    return torch.from_numpy(np.moveaxis(np.stack(codes), -1, 1).astype(np.float32) / spec.top)
+    ends = np.array([spec.min_illuminance, spec.min_illuminance + spec.top * spec.slope]) / WHITE
+    seen = np.moveaxis(np.stack(codes), -1, 1).astype(np.float32) / spec.top
+    return {"clipped": torch.from_numpy(seen), "range": torch.from_numpy(ends.astype(np.float32))}

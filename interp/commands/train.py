@@ -1,0 +1,153 @@
+"""`vid2ev train`: a network, from simulated or real samples to its weights."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vid2ev.commands.convert import Auto
+from vid2ev.errors import UsageError
+
+if TYPE_CHECKING:
+    from interp.train.fit import Outcome
+    from interp.train.job import Job
+    from interp.train.machines import Machines
+
+WORD = "auto"
+
+
+@click.command(short_help="Train a network that rebuilds video from slow frames and events.")
+@click.option(
+    "--network", default="rrin-events-light", show_default=True, metavar="NAME",
+    help="superslomo, slomo-events, rrin, rrin-events, rrin-slomo-events, timelens, e2vid, firenet, hdr.",
+)  # fmt: skip
+@click.option("--size", type=click.Choice(["tiny", "small", "paper"]), default="tiny", show_default=True, help="Width.")
+@click.option(
+    "--data", multiple=True, metavar="PATH", type=click.Path(exists=True),
+    help="A video, or a folder of recordings; may be repeated.  [default: scenes, made on the fly]",
+)  # fmt: skip
+@click.option(
+    "--validate", multiple=True, metavar="VIDEO", type=click.Path(exists=True, dir_okay=False),
+    help="A video to validate with, beside scenes: frames of it are left out.",
+)  # fmt: skip
+@click.option("-o", "--output", metavar="RUN", help="Folder of the run.  [default: NETWORK_SIZE here]")
+@click.option("--time", "time_", metavar="TIME", help="How long it may take, such as 2h.  [default: 55m]")
+@click.option("--steps", type=click.IntRange(1), metavar="N", help="Steps, whatever time they take.")
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE",
+    help="Change a number of the recipe, of the network. (its options), clips., samples. or window.; may be repeated.",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Another seed is another run.")
+@click.option("--resume", is_flag=True, help="Go on where a run stands.")
+@click.option("--session", metavar="TIME", help="Stop after this time, such as 5m, to go on another time.")
+@click.option(
+    "--devices", type=Auto(WORD, 1, "devices"), default=WORD, show_default=True,
+    help="GPUs of each machine, or processes without.",
+)  # fmt: skip
+@click.option("--nodes", type=click.IntRange(1), default=1, show_default=True, help="Machines; start it on each.")
+@click.option("--cpu", is_flag=True, help="Train on the CPU though there is a GPU.")
+@click.option("--workers", type=click.IntRange(0), metavar="N", help="Processes that make samples.  [default: cores]")
+@click.option("--dry-run", is_flag=True, help="Check everything, say what would be done, do nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def train(
+    output: str | None,
+    resume: bool,
+    session: str | None,
+    devices: int | str,
+    nodes: int,
+    cpu: bool,
+    workers: int | None,
+    dry_run: bool,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Train a network, with samples that are simulated on the fly or taken from videos and recordings.
+
+    A run is a folder with weights.safetensors, curves, pictures, and all that it takes to go on: interrupted or killed
+    at any moment, or carried to another machine, it continues with --resume, on a CPU to the very same weights.
+    """
+    from interp.train.machines import Machines, check_installed
+
+    session_s = _seconds(session, "--session") if session else None
+    path = Path(output or f"{options['network']}_{options['size']}".replace("-", "_"))
+    job = _taken_up(path, options) if resume else _job(options)
+    if dry_run:
+        from interp.train.told import described
+
+        click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
+        return
+    check_installed()
+    machines = Machines(devices, nodes, "cpu" if cpu else "auto")  # type: ignore[arg-type]
+    outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json)
+    if machines.first:
+        _tell(outcome, path, as_json, quiet)
+
+
+def _run(
+    job: Job,
+    path: Path,
+    resume: bool,
+    machines: Machines,
+    session_s: float | None,
+    workers: int | None,
+    quiet: bool,
+) -> Outcome:
+    """A session; the first Ctrl-C ends it after the step, with a checkpoint."""
+    from interp.train.runs import run
+    from vid2ev.commands.progress import heard
+
+    with heard(gently=True) as check:
+        return run(job, path, resume, machines, session_s, workers, quiet, check)
+
+
+def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
+    from interp.train import told
+
+    if as_json:
+        click.echo(json.dumps(told.as_json(outcome), indent=2))
+    elif not quiet:
+        of = f" of {outcome.steps}" if outcome.steps else ""
+        skipped = f", {outcome.skipped} without a finite gradient skipped" * bool(outcome.skipped)
+        rest = "" if outcome.finished else "; the same command with --resume goes on"
+        click.echo(f"{path}: step {outcome.step}{of}{skipped}{rest}")
+        if outcome.finished:
+            click.echo(f"\n{told.table(outcome)}")
+
+
+def _job(options: Mapping[str, Any]) -> Job:
+    """The job of options of the command line."""
+    from interp.train.job import Job
+
+    paths = options["data"]
+    videos = [path for path in paths if Path(path).is_file()]
+    settings = [f"seed={options['seed']}", *options["settings"]]
+    if options["time_"]:
+        settings.append(f"time_s={_seconds(options['time_'], '--time')}")
+    if options["steps"]:
+        settings.append(f"steps={options['steps']}")
+    recordings = [path for path in paths if path not in videos]
+    return Job.of(options["network"], options["size"], settings, videos, recordings, options["validate"])
+
+
+def _taken_up(path: Path, options: Mapping[str, Any]) -> Job:
+    """The job of a run that was begun, unless the command line says what it should be."""
+    from interp.train.job import Job
+    from interp.train.run_folder import begun_job
+    from vid2ev.commands.progress import given
+
+    return _job(options) if given() & options.keys() else Job(**begun_job(path))
+
+
+def _seconds(text: str, option: str) -> float:
+    """Seconds of a time such as 90s, 55m or 2h."""
+    found = re.fullmatch(r"([0-9]{1,9}\.?[0-9]{0,9})\s*(s|m|h|)", text.strip())
+    if not found or float(found[1]) == 0:
+        raise UsageError(f"{option} {text}: expected a time above 0; give it as 90s, 55m or 2h")
+    return float(found[1]) * {"s": 1, "": 1, "m": 60, "h": 3600}[found[2]]

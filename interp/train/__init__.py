@@ -1,0 +1,1 @@
+"""Training: networks and samples in, weights and their curves out.  `vid2ev train` is its command."""

@@ -1,0 +1,73 @@
+"""Which samples a step takes: step n of batches of b takes samples n b ... n b + b - 1.
+
+Samples are a function of their number, so the step is all there is to know of the position in the data: training goes
+on where it was, with any number of processes and workers.  Of W processes, process r takes the r-th of W equal parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import count
+from typing import Any
+
+import torch
+from lightning.pytorch import LightningDataModule
+from torch.utils.data import DataLoader, Dataset, Sampler
+
+from vid2ev.errors import UsageError
+
+Batch = dict[str, torch.Tensor]  # as of `interp.data`, with a dimension more in front
+
+
+class Steps(Sampler[list[int]]):
+    """The numbers of the samples of each step from `first` on, without end; those of one process."""
+
+    def __init__(self, first: int, batch: int, rank: int = 0, processes: int = 1):
+        self.first, self.batch, self.rank, self.processes = first, batch, rank, processes
+
+    def __iter__(self) -> Iterator[list[int]]:
+        part = self.batch // self.processes
+        for step in count(self.first):
+            start = step * self.batch + self.rank * part
+            yield list(range(start, start + part))
+
+
+class Feed(LightningDataModule):
+    """Samples to train with and clips to validate with, for Lightning.
+
+    training     sample i is a function of i; it is asked for i without end
+    validation   batches of one clip each, and the group of clips that it belongs to
+    batch        samples per step, of all processes together
+    workers      processes that make samples, for each process that trains; 0 makes them in between steps
+    Raises UsageError where a batch cannot be shared out evenly.
+    """
+
+    def __init__(self, training: Dataset[Any], validation: Sequence[tuple[str, Batch]], batch: int, workers: int):
+        super().__init__()
+        self.training, self.validation = training, validation
+        self.batch, self.workers = batch, workers
+
+    def train_dataloader(self) -> DataLoader[Any]:
+        """From the trainer's step on."""
+        trainer = self.trainer
+        assert trainer is not None
+        if self.batch % trainer.world_size:
+            raise UsageError(
+                f"batches of {self.batch} cannot be shared out evenly among {trainer.world_size} processes;"
+                " set batch to a multiple, or use fewer --devices"
+            )
+        steps = Steps(trainer.global_step, self.batch, trainer.global_rank, trainer.world_size)
+        return DataLoader(
+            self.training,
+            batch_sampler=steps,
+            num_workers=self.workers,
+            persistent_workers=self.workers > 0,
+            pin_memory=trainer.strategy.root_device.type == "cuda",
+        )
+
+    def val_dataloader(self) -> DataLoader[Any]:
+        """Every process's share of the clips: each W-th."""
+        trainer = self.trainer
+        assert trainer is not None
+        mine = self.validation[trainer.global_rank :: trainer.world_size]
+        return DataLoader(mine, batch_size=None)  # type: ignore[arg-type]

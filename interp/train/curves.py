@@ -1,0 +1,76 @@
+"""Curves as CSV, a file for training and one for validation, with a row per step that is logged.
+
+Lightning's own writer of CSV forgets what is there when training goes on; this one keeps the rows up to the step from
+which it goes on, and takes up columns that come later.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lightning.pytorch.loggers.logger import Logger
+from lightning.pytorch.utilities import rank_zero_only
+
+from vid2ev.recording.disk import whole_file
+
+FILES = {"train": "training.csv", "validation": "validation.csv"}
+
+
+class Curves(Logger):
+    """Writes what is logged as "train/NAME" and "validation/NAME" to the folder; keeps rows up to `step`."""
+
+    def __init__(self, folder: Path, step: int = 0):
+        super().__init__()
+        self.folder = folder
+        self._columns: dict[str, list[str]] = {}
+        if rank_zero_only.rank == 0:  # type: ignore[attr-defined]
+            for name in FILES.values():
+                self._write(name, [row for row in read_curve(folder / name) if float(row["step"]) <= step])
+
+    @property
+    def name(self) -> str:
+        """Lightning asks for one."""
+        return ""
+
+    @property
+    def version(self) -> str:
+        """As `name`."""
+        return ""
+
+    def log_hyperparams(self, *_: Any, **__: Any) -> None:
+        """They are in the run's configuration."""
+
+    @rank_zero_only
+    def log_metrics(self, metrics: Mapping[str, float], step: int | None = None) -> None:
+        """Add a row to each file that the metrics are of."""
+        for group, name in FILES.items():
+            mine = {key.removeprefix(f"{group}/"): value for key, value in metrics.items() if key.startswith(group)}
+            if mine:
+                self._add(name, {"step": f"{step}"} | {key: f"{value:.6g}" for key, value in mine.items()})
+
+    def _add(self, name: str, row: dict[str, str]) -> None:
+        if not set(row) <= set(self._columns.get(name, [])):
+            self._write(name, [*read_curve(self.folder / name), row])
+            return
+        with open(self.folder / name, "a", newline="", encoding="utf-8") as file:
+            csv.DictWriter(file, self._columns[name], lineterminator="\n").writerow(row)
+
+    def _write(self, name: str, rows: list[dict[str, str]]) -> None:
+        columns = list(dict.fromkeys(key for row in rows for key in row))
+        if not columns:
+            (self.folder / name).unlink(missing_ok=True)
+            return
+        with whole_file(self.folder / name) as raw:
+            lines = [columns, *([row.get(key, "") for key in columns] for row in rows)]
+            raw.write("".join(",".join(line) + "\n" for line in lines).encode())
+        self._columns[name] = columns
+
+
+def read_curve(path: Path) -> list[dict[str, str]]:
+    """The rows of a curve that are whole; none if there is no file."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    whole = text[: text.rfind("\n") + 1]
+    return list(csv.DictReader(whole.splitlines()))

@@ -1,0 +1,189 @@
+"""A session of training, from the checkpoint, if there is one, to the end, or as far as it goes."""
+
+from __future__ import annotations
+
+import logging
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+
+import torch
+from lightning.pytorch import Trainer
+from lightning.pytorch.callbacks import WeightAveraging
+from lightning.pytorch.loggers import TensorBoardLogger
+
+from interp.train.batches import Feed
+from interp.train.checkpoints import Saves, WholeFiles, read_checkpoint
+from interp.train.curves import Curves
+from interp.train.keeping import Keeping
+from interp.train.learner import Learner, means
+from interp.train.machines import ALL, Machines
+from interp.train.progress import Bar
+from interp.train.run_folder import RunFolder
+from interp.train.schedule import Schedule
+from interp.train.scores import Scores
+from interp.train.session import Limits, Session, validate_every
+
+LOG_EVERY = 10  # steps
+Stop = Callable[[], bool]
+NEVER = 1 << 62  # batches until validation, while the steps are not known
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a session ended.
+
+    step, steps   where training stands, and how many steps it has; None where that is not known yet
+    skipped       steps without a finite gradient
+    scores        of methods on groups of clips, the network's as "network"; empty before the end
+    """
+
+    step: int
+    steps: int | None
+    skipped: int
+    scores: dict[str, dict[str, Scores]]
+
+    @property
+    def finished(self) -> bool:
+        """Whether training is done."""
+        return self.step == self.steps
+
+
+@dataclass(slots=True)
+class Fit:
+    """A session of training.
+
+    name        of the network, for its weights
+    session_s   seconds after which to stop, to go on another time; None for no end
+    stop        asked after each step: whether to stop
+    begun_s     when the session began, by the monotonic clock; now unless given
+    """
+
+    learner: Learner
+    feed: Feed
+    folder: RunFolder
+    name: str
+    machines: Machines = ALL
+    session_s: float | None = None
+    stop: Stop = lambda: False
+    quiet: bool = False
+    begun_s: float = field(default_factory=time.monotonic)
+
+    def run(self) -> Outcome:
+        """Train.  Raises DataError where training does not get on, or a file does not hold what it should."""
+        with unmentioned():
+            torch.set_num_threads(self.learner.recipe.threads)
+            step = read_checkpoint(self.folder.checkpoint)["global_step"] if self.folder.checkpoint.exists() else 0
+            self._take_up(self._given())
+            trainer = self._trainer(step)
+            self._measure(trainer, step)
+            trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
+            return self._outcome(trainer)
+
+    def _given(self) -> tuple[int, int] | None:
+        steps = self.learner.recipe.steps
+        return (steps, 0) if steps else self.folder.fixed()
+
+    def _take_up(self, steps_and_level: tuple[int, int] | None) -> None:
+        recipe = self.learner.recipe
+        self.learner.schedule = Schedule(recipe.warm_up, recipe.rate_end, *steps_and_level or ())
+
+    def _fix(self, steps: int, level: int) -> None:
+        self.folder.fix(steps, level)
+        self._take_up((steps, level))
+
+    def _trainer(self, step: int) -> Trainer:
+        recipe, steps = self.learner.recipe, self.learner.schedule.steps
+        limits = Limits(recipe.time_s, recipe.validations, self.session_s, self.stop)
+        session = Session(limits, self._fix, self._validation_s, self.begun_s)
+        path = self.folder.path
+        board = TensorBoardLogger(path, name="tensorboard", version="", purge_step=step or None)
+        return Trainer(
+            accelerator=self.machines.accelerator,
+            devices=self.machines.devices,
+            num_nodes=self.machines.nodes,
+            precision=self._precision(),  # type: ignore[arg-type]
+            max_steps=steps or -1,
+            max_epochs=-1,
+            val_check_interval=validate_every(steps, recipe.validations) if steps else NEVER,
+            check_val_every_n_epoch=None,
+            num_sanity_val_steps=0,
+            log_every_n_steps=LOG_EVERY,
+            logger=[Curves(path, step), board],
+            callbacks=[
+                session,
+                Bar(recipe.batch, self.quiet),
+                Keeping(self.folder, self.name),
+                WeightAveraging(use_buffers=False, avg_fn=self._mean),
+                Saves(self.folder.checkpoint, recipe.save_s),
+            ],
+            plugins=[WholeFiles()],
+            use_distributed_sampler=False,
+            enable_progress_bar=False,
+            enable_model_summary=False,
+            default_root_dir=path,
+        )
+
+    def _precision(self) -> str:
+        asked = self.learner.recipe.precision
+        if asked == "auto":
+            on_gpu = self.machines.accelerator != "cpu" and torch.cuda.is_available()
+            asked = "32" if not on_gpu else "bf16" if torch.cuda.is_bf16_supported() else "16"
+        return {"32": "32-true", "bf16": "bf16-mixed", "16": "16-mixed"}[asked]
+
+    def _mean(self, mean: torch.Tensor, weight: torch.Tensor, count: torch.Tensor) -> torch.Tensor:
+        """The running mean with one weight more; at first over fewer steps, so that it does not hang on the start."""
+        return torch.lerp(weight, mean, min(self.learner.recipe.mean, (1 + int(count)) / (10 + int(count))))
+
+    def _measure(self, trainer: Trainer, step: int) -> None:
+        """The scores of what needs no training, once, and of the network before it has learnt anything."""
+        if self.folder.first and not self.folder.baselines():
+            found = [
+                (group, name, self.learner.scored(clip, images))
+                for group, clip in self.feed.validation
+                for name, images in self.learner.baselines(clip).items()
+            ]
+            names = dict.fromkeys(name for _, name, _ in found)
+            tables = {name: means([(group, each) for group, of, each in found if of == name]) for name in names}
+            self.folder.write_baselines(
+                {name: {g: asdict(s) for g, s in table.items()} for name, table in tables.items()}
+            )
+        if not step:
+            trainer.validate(self.learner, self.feed, verbose=False)
+
+    def _validation_s(self) -> float:
+        return self.learner.validation_s
+
+    def _outcome(self, trainer: Trainer) -> Outcome:
+        step, steps, skipped = trainer.global_step, self.learner.schedule.steps, self.learner.skipped
+        if step != steps:
+            return Outcome(step, steps, skipped, {})
+        if self.learner.validated_at != step:
+            self.learner.load_state_dict(read_checkpoint(self.folder.checkpoint)["state_dict"])  # (the running mean)
+            trainer.validate(self.learner, self.feed, verbose=False)
+        found: dict[str, dict[str, Scores]] = {group: {"network": one} for group, one in self.learner.table.items()}
+        for name, table in self.folder.baselines().items():
+            for group, values in table.items():
+                found[group][name] = Scores(**values)
+        return Outcome(step, steps, skipped, found)
+
+
+@contextmanager
+def unmentioned() -> Iterator[None]:
+    """Without what Lightning tells people who write training loops."""
+    from lightning.fabric.utilities.warnings import PossibleUserWarning
+
+    loggers = [logging.getLogger(f"lightning.{part}") for part in ("pytorch", "fabric")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PossibleUserWarning)
+            warnings.filterwarnings("ignore", r".*isinstance\(treespec, LeafSpec\)", FutureWarning)
+            yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

@@ -1,0 +1,88 @@
+"""Networks that take two frames learn to rebuild what is between them.
+
+A batch has, as of `interp.data.samples`, frames [B, 2, C, H, W] codes 0 ... 1, off_on [B, 2, S, H, W] and contrast
+[B, 2] of the events between them, times [B, N], and truth [B, N, C, H, W] codes at these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from interp.losses import objectives
+from interp.losses.perceptual import Perceptual
+from interp.networks.frame_fed import FrameFed, Interpolated
+from interp.representation.event_counts import EventCounts
+from interp.train.baselines import METHODS, baseline
+from interp.train.batches import Batch
+from interp.train.learner import Learner
+from interp.train.pictures import of_error, of_events, rows, shown
+from interp.train.recipe import Recipe
+from interp.train.schedule import Schedule
+from interp.train.scores import Scores, scores
+
+OF_FEATURES = ("superslomo", "slomo_events", "timelens")  # whose loss looks at them, too
+
+
+class FrameFedLearner(Learner):
+    """A network that takes two frames, with the loss that its name stands for."""
+
+    network: FrameFed
+
+    def __init__(self, name: str, network: FrameFed, recipe: Recipe, schedule: Schedule):
+        super().__init__(network, recipe, schedule)
+        self.of = name
+        self.features = Perceptual(squared=name != "timelens") if name in OF_FEATURES else None
+
+    def made(self, batch: Batch) -> Interpolated:
+        """What the network makes of a batch."""
+        first, last = batch["frames"].unbind(1)
+        return self.network(first, last, batch["times"], events_of(batch))
+
+    def parts(self, batch: Batch) -> objectives.Terms:
+        """Terms of the loss."""
+        made, truth = self.made(batch), batch["truth"]
+        if self.of == "timelens":
+            return objectives.time_lens(made, truth, self.features)  # type: ignore[arg-type]
+        if self.features is not None:
+            first, last = batch["frames"].unbind(1)
+            return objectives.super_slomo(made, first, last, truth, self.features)
+        if self.of == "rrin_events_light":
+            return objectives.supervised_residue(made, truth, self.schedule.progress(self.trainer.global_step))
+        return objectives.residue(made, truth)
+
+    def predicted(self, clip: Batch) -> torch.Tensor:
+        """Images [N, C, H, W] codes of one pair."""
+        return self.made(clip).images[0]
+
+    def scored(self, clip: Batch, images: torch.Tensor) -> list[Scores]:
+        """One for each of the images."""
+        return scores(images, clip["truth"][0], *clip["frames"][0])
+
+    def baselines(self, clip: Batch) -> dict[str, torch.Tensor]:
+        """Images of the methods without training."""
+        first, last = clip["frames"][0]
+        return {name: baseline(name, first, last, events_of(clip), clip["times"][0]) for name in METHODS}
+
+    def picture(self, clip: Batch, images: torch.Tensor) -> np.ndarray:
+        """First frame, events up to the target, bridge, prediction, truth, error, last frame; a row per target."""
+        events, times, truth = events_of(clip), clip["times"][0], clip["truth"][0]
+        first, last = clip["frames"][0]
+        bridge = baseline("bridge", first, last, events, times)
+        return rows(
+            [
+                first,
+                of_events(events, float(times[n]), first),
+                bridge[n],
+                images[n],
+                truth[n],
+                of_error(images[n], truth[n]),
+                last,
+            ]
+            for n in shown(len(times))
+        )
+
+
+def events_of(batch: Batch) -> EventCounts:
+    """The events of a batch."""
+    return EventCounts(batch["off_on"], batch["contrast"])

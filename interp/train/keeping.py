@@ -1,0 +1,55 @@
+"""What a run keeps after each validation: the weights, for use, and pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from lightning.pytorch import Callback, LightningModule, Trainer
+from lightning.pytorch.loggers import TensorBoardLogger
+
+from interp import weights
+from interp.train.learner import Learner
+from interp.train.pictures import encoded
+from interp.train.run_folder import RunFolder
+from vid2ev.recording.disk import whole_file, writing
+
+
+class Keeping(Callback):
+    """Writes weights and pictures; stands before the callback that keeps the running mean, whose weights these are."""
+
+    def __init__(self, folder: RunFolder, network: str):
+        self.folder, self.network = folder, network
+        self._pictured: set[str] = set()
+
+    def on_validation_epoch_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        """No pictures yet."""
+        self._pictured = set()
+
+    def on_validation_batch_end(
+        self, trainer: Trainer, pl_module: LightningModule, outputs: Any, batch: Any, *_: Any
+    ) -> None:
+        """A picture of the first clip of each group."""
+        group, clip = batch
+        if group in self._pictured or not trainer.is_global_zero:
+            return
+        self._pictured.add(group)
+        assert isinstance(pl_module, Learner)
+        rgb = pl_module.picture(clip, outputs)
+        with self._writing():
+            self.folder.pictures.mkdir(exist_ok=True)
+            with whole_file(self.folder.pictures / f"step-{trainer.global_step:07d}-{group}.png") as file:
+                file.write(encoded(rgb))
+        for logger in trainer.loggers:
+            if isinstance(logger, TensorBoardLogger):
+                logger.experiment.add_image(group, torch.from_numpy(rgb), trainer.global_step, dataformats="HWC")
+
+    def on_validation_epoch_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        """The weights."""
+        assert isinstance(pl_module, Learner)
+        if trainer.is_global_zero:
+            with self._writing():
+                weights.save(self.folder.weights, self.network, pl_module.network, {"step": str(trainer.global_step)})
+
+    def _writing(self) -> Any:
+        return writing(self.folder.path, "make room or access there, then --resume")

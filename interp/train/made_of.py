@@ -1,0 +1,94 @@
+"""A job's parts: the learner, and what feeds it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch.utils.data import Dataset, default_collate
+
+from interp.data.chance import chance
+from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.pool import Pool, Report
+from interp.data.samples import Samples
+from interp.data.sensor_ranges import SENSORS
+from interp.data.sequences import Sequences, clipped
+from interp.data.settings import ClipSettings
+from interp.data.tensors import as_tensor, tensors
+from interp.data.validation import validation_clips
+from interp.networks import make
+from interp.train.batches import Batch, Feed
+from interp.train.event_fed import EventFedLearner
+from interp.train.frame_fed import FrameFedLearner
+from interp.train.hdr import HdrLearner
+from interp.train.job import EVENT_FED, Job
+from interp.train.learner import Learner
+from interp.train.schedule import Schedule
+from interp.train.true_flows import WithFlows, with_flows
+
+WITHOUT_END = 1 << 40  # samples
+MEASURED_WITH = ("clean", "noisy")  # event sensors
+
+
+def learner_of(job: Job) -> Learner:
+    """The learner, with first weights that are a function of the seed."""
+    torch.manual_seed(job.recipe.seed)
+    network: Any = make(job.network, job.size, **job.options)
+    schedule = Schedule(job.recipe.warm_up, job.recipe.rate_end, job.recipe.steps)
+    if job.network == "hdr":
+        return HdrLearner(job.network, network, job.recipe, schedule)
+    kind = EventFedLearner if job.network in EVENT_FED else FrameFedLearner
+    return kind(job.network, network, job.recipe, schedule)  # type: ignore[type-var]
+
+
+def feed_of(job: Job, cache: Path, step: int, workers: int, jobs: int, report: Report | None = None) -> Feed:
+    """Samples from a step on, and clips to validate with.
+
+    cache   a folder for clips; what is missing there is made again
+    jobs    processes that make the first clips
+    """
+    pool = Pool(cache, job.clips, job.recipe.seed, **job.window.model_dump())
+    pool.fill(step * job.recipe.batch, jobs, report)
+    return Feed(_samples(job, pool), _validation(job, cache / "validation"), job.recipe.batch, workers)
+
+
+def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
+    if not job.sequences:
+        return Samples(pool, job.samples, WITHOUT_END)
+    return WithFlows(Sequences(pool, job.samples, WITHOUT_END))
+
+
+def _validation(job: Job, cache: Path) -> list[tuple[str, Batch]]:
+    """Clips of two event sensors, each as a batch of its own, with every instant a target."""
+    batches = []
+    for sensor in MEASURED_WITH:
+        clips = job.clips.model_copy(update={"sensors": SENSORS[sensor]})
+        for number, clip in enumerate(_kept_clips(job, clips, cache / sensor)):
+            group = f"{'scenes' if number < job.validation_clips else 'real'}-{sensor}"
+            batches.append((group, default_collate([_whole(job, clip, number)])))
+    return batches
+
+
+def _whole(job: Job, clip: Clip, number: int) -> Batch:
+    """A clip, as a sample of all its instants."""
+    sample = tensors(clip, job.clips)
+    if job.sequences:
+        light = clipped(clip.truth, chance(0, "validation", number)) if job.clips.light == "linear" else {}
+        return with_flows(sample | {"truth": as_tensor(clip.truth)} | light)
+    inner = torch.arange(1, clip.multiple)
+    return sample | {"times": inner.float() / clip.multiple, "truth": as_tensor(clip.truth[1:-1])}
+
+
+def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:
+    """The clips to validate with, from their folder if they are all there."""
+    paths = sorted(cache.glob("*.npy"))
+    whole = cache / "whole"
+    if whole.exists():
+        return [read_clip(path) for path in paths]
+    clips = validation_clips(settings, job.validation_clips, job.validation_videos)
+    cache.mkdir(parents=True, exist_ok=True)
+    for number, clip in enumerate(clips):
+        write_clip(cache / f"{number:04d}.npy", clip)
+    whole.touch()
+    return clips

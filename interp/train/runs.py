@@ -1,0 +1,47 @@
+"""A run from what was asked for: its folder, its parts, a session of training."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from interp.train.checkpoints import read_checkpoint
+from interp.train.fit import Fit, Outcome, Stop
+from interp.train.job import Job
+from interp.train.machines import ALL, Machines, cores
+from interp.train.made_of import feed_of, learner_of
+from interp.train.progress import clip_bar
+from interp.train.run_folder import RunFolder
+
+
+def run(
+    job: Job,
+    path: Path,
+    resume: bool = False,
+    machines: Machines = ALL,
+    session_s: float | None = None,
+    workers: int | None = None,
+    quiet: bool = False,
+    stop: Stop = lambda: False,
+) -> Outcome:
+    """Train in the folder `path`, or go on there.
+
+    session_s   seconds after which to stop, to go on another time
+    workers     processes that make samples, for each that trains; None for those cores that training leaves, at least 1
+    stop        asked after each step
+    Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on.
+    """
+    begun_s = time.monotonic()
+    folder = RunFolder(path, job.model_dump(mode="json"), resume, machines.first)
+    try:
+        learner = learner_of(job)
+        step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
+        spare = max(1, cores() - job.recipe.threads) if workers is None else workers
+        with clip_bar(quiet) as report:
+            feed = feed_of(job, folder.clips, step, spare, cores(), report)
+        outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
+        if outcome.finished:
+            folder.forget_clips()
+        return outcome
+    finally:
+        folder.close()

@@ -1,0 +1,48 @@
+"""What people are told of a run: what it will do, and how it came out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from interp.train.fit import Outcome
+from interp.train.job import Job
+from vid2ev.commands.summary import lines
+
+COLUMNS = ("psnr", "ssim", "moving", "static")
+HEADS = ("PSNR", "SSIM", "moving", "static")
+
+
+def described(job: Job, path: Path) -> str:
+    """What a run will do."""
+    recipe = job.recipe
+    length = f"{recipe.steps:,} steps" if recipe.steps else f"{recipe.time_s / 60:g} minutes"
+    sources = {name: getattr(job.clips, name) for name in ("scenes", "photographs", "videos", "recordings")}
+    data = ", ".join(f"{100 * share / sum(sources.values()):.0f} % {name}" for name, share in sources.items() if share)
+    return lines(
+        [
+            ("network", f"{job.network}, {job.size}"),
+            ("training", f"{length} of {recipe.batch} samples of {job.samples.size}x{job.samples.size}"),
+            ("data", f"{data}; x{', x'.join(map(str, job.clips.multiples))}"),
+            ("run", str(path)),
+        ]
+    )
+
+
+def table(outcome: Outcome) -> str:
+    """Scores of each group of clips, the best last."""
+    blocks = []
+    for group, methods in outcome.scores.items():
+        rows = [f"{group:<14}" + "".join(f"{head:>9}" for head in HEADS)]
+        for name, scores in sorted(methods.items(), key=lambda item: item[1].psnr):
+            values = [getattr(scores, column) for column in COLUMNS]
+            rows.append(f"{name:<14}{values[0]:9.2f}{values[1]:9.4f}{values[2]:9.2f}{values[3]:9.2f}")
+        blocks.append("\n".join(rows))
+    return "\n\n".join(blocks)
+
+
+def as_json(outcome: Outcome) -> Mapping[str, Any]:
+    """The same for programs; NaN as nothing."""
+    scores = {g: {m: s.named("") for m, s in methods.items()} for g, methods in outcome.scores.items()}
+    return {"step": outcome.step, "steps": outcome.steps, "skipped": outcome.skipped, "scores": scores}

@@ -1,0 +1,81 @@
+"""`vid2ev train`, with samples that are quick to make."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from small_run import Made, clips
+
+from interp.commands.train import train
+from interp.train import runs
+from interp.train.batches import Feed
+from vid2ev.commands import Commands
+
+FEW = ["--steps", "3", "--set", "batch=2", "--set", "threads=1", "--set", "validations=1", "--workers", "0", "--cpu"]
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(runs, "feed_of", lambda job, *_: Feed(Made(), clips(1), job.recipe.batch, 0))
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*arguments: str) -> Result:
+    group = Commands("vid2ev")
+    group.get_command = lambda *_: train  # type: ignore[method-assign]
+    group.list_commands = lambda *_: ["train"]  # type: ignore[method-assign]
+    return CliRunner().invoke(group, ["train", *arguments])
+
+
+def test_a_run_in_two_sessions_ends_with_a_table() -> None:
+    first = run(*FEW, "-o", "run", "--session", "0.001s")
+    assert first.exit_code == 0, first.output
+    assert first.output == "run: step 1 of 3; the same command with --resume goes on\n"
+    again = run("-o", "run", "--resume", "--workers", "0", "--cpu")
+    assert again.exit_code == 0, again.output
+    assert again.output.startswith("run: step 3 of 3\n\nscenes             PSNR     SSIM   moving   static\n")
+    assert "\nbridge " in again.output and "\nnetwork " in again.output
+    same = run(*FEW, "-o", "run", "--resume", "--json")
+    assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}
+
+
+def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> None:
+    told = run("--dry-run", "--time", "2h", "--network", "e2vid")
+    assert told.exit_code == 0, told.output
+    assert "120 minutes of 8 samples of 96x96" in told.output and "e2vid_tiny" in told.output
+    job = json.loads(run("--dry-run", "--json", "--seed", "3").output)
+    assert job["recipe"]["seed"] == 3
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--network", "rrun"], "error: network 'rrun' (did you mean rrin?)"),
+        (["--time", "0"], "error: --time 0: expected a time above 0; give it as 90s, 55m or 2h"),
+        (["--session", "soon"], "error: --session soon: expected a time above 0"),
+        (["--set", "rate"], "error: Setting 'rate' is not of the form key=value"),
+        (["--resume"], "error: rrin_events_light_tiny holds no run to go on with"),
+        (["--devices", "0"], "0 is less than 1"),
+        (["--size", "huge"], "'huge' is not one of"),
+        (["--data", "nowhere"], "Path 'nowhere' does not exist"),
+    ],
+)
+def test_wrong_options_are_one_sentence_and_exit_code_2(arguments: list[str], sentence: str, tmp_path: Path) -> None:
+    shown = run(*arguments)
+    assert shown.exit_code == 2
+    assert sentence in shown.output and "Traceback" not in shown.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_training_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    from interp.train import machines
+
+    found: Any = machines.find_spec
+    monkeypatch.setattr(machines, "find_spec", lambda name: None if name == "lightning" else found(name))
+    shown = run(*FEW)
+    assert shown.exit_code == 2 and "pip install 'vid2ev[train]'" in shown.output

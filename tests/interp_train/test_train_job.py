@@ -1,0 +1,61 @@
+"""What is asked for becomes one record, that a run keeps; what cannot be meant is refused in a sentence."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from pydantic import ValidationError
+
+from interp.networks import names
+from interp.train.job import UNTRAINABLE, Job
+from interp.train.recipe import Recipe
+from vid2ev.errors import UsageError
+
+
+@pytest.mark.parametrize("network", [name for name in names() if name not in UNTRAINABLE])
+def test_a_job_comes_back_from_its_json(network: str) -> None:
+    job = Job.of(network, "small", ["rate=.002", "clips.scenes=1", "samples.size=64", "window.begin=8"])
+    assert Job(**json.loads(json.dumps(job.model_dump(mode="json")))) == job
+    assert (job.recipe.rate, job.clips.scenes, job.samples.size, job.window.begin) == (0.002, 1, 64, 8)
+
+
+def test_settings_reach_what_they_are_of() -> None:
+    job = Job.of("rrin-events", settings=["network.bins=3", "betas=[0.8, 0.95]", "precision=bf16"])
+    assert job.network == "rrin_events" and job.options == {"bins": 3}
+    assert job.recipe.betas == (0.8, 0.95) and job.recipe.precision == "bf16"
+    videos = Job.of("rrin", videos=["a.mp4", "b.mp4"], recordings=["c"])
+    assert videos.clips.shares == (0, 0, 2, 1)
+    assert videos.clips.video_files == ("a.mp4", "b.mp4") and videos.clips.recording_folders == ("c",)
+    assert Job.of("hdr").clips.light == "linear"
+    assert Job.of("firenet").recipe.rate < Job.of("rrin").recipe.rate
+
+
+@pytest.mark.parametrize(
+    ("network", "settings", "sentence"),
+    [
+        ("rrin_event", [], r"network 'rrin_event' \(did you mean rrin_events\?\): expected one of superslomo"),
+        ("flow", [], "network 'flow' cannot be trained"),
+        ("rrin", ["rate"], "Setting 'rate' is not of the form key=value; write for example rate=0.001"),
+        ("rrin", ["rat=1"], r"setting 'rat' is unknown \(did you mean rate\?\); expected one of seed"),
+        ("rrin", ["rate=-1"], r"setting rate = -1 is impossible: it must be greater than 0"),
+        ("rrin", ["rate=fast"], r"setting rate = 'fast' is impossible: it must be a valid number"),
+        ("rrin", ["rate=nan"], r"setting rate = nan is impossible: it must be a finite number"),
+        ("rrin", ["net.bins=1"], r"setting 'net.bins=1': 'net' has no settings \(did you mean network\?\)"),
+        ("rrin", ["network.bin=1"], r"rrin has no option 'bin' \(did you mean bins\?\)"),
+        ("rrin", ["clips.multiples=[5]"], r"settings of clips: multiples \(5,\): expected some of 4, 8, 16, 32"),
+        ("rrin", ["clips.sensors.threshold=1"], r"setting 'clips.sensors.threshold' is unknown"),
+        ("rrin", ["samples.size=3"], r"setting samples.size = 3 is impossible: it must be greater than or equal to 16"),
+        ("rrin", ["window.begin=0"], r"setting window.begin = 0 is impossible"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_sentence(network: str, settings: list[str], sentence: str) -> None:
+    with pytest.raises(UsageError, match=sentence) as error:
+        Job.of(network, settings=settings)
+    assert "\n" not in str(error.value)
+
+
+def test_every_number_of_the_recipe_says_what_it_is_and_stays() -> None:
+    assert all(field.description for field in Recipe.model_fields.values())
+    with pytest.raises(ValidationError):
+        Recipe().rate = 1.0  # type: ignore[misc]

@@ -1,0 +1,75 @@
+"""Training killed at any moment goes on to the very same bits."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import load_file
+from small_run import STEPS_OF_RUN, in_a_process, kept, session
+
+from interp.train.curves import read_curve
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run, in one go."""
+    torch.set_num_threads(1)
+    folder = tmp_path_factory.mktemp("undisturbed") / "run"
+    assert session(folder).finished
+    return folder
+
+
+def same(folder: Path, other: Path) -> bool:
+    one, two = kept(folder), kept(other)
+    return one.keys() == two.keys() and all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_a_run_killed_at_a_step_goes_on_to_the_same_bits(undisturbed: Path, tmp_path: Path) -> None:
+    step = random.Random(5).randrange(3, STEPS_OF_RUN)
+    killed = in_a_process(tmp_path / "run", killed_at_step=step)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    shutil.move(tmp_path / "run", tmp_path / "carried")  # to another place
+    assert session(tmp_path / "carried", resume=True).finished
+    assert same(tmp_path / "carried", undisturbed)
+    weights = [load_file(folder / "weights.safetensors") for folder in (undisturbed, tmp_path / "carried")]
+    assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
+    curves = [
+        [(row["step"], row["loss"], row["gradient"]) for row in read_curve(folder / "training.csv")]
+        for folder in (undisturbed, tmp_path / "carried")
+    ]
+    assert curves[0] == curves[1]
+
+
+def test_pieces_of_a_step_each_are_the_run_in_one_go(undisturbed: Path, tmp_path: Path) -> None:
+    pieces = 0
+    while not (done := session(tmp_path / "run", resume=pieces > 0, session_s=1e-9)).finished:
+        pieces += 1
+        assert done.step == pieces and not done.scores
+    assert pieces == STEPS_OF_RUN - 1
+    assert same(tmp_path / "run", undisturbed)
+    assert session(tmp_path / "run", resume=True).scores == done.scores  # what is finished stays so
+
+
+def test_samples_may_be_made_by_others(undisturbed: Path, tmp_path: Path) -> None:
+    session(tmp_path / "run", workers=2, session_s=1e-9)
+    session(tmp_path / "run", workers=1, resume=True)
+    assert same(tmp_path / "run", undisturbed)
+
+
+@pytest.mark.slow
+def test_a_run_killed_at_whatever_lasts_goes_on_to_the_same_bits(undisturbed: Path, tmp_path: Path) -> None:
+    writes = int(in_a_process(tmp_path / "counted").stdout.split()[1])
+    for write in sorted(random.Random(6).sample(range(2, writes), 12)):
+        folder = tmp_path / f"run-{write}"
+        killed = in_a_process(folder, killed_at_write=write)
+        assert killed.returncode == -signal.SIGKILL, killed.stderr
+        assert session(folder, resume=True).finished
+        assert same(folder, undisturbed), write

@@ -1,0 +1,107 @@
+"""What becomes of steps whose loss is not finite, of checkpoints that are torn, and of what a run keeps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+import torch
+from small_run import NETWORK, STEPS_OF_RUN, clips, kept, session
+
+from interp import weights
+from interp.train.checkpoints import WholeFiles, read_checkpoint
+from interp.train.curves import read_curve
+from interp.train.learner import number_of
+from vid2ev.errors import DataError, UsageError
+
+
+def test_steps_that_are_not_finite_change_nothing_and_are_counted(tmp_path: Path) -> None:
+    # Samples 20 ... 27 are those of the sixth and seventh step of 4.
+    before = session(tmp_path / "before", session_s=1e-9, batch=4, spoilt=range(0, 4))
+    assert before.skipped == 1
+    learnt = kept(tmp_path / "before")
+    assert not any(name.endswith("exp_avg") for name in learnt)  # the optimiser knows of nothing
+    done = session(tmp_path / "run", spoilt=range(20, 28))
+    assert done.finished and done.skipped == 2
+    assert all(bool(value.isfinite().all()) for value in kept(tmp_path / "run").values())
+    assert float(read_curve(tmp_path / "run" / "training.csv")[-1]["skipped"]) == 2
+
+
+def test_training_ends_where_nothing_is_finite_any_more(tmp_path: Path) -> None:
+    with pytest.raises(
+        DataError, match=r"no finite gradient in 3 steps in a row, up to step 6.*smaller rate than 0.0015"
+    ):
+        session(tmp_path / "run", spoilt=range(16, 1000), most_skipped=3)
+
+
+def test_a_checkpoint_is_whole_or_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "checkpoint.ckpt"
+    WholeFiles().save_checkpoint({"global_step": 1}, path)
+
+    def torn(content: object, file: object) -> None:
+        file.write(b"half of it")  # type: ignore[attr-defined]
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(torch, "save", torn)
+    with pytest.raises(DataError, match=r"No space left on device; make room"):
+        WholeFiles().save_checkpoint({"global_step": 2}, path)
+    assert read_checkpoint(path) == {"global_step": 1}
+    assert [child.name for child in tmp_path.iterdir()] == ["checkpoint.ckpt"]
+
+
+def test_a_torn_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "checkpoint.ckpt"
+    WholeFiles().save_checkpoint({"global_step": 1, "state_dict": {"a": torch.rand(1000)}}, path)
+    whole = path.read_bytes()
+    for length in (0, 1, 100, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(DataError, match=r"checkpoint\.ckpt is no whole checkpoint .*; copy the run again") as error:
+            read_checkpoint(path)
+        assert "\n" not in str(error.value)
+    torch.save({"weights": 1}, path)
+    with pytest.raises(DataError, match="is no checkpoint of `vid2ev train`"):
+        read_checkpoint(path)
+
+
+def test_a_run_keeps_all_that_it_has_to_show(tmp_path: Path) -> None:
+    done = session(tmp_path / "run")
+    assert set(done.scores["scenes"]) == {"network", "nearest", "linear", "flow", "integration", "bridge"}
+    run = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert {"torch", "lightning", "vid2ev"} <= run["versions"].keys()
+    assert [row["step"] for row in read_curve(tmp_path / "run" / "validation.csv")] == ["0", "6", f"{STEPS_OF_RUN}"]
+    pictures = sorted((tmp_path / "run" / "pictures").iterdir())
+    assert [path.name for path in pictures] == [f"step-{step:07d}-scenes.png" for step in (0, 6, STEPS_OF_RUN)]
+    rows, columns, _ = cv2.imread(str(pictures[-1])).shape
+    assert (rows, columns) == (2 * 16 + 2, 7 * 16 + 6 * 2)  # two targets; seven images with gaps of 2 px
+    assert list((tmp_path / "run" / "tensorboard").glob("events.out.*"))
+    assert str(tmp_path) not in (tmp_path / "run" / "run.json").read_text()
+
+    # The weights are the running mean, and score what the run says.
+    network = weights.load(tmp_path / "run" / "weights.safetensors")
+    mean = kept(tmp_path / "run")
+    assert all(torch.equal(value, mean[f"network.{name}"]) for name, value in network.state_dict().items())
+    assert any(not torch.equal(mean[f"network.{n}"], mean[f"current.network.{n}"]) for n in network.state_dict())
+
+
+def test_a_folder_is_taken_once(tmp_path: Path) -> None:
+    session(tmp_path / "run", session_s=1e-9)
+    with pytest.raises(UsageError, match=r"holds a run; --resume goes on"):
+        session(tmp_path / "run")
+    with pytest.raises(UsageError, match=r"was begun with recipe\.rate = 0\.0015, not 0\.001"):
+        session(tmp_path / "run", resume=True, rate=0.001)
+    with pytest.raises(UsageError, match=r"begun with|holds no run") as error:
+        session(tmp_path / "nothing", resume=True)
+    assert not (tmp_path / "nothing").exists(), error
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").touch()
+    with pytest.raises(UsageError, match="holds files that are no run"):
+        session(tmp_path / "mine")
+
+
+def test_random_numbers_are_of_seed_step_and_process() -> None:
+    numbers = {number_of(seed, step, rank) for seed in range(4) for step in range(50) for rank in range(4)}
+    assert len(numbers) == 4 * 50 * 4
+    assert all(0 <= number < 1 << 63 for number in numbers)
+    assert clips()[0][1]["frames"].shape == (1, 2, 3, 16, 16) and NETWORK
