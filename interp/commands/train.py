@@ -24,7 +24,8 @@ WORD = "auto"
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
 @click.option(
     "--network", default="rrin-events-light", show_default=True, metavar="NAME",
-    help="superslomo, slomo-events, rrin, rrin-events, rrin-slomo-events, timelens, e2vid, firenet, hdr.",
+    help="superslomo, slomo-events, rrin, rrin-events, rrin-events-light, rrin-slomo-events, timelens, e2vid, firenet,"
+    " hdr.",
 )  # fmt: skip
 @click.option("--size", type=click.Choice(["tiny", "small", "paper"]), default="tiny", show_default=True, help="Width.")
 @click.option(
@@ -40,7 +41,7 @@ WORD = "auto"
 @click.option("--steps", type=click.IntRange(1), metavar="N", help="Steps, whatever time they take.")
 @click.option(
     "--set", "settings", multiple=True, metavar="KEY=VALUE",
-    help="Change a number of the recipe, of the network. (its options), clips., samples. or window.; may be repeated.",
+    help="Change a number of the recipe, of network., clips., samples., window. or validation.; may be repeated.",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Another seed is another run.")
 @click.option("--resume", is_flag=True, help="Go on where a run stands.")

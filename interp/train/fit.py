@@ -25,6 +25,7 @@ from interp.train.run_folder import RunFolder
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores
 from interp.train.session import Limits, Session, validate_every
+from vid2ev.errors import DataError
 
 LOG_EVERY = 10  # steps
 Stop = Callable[[], bool]
@@ -79,7 +80,8 @@ class Fit:
             self._take_up(self._given())
             trainer = self._trainer(step)
             self._measure(trainer, step)
-            trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
+            with made_by_workers():
+                trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
             return self._outcome(trainer)
 
     def _given(self) -> tuple[int, int] | None:
@@ -168,6 +170,19 @@ class Fit:
             for group, values in table.items():
                 found[group][name] = Scores(**values)
         return Outcome(step, steps, skipped, found)
+
+
+@contextmanager
+def made_by_workers() -> Iterator[None]:
+    """A process that makes samples and is killed, for want of memory as a rule, becomes one sentence."""
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith("DataLoader worker"):
+            raise
+        raise DataError(
+            f"a process that makes samples ended ({error}); go on with --resume and fewer --workers"
+        ) from error
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from interp.data.samples import SampleSettings
 from interp.data.settings import PRESETS, ClipSettings
-from interp.networks import names, spec_of
+from interp.networks import spec_of
 from interp.train.recipe import RECURRENT, Recipe
 from vid2ev.errors import UsageError, clause, nearest
 from vid2ev.requests import setting
@@ -20,6 +20,7 @@ from vid2ev.requests import setting
 EVENT_FED = ("e2vid", "firenet")
 SEQUENTIAL = (*EVENT_FED, "hdr")
 UNTRAINABLE = {"flow": "it learns from the true flow of scenes, which samples do not have"}
+PARTS = ("recipe", "network", "clips", "samples", "window", "validation")
 EXAMPLE = "rate=0.001, network.bins=5, clips.multiples=[16] or samples.size=128"
 
 
@@ -31,6 +32,15 @@ class Window(BaseModel):
     begin: int = Field(256, ge=1, description="clips that there are before the first sample")
     most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 1.6 MB of disk")
     fresh: float = Field(0.02, ge=0, description="clips that join with each sample")
+
+
+class Validation(BaseModel):
+    """Clips that training never sees."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    clips: int = Field(8, ge=1, description="of scenes, for each of two event sensors")
+    videos: tuple[str, ...] = Field((), description="real ones, with frames left out; four clips of each")
 
 
 class Job(BaseModel):
@@ -45,8 +55,7 @@ class Job(BaseModel):
     clips: ClipSettings
     samples: SampleSettings
     window: Window
-    validation_clips: int = Field(8, ge=1, description="scenes to validate with, for each of two event sensors")
-    validation_videos: tuple[str, ...] = Field((), description="real videos to validate with, with frames left out")
+    validation: Validation
 
     @property
     def sequences(self) -> bool:
@@ -65,7 +74,7 @@ class Job(BaseModel):
     ) -> Self:
         """The job for a network, with `key=value` settings.
 
-        settings   of the recipe, or of `network.`, `clips.`, `samples.`, `window.`
+        settings   of the recipe, or of `network.`, `clips.`, `samples.`, `window.`, `validation.`
         videos, recordings   to train with, instead of what is made on the fly
         Raises UsageError for what cannot be meant.
         """
@@ -81,14 +90,10 @@ class Job(BaseModel):
             "clips": _valid(ClipSettings, clips, "clips."),
             "samples": _valid(SampleSettings, asked["samples"], "samples."),
             "window": _valid(Window, asked["window"], "window."),
+            "validation": _valid(Validation, {"videos": tuple(validation_videos)} | asked["validation"], "validation."),
         }
         named = {"network": network, "size": size, "options": asked["network"]}
-        return _valid(cls, named | parts | {"validation_videos": tuple(validation_videos)}, "")
-
-
-def trainable() -> list[str]:
-    """Networks that can be trained."""
-    return [name for name in names() if name not in UNTRAINABLE]
+        return _valid(cls, named | parts, "")
 
 
 def _clip_defaults(network: str, videos: Sequence[str], recordings: Sequence[str]) -> dict[str, Any]:
@@ -105,7 +110,7 @@ def _clip_defaults(network: str, videos: Sequence[str], recordings: Sequence[str
 
 def _by_part(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
     """The values asked for, by what they are settings of."""
-    parts: dict[str, dict[str, Any]] = {part: {} for part in ("recipe", "network", "clips", "samples", "window")}
+    parts: dict[str, dict[str, Any]] = {part: {} for part in PARTS}
     for text in settings:
         key, value = setting(text, EXAMPLE)
         part, dot, rest = key.partition(".")

@@ -65,7 +65,7 @@ def _validation(job: Job, cache: Path) -> list[tuple[str, Batch]]:
     for sensor in MEASURED_WITH:
         clips = job.clips.model_copy(update={"sensors": SENSORS[sensor]})
         for number, clip in enumerate(_kept_clips(job, clips, cache / sensor)):
-            group = f"{'scenes' if number < job.validation_clips else 'real'}-{sensor}"
+            group = f"{'scenes' if number < job.validation.clips else 'real'}-{sensor}"
             batches.append((group, default_collate([_whole(job, clip, number)])))
     return batches
 
@@ -86,7 +86,7 @@ def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:
     whole = cache / "whole"
     if whole.exists():
         return [read_clip(path) for path in paths]
-    clips = validation_clips(settings, job.validation_clips, job.validation_videos)
+    clips = validation_clips(settings, job.validation.clips, job.validation.videos)
     cache.mkdir(parents=True, exist_ok=True)
     for number, clip in enumerate(clips):
         write_clip(cache / f"{number:04d}.npy", clip)

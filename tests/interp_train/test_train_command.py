@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ from click.testing import CliRunner, Result
 from small_run import Made, clips
 
 from interp.commands.train import train
+from interp.networks import names
 from interp.train import runs
 from interp.train.batches import Feed
+from interp.train.job import UNTRAINABLE
 from vid2ev.commands import Commands
 
 FEW = ["--steps", "3", "--set", "batch=2", "--set", "threads=1", "--set", "validations=1", "--workers", "0", "--cpu"]
@@ -50,6 +53,11 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> N
     job = json.loads(run("--dry-run", "--json", "--seed", "3").output)
     assert job["recipe"]["seed"] == 3
     assert not list(tmp_path.iterdir())
+
+
+def test_the_help_names_every_network_that_can_be_trained() -> None:
+    shown = next(option.help for option in train.params if option.name == "network")
+    assert {name.replace("_", "-") for name in names() if name not in UNTRAINABLE} == set(re.findall(r"[\w-]+", shown))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,9 @@ from vid2ev.errors import UsageError
 
 @pytest.mark.parametrize("network", [name for name in names() if name not in UNTRAINABLE])
 def test_a_job_comes_back_from_its_json(network: str) -> None:
-    job = Job.of(network, "small", ["rate=.002", "clips.scenes=1", "samples.size=64", "window.begin=8"])
+    job = Job.of(
+        network, "small", ["rate=.002", "clips.scenes=1", "samples.size=64", "window.begin=8", "validation.clips=2"]
+    )
     assert Job(**json.loads(json.dumps(job.model_dump(mode="json")))) == job
     assert (job.recipe.rate, job.clips.scenes, job.samples.size, job.window.begin) == (0.002, 1, 64, 8)
 
