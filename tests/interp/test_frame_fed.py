@@ -41,6 +41,20 @@ def test_any_size_comes_back_as_it_went_in(name: str, size: tuple[int, int]) -> 
     assert made.weights.shape[-2:] == size and torch.isfinite(made.images).all()
 
 
+@pytest.mark.parametrize(("coarse", "px"), [(False, 2.0), (True, 4.0)])
+def test_flows_are_pixels_of_the_frames_whatever_the_networks_resolution(coarse: bool, px: float) -> None:
+    made = make("rrin_events", coarse=coarse)
+    with torch.no_grad():
+        made.get_submodule("flow.head").bias.copy_(torch.tensor([0.2, 0.0, -0.2, 0.0]))  # type: ignore[union-attr]
+        first, second = frames(1, (20, 40))
+        given = made(first, second, [0.5])
+    assert torch.equal(given.flows[:, 0], torch.full((1, 20, 40), px))
+    shift = int(px) // 2  # halfway between the frames
+    assert torch.equal(given.flows_at[0, 0, :, 9, 9], torch.tensor([-px, 0, px, 0]) / 2)
+    assert torch.equal(given.warps[:, 0, 0][..., 8:-8], first[..., 8 - shift : -8 - shift])
+    assert torch.equal(given.warps[:, 0, 1][..., 8:-8], second[..., 8 + shift : -8 + shift])
+
+
 def test_frames_go_on_as_their_border_and_events_end() -> None:
     first, second = frames(1, (5, 20))
     pair = network("rrin_events").prepare(first, second, EventCounts(torch.ones(1, 2, 3, 5, 20), torch.ones(1, 2)))

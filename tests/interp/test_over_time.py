@@ -61,6 +61,23 @@ def test_cells_stay_bounded_when_every_gate_is_open(kind: type) -> None:
     assert h.abs().max() <= 1 and all(part.abs().max() <= CELL_LIMIT for part in state)
 
 
+@pytest.mark.parametrize("kind", [torch.bfloat16, torch.float16])
+@pytest.mark.parametrize("cell", [ConvLstm, ConvGru])
+def test_states_are_not_rounded_to_16_bits(cell: type, kind: torch.dtype) -> None:
+    made, states = cell(1, 2), []
+    with torch.no_grad():
+        for name, parameter in made.named_parameters():
+            # gates that 16 bits can hold, so that only what is done with them can differ
+            parameter.copy_(torch.linspace(-1, 1, 9)[: parameter.numel()] if "bias" in name else 0 * parameter)
+        for half in (False, True):
+            state = None
+            for _ in range(20):
+                with torch.autocast("cpu", kind, enabled=half):
+                    _, state = made(torch.zeros(1, 1, 3, 3), state)
+            states.append(state)
+    assert all(torch.equal(whole, half) for whole, half in zip(*states, strict=True))
+
+
 def test_an_lstm_remembers_at_first_and_gates_are_orthogonal() -> None:
     gates = ConvLstm(4, 4).gates
     assert gates.bias is not None and gates.bias[4:8].tolist() == [1] * 4 and gates.bias[:4].abs().sum() == 0

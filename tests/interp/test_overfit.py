@@ -36,9 +36,7 @@ def loss_of(name: str, made: Interpolated, truth: torch.Tensor, progress: float)
 @pytest.mark.parametrize("name", FRAME_FED)
 def test_networks_of_frames_learn_a_clip_by_heart(name: str) -> None:
     network = make(name, "tiny")
-    optimiser = torch.optim.AdamW(
-        network.parameters(), 1e-3 if name in ("superslomo", "slomo_events", "timelens") else 2e-3
-    )
+    optimiser = torch.optim.AdamW(network.parameters(), 1e-3 if name in ("superslomo", "slomo_events") else 2e-3)
     counts, times, truth = CLIP.counts(), CLIP.times(), CLIP.truth()
     best = 0.0
     for step in range(STEPS):
