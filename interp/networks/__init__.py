@@ -30,8 +30,8 @@ class Entry:
 
 
 NETWORKS = {
-    "superslomo": Entry("superslomo", "SuperSlomo"),
-    "slomo_events": Entry("superslomo", "SuperSlomo", {"events": "halves"}),
+    "superslomo": Entry("superslomo", "SuperSlomo", {"events": "none"}),
+    "slomo_events": Entry("superslomo", "SuperSlomo"),
     "rrin": Entry("rrin_events", "RrinEvents", {"depths": (5, 4, 4, 4), "bins": 0}),
     "rrin_events": Entry("rrin_events", "RrinEvents"),
     "rrin_events_light": Entry(

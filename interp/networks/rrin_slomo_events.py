@@ -23,26 +23,19 @@ from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
 from interp.networks.e2vid import E2vid, E2vidSpec
-from interp.networks.event_input import EventInput, Events, first_last_and_target
+from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
 from interp.networks.firenet import FireNet, FireNetSpec
 from interp.networks.flow import FlowNetwork, FlowNetworkSpec
-from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
-from interp.networks.spec import FrameFedSpec
-from interp.warp import flows_at
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at
+from interp.networks.refinement import refined
 
 SUB_BINS = 5  # of the window that a reconstruction is made of
 Weights = Literal["own", "pretrained"]
 
 
-class RrinSlomoEventsSpec(FrameFedSpec):
+class RrinSlomoEventsSpec(EventInputSpec):
     """Options of RRINSloMoEvents; by default 14.4 million parameters and 614 kMAC/px at size paper."""
 
-    events: Events = Field(
-        default="halves",
-        description="into the combined UNet: none, bins (first, last, target; 3 channels) or halves (2 bins channels);"
-        " 288 parameters and 0.288 kMAC/px for each channel",
-    )
-    bins: int = Field(default=5, ge=1, le=64, description="of events, in each half or between the frames; see events")
     flow_input: Literal["frames", "frames+events"] = Field(
         default="frames",
         description="of the flow network: all bins as well; 288 parameters and 0.288 kMAC/px a bin, once per pair",
@@ -100,17 +93,12 @@ class RrinSlomoEvents(FrameFed):
 
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
-        assert pair.flows is not None
         once, beside = pair.once, []
         if self.reconstruct is not None:
             beside, once = [first_last_and_target(once[0], times)], once[1:]
-        at = flows_at(pair.flows, times)
-        first = warped(pair, at)
-        parts = [pair.frame_0, pair.frame_1, pair.flows, at[:, :, 2:], at[:, :, :2], first[:, :, 1], first[:, :, 0]]
-        found = run(self.combined, [*parts, *self.event_input.at(pair, once, times), *beside])
-        at = at + found[:, :, :4] * self.spec.flow_scale
-        warps = warped(pair, at)
-        image, weights = blend(warps, F.logsigmoid(found[:, :, 4:]), shares_at(times))
+        events = self.event_input.at(pair, once, times)
+        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
+        image, weights = blend(warps, F.logsigmoid(visible), shares_at(times))
         of_warps = image
         if self.residue is not None:
             image = image + run(self.residue, [pair.frame_0, pair.frame_1, image])

@@ -20,21 +20,14 @@ from pydantic import Field
 
 from interp.blend import blend
 from interp.blocks.unet import Unet, slomo_layout
-from interp.networks.event_input import EventInput, Events
-from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
-from interp.networks.spec import FrameFedSpec
-from interp.warp import flows_at
+from interp.networks.event_input import EventInput, EventInputSpec
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, shares_at
+from interp.networks.refinement import refined
 
 
-class SuperSlomoSpec(FrameFedSpec):
+class SuperSlomoSpec(EventInputSpec):
     """Options of Super SloMo and SloMoEvents."""
 
-    events: Events = Field(
-        default="none",
-        description="into the second UNet: none, bins (first, last, target; 3 channels) or halves (2 bins channels);"
-        " 1,568 parameters and 1.568 kMAC/px for each channel (at tiny a quarter of that)",
-    )
-    bins: int = Field(default=5, ge=1, le=64, description="of events, in each half or between the frames; see events")
     recurrent: bool = Field(
         default=False,
         description="a GRU of 8 channels walks over the bins first: 2,041 parameters and 2.016 kMAC/px a bin, at"
@@ -64,13 +57,8 @@ class SuperSlomo(FrameFed):
 
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
-        assert pair.flows is not None
-        at = flows_at(pair.flows, times)
-        first = warped(pair, at)
-        parts = [pair.frame_0, pair.frame_1, pair.flows, at[:, :, 2:], at[:, :, :2], first[:, :, 1], first[:, :, 0]]
-        found = run(self.refine, [*parts, *self.event_input.at(pair, pair.once, times)])
-        at = at + found[:, :, :4] * self.spec.flow_scale
-        warps = warped(pair, at)
-        logits = torch.cat([found[:, :, 4:], torch.zeros_like(found[:, :, 4:])], 2)
+        events = self.event_input.at(pair, pair.once, times)
+        at, warps, visible = refined(self.refine, pair, times, events, self.spec.flow_scale)
+        logits = torch.cat([visible, torch.zeros_like(visible)], 2)
         image, weights = blend(warps, logits, shares_at(times))
         return Interpolated(image, pair.flows, at, warps, weights, image)
