@@ -33,6 +33,7 @@ from torch import nn
 from torch.nn import functional as F
 
 from interp.blend import blend
+from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
 from interp.candidates.bridge import bridge
 from interp.light import Transfer
@@ -93,99 +94,82 @@ class RrinEvents(FrameFed):
         masks_in = 4 * colours + 4 + events * spec.events_into_masks + candidate * self._blends_candidate
         pictures = 3 if spec.candidate == "softmax" else 2
         layouts = [rrin_layout(depth, spec.base) for depth in spec.depths]
+        self.scale = Scale(2 if spec.coarse else 1)
         self.flow = Unet(2 * colours, 4, layouts[0], zero)
         self.refine = Unet(2 * colours + 4 + events, 4, layouts[1], zero)
         self.masks = Unet(masks_in, pictures, layouts[2], zero)
-        residue_in = 3 * colours + candidate
         if spec.coarse:
-            self.residue: nn.Module = HalfSized(
-                residue_in, colours, rrin_layout(spec.depths[3] - 1, 2 * spec.base), zero
-            )
+            halved = rrin_layout(spec.depths[3] - 1, 2 * spec.base)
+            self.residue: nn.Module = HalfSized(3 * colours + candidate, colours, halved, zero)
         else:
-            self.residue = Unet(residue_in, colours, layouts[3], zero)
-        self.multiple = 2 ** (max(spec.depths) - 1) * (2 if spec.coarse else 1)
+            self.residue = Unet(3 * colours + candidate, colours, layouts[3], zero)
+        self.multiple = self.scale.factor * 2 ** (max(spec.depths) - 1)
 
     @property
     def _blends_candidate(self) -> bool:
         return self.spec.candidate in ("input", "softmax")
 
     def flows_of(self, pair: Pair) -> torch.Tensor:
-        """Flows between the frames; in pixels of half the resolution, if coarse."""
+        """Flows between the frames, in pixels of the resolution of U1 to U3."""
         frames = torch.cat([pair.frame_0, pair.frame_1], 1)
-        return self.flow(self._coarse(frames)).float() * self.spec.flow_scale
+        return self.flow(self.scale.down(frames)).float() * self.spec.flow_scale
 
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
         assert pair.flows is not None
-        frames = [self._coarse(pair.frame_0), self._coarse(pair.frame_1)]
-        events = [self._events(pair).halves(times, self.spec.bins)] if self.spec.bins else []
+        frames = [self.scale.down(frame) for frame in (pair.frame_0, pair.frame_1)]
+        events = self._events(pair, times)
         at = flows_at(pair.flows, times)
         at = at + run(self.refine, [at, *frames, *events]) * self.spec.flow_scale
-        fine = self._fine_flow(at)
-        warps = warped(pair, fine)
-        candidate = [self._candidate(pair, times, warps)] if self.spec.candidate != "none" else []
-        seen = [
-            at,
-            *frames,
-            *(self._coarse(warps[:, :, k]) for k in (0, 1)),
-            *(events if self.spec.events_into_masks else []),
-        ]
-        seen += [self._coarse(each) for each in candidate if self._blends_candidate]
-        logits = F.logsigmoid(self._fine(run(self.masks, seen)))
+        flows = self.scale.flow_up(at)
+        warps = warped(pair, flows)
+        candidate = self._candidate(pair, times, warps)
+        beside = events if self.spec.events_into_masks else []
+        logits = self._visible([at, *frames], warps, beside, candidate)
         of_warps, weights = blend(warps, logits[:, :, :2], shares_at(times))
-        draft, weights = self._draft(of_warps, weights, warps, candidate, logits, times)
-        residue = run(
-            self.residue, [pair.frame_0, pair.frame_1, of_warps if self.spec.candidate == "base" else draft, *candidate]
-        )
-        image = draft + (self._gate(pair)[:, None] * residue if self.spec.gate and pair.seen else residue)
-        return Interpolated(image, self._fine_flow(pair.flows), fine, warps, weights, of_warps)
+        draft = of_warps
+        if self.spec.candidate == "softmax":
+            draft, weights = self._blend_with_candidate(warps, candidate[0], logits, times)
+        residue = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate])
+        start = candidate[0] if self.spec.candidate == "base" else draft
+        image = start + (self._gate(pair)[:, None] * residue if self.spec.gate and pair.seen else residue)
+        return Interpolated(image, self.scale.flow_up(pair.flows), flows, warps, weights, of_warps)
 
-    def _draft(
-        self,
-        of_warps: torch.Tensor,
-        weights: torch.Tensor,
-        warps: torch.Tensor,
-        candidate: list[torch.Tensor],
-        logits: torch.Tensor,
-        times: torch.Tensor,
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """The picture that U4 corrects, and the weights it was blended with."""
-        if self.spec.candidate == "base":
-            return candidate[0], weights
-        if self.spec.candidate != "softmax":
-            return of_warps, weights
-        kept = torch.ones_like(times)
-        if self.training:
-            kept = (torch.rand_like(times) >= self.spec.candidate_dropout).to(times)
-        pictures = torch.cat([warps, candidate[0][:, :, None]], 2)
-        return blend(pictures, logits, torch.cat([shares_at(times), kept[..., None]], -1))
+    def _events(self, pair: Pair, times: torch.Tensor) -> list[torch.Tensor]:
+        """Voxels of both halves, at the resolution of U1 to U3, in a list that is empty without events."""
+        if not self.spec.bins:
+            return []
+        counts = pair.events if self.scale.factor == 1 else pair.events.pooled(self.scale.factor)
+        return [counts.halves(times, self.spec.bins)]
 
-    def _candidate(self, pair: Pair, times: torch.Tensor, warps: torch.Tensor) -> torch.Tensor:
+    def _candidate(self, pair: Pair, times: torch.Tensor, warps: torch.Tensor) -> list[torch.Tensor]:
+        """The bridge, in a list that is empty if none is asked for."""
+        if self.spec.candidate == "none":
+            return []
         around = None
         if self.spec.chroma == "warps":
             around = warps[:, :, 0] + times[..., None, None, None] * (warps[:, :, 1] - warps[:, :, 0])
-        return bridge(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around=around)
+        return [bridge(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around=around)]
+
+    def _visible(
+        self, seen: list[torch.Tensor], warps: torch.Tensor, events: list[torch.Tensor], candidate: list[torch.Tensor]
+    ) -> torch.Tensor:
+        """What U3 says, at full resolution: logarithms of V, [B, N, pictures, H, W]."""
+        pictures = [*warps.unbind(2), *(candidate if self._blends_candidate else [])]
+        found = run(self.masks, [*seen, *(self.scale.down(picture) for picture in pictures), *events])
+        return F.logsigmoid(self.scale.up(found))
+
+    def _blend_with_candidate(
+        self, warps: torch.Tensor, candidate: torch.Tensor, logits: torch.Tensor, times: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        kept = torch.ones_like(times)
+        if self.training:
+            kept = (torch.rand_like(times) >= self.spec.candidate_dropout).to(times)
+        pictures = torch.cat([warps, candidate[:, :, None]], 2)
+        return blend(pictures, logits, torch.cat([shares_at(times), kept[..., None]], -1))
 
     def _gate(self, pair: Pair) -> torch.Tensor:
-        """How much residue is let through, [B, 1, H, W]: 0 where no event is near."""
+        """How much residue is let through, [B, 1, H, W]: none where no event is near."""
         number = pair.events.off_on.float().sum((1, 2)).unsqueeze(1)
         near = F.avg_pool2d(number, GATE_REACH_PX, stride=1, padding=GATE_REACH_PX // 2)
         return 1 - torch.exp(-GATE_STEEPNESS * near)
-
-    def _events(self, pair: Pair):  # type: ignore[no-untyped-def]
-        return pair.events.pooled(2) if self.spec.coarse else pair.events
-
-    def _coarse(self, x: torch.Tensor) -> torch.Tensor:
-        """Pictures [..., c, H, W] at the resolution of U1 to U3."""
-        return F.avg_pool2d(x.flatten(0, -4), 2).unflatten(0, x.shape[:-3]) if self.spec.coarse else x
-
-    def _fine(self, x: torch.Tensor) -> torch.Tensor:
-        """Pictures [..., c, h, w] back at full resolution."""
-        if not self.spec.coarse:
-            return x
-        larger = F.interpolate(x.flatten(0, -4), scale_factor=2, mode="bilinear", align_corners=False)
-        return larger.unflatten(0, x.shape[:-3])
-
-    def _fine_flow(self, flow: torch.Tensor) -> torch.Tensor:
-        """Flows at full resolution, in its pixels."""
-        return self._fine(flow) * 2 if self.spec.coarse else flow
