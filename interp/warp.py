@@ -42,14 +42,6 @@ def sample(images: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
     return found.unflatten(2, grid.shape[1:3]).transpose(1, 2)
 
 
-@in_full_precision
-def inside(flow: torch.Tensor) -> torch.Tensor:
-    """Whether a flow [..., 2, H, W] px leads to a place within a picture of its own size: bool [..., H, W]."""
-    height, width = flow.shape[-2:]
-    x, y = (pixel_places(height, width, device=flow.device, dtype=flow.dtype) + flow).unbind(-3)
-    return (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-
-
 def pixel_places(height: int, width: int, **kind: object) -> torch.Tensor:
     """Where the pixels of a picture are: [2, H, W], across and down."""
     down, across = torch.meshgrid(torch.arange(height, **kind), torch.arange(width, **kind), indexing="ij")  # type: ignore[call-overload]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from interp.warp import flows_at, inside, pixel_places, warp
+from interp.warp import flows_at, pixel_places, warp
 
 SIZES = [(1, 1), (1, 9), (7, 1), (2, 3), (37, 53), (64, 64), (129, 257), (260, 346)]
 
@@ -97,14 +97,6 @@ def test_gradients_are_those_of_the_function() -> None:
     # places away from the pixels, where slopes have a step, and from the border
     flow = (0.2 + 0.6 * torch.rand(1, 2, 5, 6, dtype=torch.float64)).neg().requires_grad_()
     assert torch.autograd.gradcheck(lambda i, f: warp(i, f)[..., 1:, 1:], (images, flow))
-
-
-def test_flow_out_of_the_picture_is_known() -> None:
-    flow = torch.zeros(1, 2, 3, 4)
-    flow[0, 0, 1, 3], flow[0, 1, 0, 0] = 0.5, -0.1
-    expected = torch.ones(1, 3, 4, dtype=torch.bool)
-    expected[0, 1, 3] = expected[0, 0, 0] = False
-    assert torch.equal(inside(flow), expected)
 
 
 def test_places_are_across_and_then_down() -> None:
