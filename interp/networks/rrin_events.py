@@ -39,6 +39,7 @@ from interp.candidates.bridge import bridge
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
 from interp.networks.spec import FrameFedSpec
+from interp.representation.event_counts import EventCounts
 from interp.warp import flows_at
 
 Depth = Annotated[int, Field(ge=2, le=7)]
@@ -114,6 +115,10 @@ class RrinEvents(FrameFed):
         frames = torch.cat([pair.frame_0, pair.frame_1], 1)
         return self.flow(self.scale.down(frames)).float() * self.spec.flow_scale
 
+    def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
+        """Counts at the resolution of U1 to U3, and the gate."""
+        return pair.events.pooled(self.scale.factor).off_on, self._gate(pair)
+
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
         assert pair.flows is not None
@@ -132,15 +137,14 @@ class RrinEvents(FrameFed):
             draft, weights = self._blend_with_candidate(warps, candidate[0], logits, times)
         residue = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate])
         start = candidate[0] if self.spec.candidate == "base" else draft
-        image = start + (self._gate(pair)[:, None] * residue if self.spec.gate and pair.seen else residue)
+        image = start + pair.once[1][:, None] * residue
         return Interpolated(image, self.scale.flow_up(pair.flows), flows, warps, weights, of_warps)
 
     def _events(self, pair: Pair, times: torch.Tensor) -> list[torch.Tensor]:
         """Voxels of both halves, at the resolution of U1 to U3, in a list that is empty without events."""
         if not self.spec.bins:
             return []
-        counts = pair.events if self.scale.factor == 1 else pair.events.pooled(self.scale.factor)
-        return [counts.halves(times, self.spec.bins)]
+        return [EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins)]
 
     def _candidate(self, pair: Pair, times: torch.Tensor, warps: torch.Tensor) -> list[torch.Tensor]:
         """The bridge, in a list that is empty if none is asked for."""
@@ -169,7 +173,9 @@ class RrinEvents(FrameFed):
         return blend(pictures, logits, torch.cat([shares_at(times), kept[..., None]], -1))
 
     def _gate(self, pair: Pair) -> torch.Tensor:
-        """How much residue is let through, [B, 1, H, W]: none where no event is near."""
+        """How much residue is let through, [B, 1, H, W]: none where no event is near; all without events or a gate."""
+        if not (self.spec.gate and pair.seen):
+            return torch.ones_like(pair.frame_0[:, :1])
         number = pair.events.off_on.float().sum((1, 2)).unsqueeze(1)
         near = F.avg_pool2d(number, GATE_REACH_PX, stride=1, padding=GATE_REACH_PX // 2)
         return 1 - torch.exp(-GATE_STEEPNESS * near)

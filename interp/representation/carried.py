@@ -34,7 +34,7 @@ def carried(counts: EventCounts, places: torch.Tensor) -> EventCounts:
     height, width = counts.off_on.shape[-2:]
     seen = ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
     factor = _pixels_across(places, seen)
-    maps = counts.pooled(factor).off_on if factor > 1 else counts.off_on.float()
+    maps = counts.pooled(factor).off_on.float()
     where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
     found = sample(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float())
     return replace(counts, off_on=(found * seen).unflatten(1, counts.off_on.shape[1:3]))

@@ -48,23 +48,17 @@ class EventCounts:
         """S, the number of sub-intervals."""
         return self.off_on.shape[2]
 
-    def nats(self) -> torch.Tensor:
-        """Change of log light per sub-interval [B, S, H, W] float32."""
-        off, on = self.off_on.float().unbind(1)
-        down, up = self.contrast.float()[..., None, None, None].unbind(1)
-        return on * up - off * down
-
     def change(self, start: torch.Tensor, stop: torch.Tensor) -> torch.Tensor:
         """Change of log light [B, N, H, W] nats in windows [B, N], in 0 ... 1 of the time between the frames."""
-        return _in_bins(self.nats(), start, stop, 1).squeeze(2)
+        return _in_bins(self.off_on, self._signs(), start, stop, 1).squeeze(2)
 
     def number(self, start: torch.Tensor, stop: torch.Tensor) -> torch.Tensor:
         """Number of events, OFF and ON, [B, N, H, W] in windows [B, N]."""
-        return _in_bins(self.off_on.float().sum(1), start, stop, 1).squeeze(2)
+        return _in_bins(self.off_on, torch.ones_like(self._signs()), start, stop, 1).squeeze(2)
 
     def voxels(self, start: torch.Tensor, stop: torch.Tensor, bins: int) -> torch.Tensor:
         """Voxel grids [B, N, bins, H, W] of windows [B, N]."""
-        return as_voxels(_in_bins(self.nats(), start, stop, bins))
+        return as_voxels(_in_bins(self.off_on, self._signs(), start, stop, bins))
 
     def halves(self, times: torch.Tensor, bins: int) -> torch.Tensor:
         """Voxel grids [B, N, 2 bins, H, W]: from each time back to the first frame, then on to the second.
@@ -79,12 +73,18 @@ class EventCounts:
         start = self.contrast.new_zeros(len(self.contrast), 1)
         return self.voxels(start, start + 1, bins).squeeze(1)
 
+    def _signs(self) -> torch.Tensor:
+        """What an OFF and an ON event count as, [B, 2] nats."""
+        return self.contrast.float() * self.contrast.new_tensor([-1, 1])
+
     def padded(self, right: int, below: int) -> EventCounts:
-        """With so many pixels more, in which nothing happens."""
-        return replace(self, off_on=F.pad(self.off_on, (0, right, 0, below)))
+        """In float32, with so many pixels more, in which nothing happens."""
+        return replace(self, off_on=F.pad(self.off_on.float(), (0, right, 0, below)))
 
     def pooled(self, factor: int) -> EventCounts:
         """Means of squares of pixels, as a sensor of larger pixels would count."""
+        if factor == 1:
+            return self
         counts = F.avg_pool2d(self.off_on.float().flatten(1, 2), factor)
         return replace(self, off_on=counts.unflatten(1, (2, self.steps)))
 
@@ -147,8 +147,11 @@ def as_voxels(nats: torch.Tensor) -> torch.Tensor:
 
 
 @in_full_precision
-def _in_bins(values: torch.Tensor, start: torch.Tensor, stop: torch.Tensor, bins: int) -> torch.Tensor:
-    """[B, N, bins, H, W] of values per sub-interval [B, S, H, W]."""
-    weights = bin_weights(start, stop, bins, values.shape[1])
-    found = weights.flatten(1, 2) @ values.flatten(2)
-    return found.unflatten(1, weights.shape[1:3]).unflatten(3, values.shape[2:])
+def _in_bins(
+    off_on: torch.Tensor, worth: torch.Tensor, start: torch.Tensor, stop: torch.Tensor, bins: int
+) -> torch.Tensor:
+    """[B, N, bins, H, W] of counts [B, 2, S, H, W]; worth [B, 2]: what an OFF and an ON event count as."""
+    weights = bin_weights(start, stop, bins, off_on.shape[2])
+    both = torch.cat([weights * share[:, None, None, None] for share in worth.unbind(1)], -1)
+    found = both.flatten(1, 2) @ off_on.float().flatten(1, 2).flatten(2)
+    return found.unflatten(1, weights.shape[1:3]).unflatten(3, off_on.shape[3:])
