@@ -118,9 +118,9 @@ def test_light_is_made_once_where_the_first_plans_hold(
     held(SOME)
     times = []
 
-    def counted(*arguments: Any) -> Any:
+    def counted(*arguments: Any, **rest: Any) -> Any:
         times.append(arguments)
-        return instants(*arguments)
+        return instants(*arguments, **rest)
 
     monkeypatch.setattr(planning, "instants", counted)
     assert gone(made(clip, tmp_path / "wide", tolerance=1.0)) == ["photoreceptor", "follower"] and len(times) == 1

@@ -114,6 +114,7 @@ class Dvs:
         """
         if self._t_ns is None:
             return self.restart(light, t_ns)
+        self._check_shape(np.shape(light))
         flat, table = self._light(light)
         sent = self._walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
         self._seen = light
@@ -154,6 +155,7 @@ class Dvs:
         There are no events in (previous frame, this frame]; only fixed-rate mode may return some, held back from
         before.  Noise goes on: what is drawn by count or by time is drawn on.  Raises UsageError as `step` does.
         """
+        self._check_shape(np.shape(light))
         flat, table = self._light(light)
         self._seen = light
         if self._t_ns is None and self._frames is not None:
@@ -266,7 +268,9 @@ class Dvs:
     def _check_shape(self, shape: tuple[int, ...]) -> None:
         width, height = self.size
         if shape != (height, width):
-            raise UsageError(f"light of shape {shape}: expected ({height}, {width}), rows and columns of this sensor")
+            raise UsageError(
+                f"light of shape {tuple(shape)}: expected ({height}, {width}), rows and columns of this sensor"
+            )
 
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Light [..., height, width] as [frames, pixels], with the table of its codes."""
