@@ -17,7 +17,12 @@ that learn on two cores in minutes; the register has them as `rrin_events_light`
 
 In a blend with warps the candidate wins before flows have learnt anything, and then they never do.  So it is either
 kept out of the blend (`base`: U4 corrects it, and sees the blend) or left out of it at random (`softmax`,
-`candidate_dropout`); and `Interpolated.blend` is of the warps alone, for a loss of their own.
+`candidate_dropout`); and `Interpolated.blend` is of the warps alone, for a loss of their own.  `mixed` lets U4 say how
+far to go from the candidate C to the blend, too, none of it at first and at most as far again the other way,
+
+    I_t = C + (1 - 2 sigmoid(z)) (J - C) + residue                    z, residue = U4(I0, I1, J, C)
+
+as where events are noise the blend is all that is needed.
 
 Sources: Li et al. (2020), "Video frame interpolation via residue refinement", ICASSP; channels and levels as in
 https://github.com/HopLee6/RRIN; events, Radomski et al., section III.A.2.
@@ -67,10 +72,11 @@ class RrinEventsSpec(FrameFedSpec):
         default=False,
         description="U1 to U3 at half the resolution, U4 on squares of pixels: about a quarter of the time",
     )
-    candidate: Literal["none", "input", "base", "softmax"] = Field(
+    candidate: Literal["none", "input", "base", "mixed", "softmax"] = Field(
         default="none",
-        description="the bridge: none; input of U3 and U4; base that U4 corrects; softmax: a third picture in the"
-        " blend, too. 864 parameters and 0.864 kMAC/px in each, and two products with the events",
+        description="the bridge: none; input of U3 and U4; base that U4 corrects; mixed: base, of which U4 takes part"
+        " of the way to the blend; softmax: a third picture in the blend, too. 864 parameters and 0.864 kMAC/px in"
+        " each, and two products with the events",
     )
     candidate_dropout: float = Field(
         default=0.3, ge=0, lt=1, description="share of training images whose blend does without the candidate; free"
@@ -99,11 +105,12 @@ class RrinEvents(FrameFed):
         self.flow = Unet(2 * colours, 4, layouts[0], zero)
         self.refine = Unet(2 * colours + 4 + events, 4, layouts[1], zero)
         self.masks = Unet(masks_in, pictures, layouts[2], zero)
+        corrections = colours + (spec.candidate == "mixed")
         if spec.coarse:
             halved = rrin_layout(spec.depths[3] - 1, 2 * spec.base)
-            self.residue: nn.Module = HalfSized(3 * colours + candidate, colours, halved, zero)
+            self.residue: nn.Module = HalfSized(3 * colours + candidate, corrections, halved, zero)
         else:
-            self.residue = Unet(3 * colours + candidate, colours, layouts[3], zero)
+            self.residue = Unet(3 * colours + candidate, corrections, layouts[3], zero)
         self.multiple = self.scale.factor * 2 ** (max(spec.depths) - 1)
 
     @property
@@ -135,9 +142,8 @@ class RrinEvents(FrameFed):
         draft = of_warps
         if self.spec.candidate == "softmax":
             draft, weights = self._blend_with_candidate(warps, candidate[0], logits, times)
-        residue = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate])
-        start = candidate[0] if self.spec.candidate == "base" else draft
-        image = start + pair.once[1][:, None] * residue
+        found = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate])
+        image = self._start(draft, candidate) + pair.once[1][:, None] * self._correction(found, draft, candidate)
         return Interpolated(image, self.scale.flow_up(pair.flows), flows, warps, weights, of_warps)
 
     def _events(self, pair: Pair, times: torch.Tensor) -> list[torch.Tensor]:
@@ -171,6 +177,16 @@ class RrinEvents(FrameFed):
             kept = (torch.rand_like(times) >= self.spec.candidate_dropout).to(times)
         pictures = torch.cat([warps, candidate[:, :, None]], 2)
         return blend(pictures, logits, torch.cat([shares_at(times), kept[..., None]], -1))
+
+    def _start(self, draft: torch.Tensor, candidate: list[torch.Tensor]) -> torch.Tensor:
+        return candidate[0] if self.spec.candidate in ("base", "mixed") else draft
+
+    def _correction(self, found: torch.Tensor, draft: torch.Tensor, candidate: list[torch.Tensor]) -> torch.Tensor:
+        """What U4 adds: the residue, and of `mixed` a share of the way to the blend."""
+        if self.spec.candidate != "mixed":
+            return found
+        share = 1 - 2 * torch.sigmoid(found[:, :, -1:])
+        return found[:, :, :-1] + share * (draft - candidate[0])
 
     def _gate(self, pair: Pair) -> torch.Tensor:
         """How much residue is let through, [B, 1, H, W]: none where no event is near; all without events or a gate."""
