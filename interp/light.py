@@ -11,9 +11,9 @@ import torch
 
 from interp.precision import in_full_precision
 from vid2ev.light.transfer import SRGB_KNEE, SRGB_OFFSET, SRGB_POWER, SRGB_SLOPE
+from vid2ev.stream.frames import LUMINANCE
 
 Transfer = Literal["srgb", "linear"]
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # of the primaries of BT.709 (Rec. ITU-R BT.709-6 item 3.2)
 
 
 @in_full_precision

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import json
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from interp.data.dataset import Report
 
 SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 
@@ -66,6 +60,7 @@ def dataset(
     from interp.data.dataset import write_dataset
     from interp.data.dataset_spec import DatasetSpec
     from vid2ev.commands.batch import sources_in
+    from vid2ev.commands.progress import counting
     from vid2ev.errors import UsageError
     from vid2ev.sensors.tiles import usable_cores
 
@@ -74,7 +69,7 @@ def dataset(
         spec = DatasetSpec(videos=found, size=_size(size), **options)
     except ValidationError as error:
         raise UsageError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
-    with _bar(quiet or as_json) as report:
+    with counting(quiet or as_json, SCENES) as report:
         facts = write_dataset(directory, spec, resume=resume, jobs=jobs or usable_cores(), report=report)
     if as_json:
         click.echo(json.dumps(facts, indent=2))
@@ -91,18 +86,3 @@ def _size(text: str) -> tuple[int, int]:
     if not (times and width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= 16):
         raise UsageError(f"size '{text}': expected WIDTHxHEIGHT of at least 16, such as 640x480")
     return int(width), int(height)
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Report]:
-    """A progress bar on a terminal: scenes."""
-    from tqdm import tqdm
-
-    with tqdm(total=None, bar_format=SCENES, leave=False, disable=quiet or None) as shown:
-
-        def report(done: int, count: int, name: str) -> None:
-            shown.total = count
-            shown.set_postfix_str(name, refresh=False)
-            shown.update(done - shown.n)
-
-        yield report

@@ -91,7 +91,6 @@ class ClipSettings(BaseModel):
 
 PRESETS = {
     "default": ClipSettings(),
-    # The paper's sensors: Table I's rig, 30 to 960 frames per second, noise and range of section III.B.2.
     # The paper's rig, rates and sensors: Table I and section III.B.2.
     "paper": ClipSettings(
         size=(144, 144), multiples=(32,), gap_ms=(33.312, 33.344), rigs=1.0, sensors=SENSORS["paper"]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from lightning.pytorch import Callback, LightningModule, Trainer
@@ -12,7 +10,6 @@ from tqdm import tqdm
 
 STEPS = "{percentage:3.0f}% {bar} step {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 UNKNOWN = "step {n_fmt}, {elapsed} gone{postfix}"
-CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 SMOOTHING = 0.05  # of the newest step, in loss and speed
 
 
@@ -72,21 +69,3 @@ class Bar(Callback):
 
 def _smooth(before: float, now: float, begun: bool) -> float:
     return before + SMOOTHING * (now - before) if begun else now
-
-
-@contextmanager
-def clip_bar(quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal: clips."""
-    shown: tqdm | None = None
-
-    def report(done: int, count: int) -> None:
-        nonlocal shown
-        if shown is None:
-            shown = tqdm(total=count, bar_format=CLIPS, leave=False, disable=quiet or None)
-        shown.update(done - shown.n)
-
-    try:
-        yield report
-    finally:
-        if shown is not None:
-            shown.close()

@@ -10,8 +10,10 @@ from interp.train.fit import Fit, Outcome, Stop
 from interp.train.job import Job
 from interp.train.machines import ALL, Machines, cores
 from interp.train.made_of import feed_of, learner_of
-from interp.train.progress import clip_bar
 from interp.train.run_folder import RunFolder
+from vid2ev.commands.progress import counting
+
+CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 
 
 def run(
@@ -37,7 +39,7 @@ def run(
         learner = learner_of(job)
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = max(1, cores() - job.recipe.threads) if workers is None else workers
-        with clip_bar(quiet) as report:
+        with counting(quiet, CLIPS) as report:
             feed = feed_of(job, folder.clips, step, spare, cores(), report)
         outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:

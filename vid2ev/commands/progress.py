@@ -17,6 +17,7 @@ from vid2ev.errors import DataError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
 
     from vid2ev.conversion import Progress
     from vid2ev.cost.measure import Report
@@ -107,48 +108,35 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
 
 
 @contextmanager
-def event_bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
-    """A progress bar on a terminal: events."""
+def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[..., None]]:
+    """A progress bar on a terminal; what this yields is told how many are done, of how many, and perhaps a name."""
     from tqdm import tqdm
 
-    shown: tqdm | None = None
+    with tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, **look) as shown:
 
-    def report(recording: Recording, events: int) -> None:
-        nonlocal shown
-        if shown is None:
-            shown = tqdm(total=recording.count, bar_format=EVENTS, leave=False, disable=quiet or None, unit_scale=True)
-        shown.update(events - shown.n)
+        def report(done: int, count: int | None, name: str = "") -> None:
+            shown.total = count
+            shown.set_postfix_str(name, refresh=False)
+            shown.update(done - shown.n)
+            if name:
+                shown.refresh()
 
-    try:
         yield report
-    finally:
-        if shown is not None:
-            shown.close()
+
+
+@contextmanager
+def event_bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
+    """A progress bar on a terminal: events."""
+    with counting(quiet, EVENTS, unit_scale=True) as report:
+        yield lambda recording, events: report(events, recording.count)
+
+
+def pass_bar(quiet: bool) -> AbstractContextManager[Report]:
+    """A progress bar on a terminal: passes."""
+    return counting(quiet, PASSES)
 
 
 def given() -> set[str]:
     """The options of the command that runs which were given on its command line."""
     context = click.get_current_context()
     return {name for name in context.params if context.get_parameter_source(name) == ParameterSource.COMMANDLINE}
-
-
-@contextmanager
-def pass_bar(quiet: bool) -> Iterator[Report]:
-    """A progress bar on a terminal: passes."""
-    from tqdm import tqdm
-
-    shown: tqdm | None = None
-
-    def report(done: int, count: int, name: str) -> None:
-        nonlocal shown
-        if shown is None:
-            shown = tqdm(total=count, bar_format=PASSES, leave=False, disable=quiet or None)
-        shown.set_postfix_str(name, refresh=False)
-        shown.update(done - shown.n)
-        shown.refresh()
-
-    try:
-        yield report
-    finally:
-        if shown is not None:
-            shown.close()

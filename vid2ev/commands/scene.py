@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from vid2ev.scenes.blender.renderer import Cycles
     from vid2ev.scenes.scene_file import SceneFile
@@ -110,6 +110,7 @@ def _file(name: str, options: dict[str, Any]) -> SceneFile:
 
 
 def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[dict[str, Any]]:
+    from vid2ev.commands.progress import counting
     from vid2ev.scenes.camera_folder import Contents
     from vid2ev.scenes.folder import write_scene
     from vid2ev.scenes.source import SceneSource
@@ -124,7 +125,7 @@ def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[d
     )
     keep = {"overwrite": options["overwrite"], "resume": options["resume"]}
     for seed, directory in directories.items():
-        with _renderer(directory, options) as renderer, _bar(str(directory), quiet) as report:
+        with _renderer(directory, options) as renderer, counting(quiet, FRAMES, desc=str(directory)) as report:
             source = SceneSource(World(file, seed, renderer=renderer), file.name, seed=seed, fps=options["fps"])
             how = f"{file.name}, seed {seed}, " + (f"{options['fps']:g} fps" if options["fps"] else "all instants")
             how += f", Cycles with {renderer.samples} samples" if renderer else ""
@@ -152,17 +153,3 @@ def _renderer(directory: Path, options: dict[str, Any]) -> AbstractContextManage
         if options[name] is not None:
             raise UsageError(f"--{name} {options[name]} says nothing to the embedded renderer; add --renderer blender")
     return nullcontext()
-
-
-@contextmanager
-def _bar(directory: str, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal: frames."""
-    from tqdm import tqdm
-
-    with tqdm(desc=directory, total=None, bar_format=FRAMES, leave=False, disable=quiet or None) as shown:
-
-        def report(done: int, total: int) -> None:
-            shown.total = total
-            shown.update(done - shown.n)
-
-        yield report

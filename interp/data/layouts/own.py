@@ -6,7 +6,6 @@ writes them.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from interp.data.layouts.sequence import Placed
 from vid2ev import DataError, read_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes
+from vid2ev.recording.manifest import read_manifest
 from vid2ev.rig.rig_file import read_rig
 
 MANIFEST = "manifest.json"
@@ -87,7 +87,7 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
     """Kind, folder and what else matters of each camera of a recording."""
     found = []
     for path in [folder / MANIFEST, *sorted(folder.glob(f"*/{MANIFEST}"))]:
-        said = _read(path)
+        said = read_manifest(path)
         sensor = said.get("sensor")
         if sensor is None or (sensor["kind"] == "cis" and not (path.parent / KINDS["png"] / TIMESTAMPS).exists()):
             continue
@@ -100,13 +100,6 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
             facts["span_us"] = (begin, begin + said["duration_us"])
         found.append(facts)
     return found
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path} cannot be read ({error}); make the recording again") from error
 
 
 def _times_us(folder: Path) -> np.ndarray:
