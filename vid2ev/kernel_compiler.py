@@ -25,7 +25,7 @@ from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import RewriteSemanticConstants
 
-from vid2ev.kernel_flags import Numba, fold_flags
+from vid2ev.kernel_flags import Numba, pass_over_flags
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
@@ -53,17 +53,7 @@ def of_plain_types(dispatcher: Any) -> Any:
     return dispatcher
 
 
-@register_pass(mutates_CFG=False, analysis_only=False)
-class FlagsAreConstants(FunctionPass):
-    """Lengths of the fields of named tuples, and what is computed from them and other constants, as constants."""
-
-    _name = "flags_are_constants"
-
-    def __init__(self) -> None:
-        FunctionPass.__init__(self)
-
-    def run_pass(self, state: Any) -> bool:
-        return fold_flags(state.func_ir, state.args, Numba(ir, types, guard, get_definition))
+FlagsAreConstants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types, guard, get_definition))
 
 
 class InnerLibrary(JITCodeLibrary):

@@ -1,6 +1,7 @@
 """Lengths of the fields of named tuples, and what is computed from them and other constants, as constants.
 
-numba has its representation of functions twice, for CPUs and for GPUs; what is asked of it is handed in.
+numba has its representation of functions and its passes over them twice, for CPUs and for GPUs; what is asked of it
+is handed in.
 """
 
 from __future__ import annotations
@@ -15,6 +16,22 @@ class Numba(NamedTuple):
     types: Any
     guard: Any
     get_definition: Any
+
+
+def pass_over_flags(register_pass: Any, function_pass: Any, numba: Numba) -> type:
+    """The pass of a compiler that does it, by numba's `register_pass` and its base of passes over functions."""
+
+    @register_pass(mutates_CFG=False, analysis_only=False)
+    class FlagsAreConstants(function_pass):
+        _name = "flags_are_constants"
+
+        def __init__(self) -> None:
+            function_pass.__init__(self)
+
+        def run_pass(self, state: Any) -> bool:
+            return fold_flags(state.func_ir, state.args, numba)
+
+    return FlagsAreConstants
 
 
 def fold_flags(func_ir: Any, argument_types: tuple, numba: Numba) -> bool:

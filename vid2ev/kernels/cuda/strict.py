@@ -12,7 +12,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from vid2ev.kernel_flags import Numba, fold_flags
+from vid2ev.kernel_flags import Numba, pass_over_flags
 
 _lock = threading.RLock()
 
@@ -46,20 +46,12 @@ def _compiler() -> Any:
     from numba.cuda.core.ir_utils import get_definition, guard
     from numba.cuda.core.untyped_passes import RewriteSemanticConstants
 
-    @register_pass(mutates_CFG=False, analysis_only=False)
-    class FlagsAreConstants(FunctionPass):
-        _name = "flags_are_constants"
-
-        def __init__(self) -> None:
-            FunctionPass.__init__(self)
-
-        def run_pass(self, state: Any) -> bool:
-            return fold_flags(state.func_ir, state.args, Numba(ir, types, guard, get_definition))
+    flags_are_constants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types, guard, get_definition))
 
     class Compiler(CUDACompiler):
         def define_pipelines(self) -> list:
             passes = super().define_pipelines()
-            passes[0].add_pass_after(FlagsAreConstants, RewriteSemanticConstants)
+            passes[0].add_pass_after(flags_are_constants, RewriteSemanticConstants)
             passes[0].finalize()
             return passes
 
