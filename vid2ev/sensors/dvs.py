@@ -13,12 +13,12 @@ from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, T
 from vid2ev.kernels.naps import rouse
 from vid2ev.kernels.rows import interval_rows
 from vid2ev.kernels.work import new_work
-from vid2ev.light.transfer import code_table
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.clock import Clock, Step
 from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
+from vid2ev.sensors.intake import Intake
 from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.sleep import Sleep
@@ -71,10 +71,10 @@ class Dvs:
         check_sensor(size, seed, camera, threads)
         width, height = size
         self.size, self.labels, self.transfer, self._skip = (width, height), labels, transfer, skip
+        self._intake = Intake(self.size, transfer)
         self._tiles = Tiles(-(-width * height // BLOCK), threads)
         self._work = [new_work() for _ in range(self._tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
-        self._tables: dict[Any, np.ndarray] = {}
         self._be(spec, seed, camera)
 
     def _be(self, spec: DvsSpec, seed: int, camera: int, flags: Flags | None = None, old: Planes | None = None) -> None:
@@ -114,7 +114,7 @@ class Dvs:
         """
         if self._t_ns is None:
             return self.restart(light, t_ns)
-        self._check_shape(np.shape(light))
+        self._intake.check(np.shape(light))
         flat, table = self._light(light)
         sent = self._walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
         self._seen = light
@@ -155,7 +155,7 @@ class Dvs:
         There are no events in (previous frame, this frame]; only fixed-rate mode may return some, held back from
         before.  Noise goes on: what is drawn by count or by time is drawn on.  Raises UsageError as `step` does.
         """
-        self._check_shape(np.shape(light))
+        self._intake.check(np.shape(light))
         flat, table = self._light(light)
         self._seen = light
         if self._t_ns is None and self._frames is not None:
@@ -265,35 +265,9 @@ class Dvs:
             )
         return t_ns
 
-    def _check_shape(self, shape: tuple[int, ...]) -> None:
-        width, height = self.size
-        if shape != (height, width):
-            raise UsageError(
-                f"light of shape {tuple(shape)}: expected ({height}, {width}), rows and columns of this sensor"
-            )
-
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Light [..., height, width] as [frames, pixels], with the table of its codes."""
-        light = np.asarray(light)
-        self._check_shape(light.shape[-2:])
-        pixels = self._bad.size
-        if light.dtype.kind == "f":
-            flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
-            return flat.reshape(-1, pixels), np.empty(0, np.float32)
-        if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
-            raise UsageError(
-                f"light of type {light.dtype}: expected floating point (linear light), or uint8 or uint16 with"
-                " transfer='srgb', 'bt709', 'gamma:2.2' or 'linear'"
-            )
-        if light.dtype not in self._tables:
-            self._tables[light.dtype] = self._table(8 * light.dtype.itemsize)
-        return np.ascontiguousarray(light).reshape(-1, pixels), self._tables[light.dtype]
-
-    def _table(self, bits: int) -> np.ndarray:
-        assert self.transfer is not None
-        if self.transfer == "linear":
-            return np.array([1.0 / ((1 << bits) - 1)], np.float32)  # one entry: a product is faster than a look-up
-        return code_table(self.transfer, bits)
+        """Light [..., height, width] as the walk takes it, with the table of its codes."""
+        return self._intake.flat(light)
 
     def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
         def settle(k: int, first: int, last: int) -> None:

@@ -63,7 +63,7 @@ class DvsOnCard(Dvs):
 
     def step(self, light: Any, t_ns: int, still: Still | None = None) -> Events:
         """`Dvs.step`; light may be a tensor.  What is `still` saves nothing here: all pixels are glanced at."""
-        self._check_shape(np.shape(light))
+        self._intake.check(np.shape(light))
         return self.steps(light[None], [t_ns])[0]
 
     def steps(self, light: Any, t_ns: Sequence[int]) -> list[Events]:
@@ -124,12 +124,12 @@ class DvsOnCard(Dvs):
         if not hasattr(light, "is_floating_point"):
             light = np.asarray(light)
             if light.dtype.kind == "f":
-                self._check_shape(light.shape[-2:])
+                self._intake.check(light.shape[-2:])
                 return light, np.empty(0, np.float32)
             frames = [super(DvsOnCard, self)._light(frame) for frame in light.reshape(-1, *light.shape[-2:])]
             linear = [table[codes] if len(table) > 1 else codes.astype(np.float32) * table for codes, table in frames]
             return np.reshape(linear, light.shape), frames[0][1]
-        self._check_shape(light.shape[-2:])
+        self._intake.check(light.shape[-2:])
         if not light.is_floating_point():
             raise UsageError(f"light of type {light.dtype}: expected a tensor of floating point, which is linear light")
         return light, np.empty(0, np.float32)

@@ -1,0 +1,49 @@
+"""What an event camera takes for light: frames of its size, linear light or codes that were promised to be such."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vid2ev.errors import UsageError
+from vid2ev.light.transfer import code_table
+
+
+class Intake:
+    """The light of sensors of `size` (width, height); `transfer` is what uint8 and uint16 are coded with, if at all."""
+
+    def __init__(self, size: tuple[int, int], transfer: str | None):
+        self.size, self.transfer = size, transfer
+        self._tables: dict[Any, np.ndarray] = {}
+
+    def check(self, shape: tuple[int, ...]) -> None:
+        """Raise UsageError for another shape than that of a frame."""
+        width, height = self.size
+        if shape != (height, width):
+            raise UsageError(
+                f"light of shape {tuple(shape)}: expected ({height}, {width}), rows and columns of this sensor"
+            )
+
+    def flat(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Light [..., height, width] as [frames, pixels], with the table of its codes; raises UsageError."""
+        light = np.asarray(light)
+        self.check(light.shape[-2:])
+        pixels = self.size[0] * self.size[1]
+        if light.dtype.kind == "f":
+            flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
+            return flat.reshape(-1, pixels), np.empty(0, np.float32)
+        if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
+            raise UsageError(
+                f"light of type {light.dtype}: expected floating point (linear light), or uint8 or uint16 with"
+                " transfer='srgb', 'bt709', 'gamma:2.2' or 'linear'"
+            )
+        if light.dtype not in self._tables:
+            self._tables[light.dtype] = _table(self.transfer, 8 * light.dtype.itemsize)
+        return np.ascontiguousarray(light).reshape(-1, pixels), self._tables[light.dtype]
+
+
+def _table(transfer: str, bits: int) -> np.ndarray:
+    if transfer == "linear":
+        return np.array([1.0 / ((1 << bits) - 1)], np.float32)  # one entry: a product is faster than a look-up
+    return code_table(transfer, bits)
