@@ -76,6 +76,9 @@ CLIENT_FLOORS = {
     "weights": 5,
     "work": 5,
     "data": 5,
+    "methods": 6,
+    "evaluate": 7,
+    "interpolate": 7,
     "train": 7,
     "commands": 8,
 }

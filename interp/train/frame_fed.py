@@ -11,9 +11,9 @@ import torch
 
 from interp.losses import objectives
 from interp.losses.perceptual import Perceptual
+from interp.methods import METHODS, Gap, open_method
 from interp.networks.frame_fed import FrameFed, Interpolated
 from interp.representation.event_counts import EventCounts
-from interp.train.baselines import METHODS, baseline
 from interp.train.batches import Batch
 from interp.train.learner import Learner
 from interp.train.pictures import of_error, of_events, rows, shown
@@ -61,14 +61,13 @@ class FrameFedLearner(Learner):
 
     def baselines(self, clip: Batch) -> dict[str, torch.Tensor]:
         """Images of the methods without training."""
-        first, last = clip["frames"][0]
-        return {name: baseline(name, first, last, events_of(clip), clip["times"][0]) for name in METHODS}
+        return {name: open_method(name).between(gap_of(clip), clip["times"][0]) for name in METHODS}
 
     def picture(self, clip: Batch, images: torch.Tensor) -> np.ndarray:
         """First frame, events up to the target, bridge, prediction, truth, error, last frame; a row per target."""
         events, times, truth = events_of(clip), clip["times"][0], clip["truth"][0]
         first, last = clip["frames"][0]
-        bridge = baseline("bridge", first, last, events, times)
+        bridge = open_method("bridge").between(gap_of(clip), times)
         return rows(
             [
                 first,
@@ -86,3 +85,9 @@ class FrameFedLearner(Learner):
 def events_of(batch: Batch) -> EventCounts:
     """The events of a batch."""
     return EventCounts(batch["off_on"], batch["contrast"])
+
+
+def gap_of(clip: Batch) -> Gap:
+    """The only pair of frames of a batch."""
+    first, last = clip["frames"][0]
+    return Gap(first, last, events_of(clip), 0)

@@ -1,0 +1,53 @@
+"""What rebuilds the frames between two frames: by name, or with the weights of a file.
+
+    method = open_method("bridge").begin()
+    images = method.between(gap, times)
+
+is all that evaluation and interpolation know of any of them.  A new method is a class that satisfies `Method`, and a
+line in `METHODS`.
+
+    nearest       the nearer key frame
+    linear        a blend of the codes of both
+    flow          light carried along the motion between both: DIS, forwards and backwards
+    integration   events integrated from the nearer key frame
+    both          events integrated from both, with weights 1 - t and t: the complementary filter
+    bridge        the same with the drift spread in proportion to events: the closed form to beat
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import torch
+
+from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events
+from interp.methods.flow import flow
+from interp.methods.gap import Gap, Method
+from interp.methods.of_networks import of_weights
+from vid2ev.errors import UsageError
+from vid2ev.errors import nearest as near
+
+__all__ = ["METHODS", "Gap", "Method", "open_method"]
+
+METHODS: dict[str, Callable[[], Method]] = {
+    "nearest": lambda: ClosedForm("nearest", nearest, needs_events=False),
+    "linear": lambda: ClosedForm("linear", linear, needs_events=False),
+    "flow": lambda: ClosedForm("flow", flow, needs_events=False),
+    "integration": lambda: ClosedForm("integration", of_events("nearest")),
+    "both": lambda: ClosedForm("both", of_events("both")),
+    "bridge": lambda: ClosedForm("bridge", of_events("bridge")),
+}
+
+
+def open_method(name: str, device: torch.device | str = "cpu") -> Method:
+    """The method of a name, or of a file of weights.
+
+    Raises UsageError for a name that is none, DataError for a file that holds no network which rebuilds frames.
+    """
+    if name in METHODS:
+        return METHODS[name]()
+    if Path(name).suffix == ".safetensors" or Path(name).exists():
+        return of_weights(Path(name), device)
+    known = ", ".join(METHODS)
+    raise UsageError(f"method '{name}'{near(name, METHODS)}: expected one of {known}, or a file of weights")

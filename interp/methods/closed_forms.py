@@ -1,0 +1,59 @@
+"""Methods that need no training: blends of the key frames, and integrals of the events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import torch
+
+from interp.candidates.bridge import Method as Way
+from interp.candidates.bridge import bridge
+from interp.methods.gap import Gap
+from interp.representation.carried import over
+from vid2ev.errors import UsageError
+
+Law = Callable[[Gap, torch.Tensor], torch.Tensor]
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedForm:
+    """A law that looks at one gap alone."""
+
+    name: str
+    law: Law
+    needs_events: bool = True
+    sequential: bool = False
+
+    def begin(self) -> Self:
+        """Itself."""
+        return self
+
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`."""
+        if self.needs_events and gap.events is None:
+            raise UsageError(f"method '{self.name}' integrates events, and there are none; choose flow or linear")
+        return self.law(gap, times)
+
+
+def nearest(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    """The nearer key frame; halfway the first."""
+    return torch.where(times[:, None, None, None] > 0.5, gap.frame_1, gap.frame_0)
+
+
+def linear(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    """A blend of the codes of both."""
+    return gap.frame_0 + times[:, None, None, None] * (gap.frame_1 - gap.frame_0)
+
+
+def of_events(way: Way) -> Law:
+    """Integration of events, as `candidates.bridge` does it."""
+
+    def law(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        assert gap.events is not None
+        height, width = gap.frame_0.shape[-2:]
+        events = over(gap.events, (height, width))
+        return bridge(gap.frame_0[None], gap.frame_1[None], events, times[None], method=way)[0]
+
+    return law

@@ -1,0 +1,46 @@
+"""Two key frames and what the events say of the time between them; and what makes frames of that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import torch
+
+from interp.representation.event_counts import EventCounts
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """The time between two key frames.
+
+    frame_0, frame_1   [C, H, W] sRGB codes, 0 ... 1, float32; C is 1 or 3
+    events             between them, B = 1; of any resolution, laid over the frames edge on edge; None where unknown
+    gap_us             from the one to the other [us]
+    """
+
+    frame_0: torch.Tensor
+    frame_1: torch.Tensor
+    events: EventCounts | None
+    gap_us: int
+
+
+class Method(Protocol):
+    """What rebuilds frames.
+
+    name           for tables and files
+    needs_events   whether gaps must have events
+    sequential     whether what it makes depends on the gaps before; if not, gaps may come in any order
+    """
+
+    name: str
+    needs_events: bool
+    sequential: bool
+
+    def begin(self) -> Self:
+        """The same for a new sequence, which knows of no gap before."""
+
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """Images [N, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second.
+        Gaps of a sequence come in their order if the method is `sequential`.  Raises UsageError without events that it
+        needs."""

@@ -1,0 +1,90 @@
+"""Trained networks as methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+import torch
+from torch.nn import functional as F
+
+from interp.methods.gap import Gap
+from interp.networks.event_fed import EventFed, States
+from interp.networks.frame_fed import FrameFed
+from interp.weights import load
+from vid2ev.errors import DataError, UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class OfFrames:
+    """A network that takes two frames; the first flow once per gap."""
+
+    name: str
+    network: FrameFed
+    needs_events: bool
+    sequential: bool = False
+
+    def begin(self) -> Self:
+        """Itself."""
+        return self
+
+    @torch.inference_mode()
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`."""
+        _check(self, gap)
+        events = gap.events if self.needs_events else None
+        return self.network(gap.frame_0[None], gap.frame_1[None], times, events).images[0]
+
+
+@dataclass(slots=True)
+class OfEvents:
+    """A network that takes events alone, window after window, from each time to the next; its images are grey."""
+
+    name: str
+    network: EventFed
+    needs_events: bool = True
+    sequential: bool = True
+    states: States = field(default=(), repr=False)
+
+    def begin(self) -> Self:
+        """With no memory."""
+        return replace(self, states=())
+
+    @torch.inference_mode()
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`."""
+        _check(self, gap)
+        assert gap.events is not None
+        edges = torch.cat([times.new_zeros(1), times, times.new_ones(1)])[None]
+        bins: int = self.network.spec.bins  # type: ignore[assignment, union-attr]
+        voxels = gap.events.voxels(edges[:, :-1], edges[:, 1:], bins)
+        images, self.states = self.network.sequence(voxels, self.states)
+        laid = F.interpolate(images[0, :-1], gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
+        return laid.expand(-1, len(gap.frame_0), -1, -1)
+
+
+def of_weights(path: Path, device: torch.device | str = "cpu", name: str | None = None) -> OfFrames | OfEvents:
+    """The network of a file as a method; it is called like the file unless told otherwise."""
+    network: Any = load(path).to(device)
+    name = name or path.stem
+    if isinstance(network, FrameFed):
+        return OfFrames(name, network, takes_events(network))
+    if isinstance(network, EventFed):
+        return OfEvents(name, network)
+    raise DataError(f"{path} holds a network that rebuilds no frames in between; give one of frames or of events")
+
+
+def takes_events(network: FrameFed) -> bool:
+    """Whether what a network makes depends on events."""
+    spec: Any = network.spec
+    if hasattr(spec, "events"):
+        return spec.events != "none"
+    return bool(spec.bins) or getattr(spec, "candidate", "none") != "none"
+
+
+def _check(method: OfFrames | OfEvents, gap: Gap) -> None:
+    if method.needs_events and gap.events is None:
+        raise UsageError(
+            f"network '{method.name}' was trained with events, and there are none; choose a frames-only one, or flow"
+        )

@@ -1,0 +1,97 @@
+"""What rebuilds frames between two frames, where it is known what it gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+from torch.nn import functional as F
+
+from interp.methods import METHODS, Gap, open_method
+from interp.networks import make
+from interp.representation.event_counts import EventCounts
+from interp.weights import save
+from vid2ev.errors import DataError, UsageError
+
+TIMES = torch.tensor([0.25, 0.5, 0.875])
+NOTHING = EventCounts.none(1, (48, 48), steps=8)
+
+
+def made_by(method: str | Path, frame_0: torch.Tensor, frame_1: torch.Tensor) -> torch.Tensor:
+    return open_method(str(method)).begin().between(Gap(frame_0, frame_1, NOTHING, 33_333), TIMES)
+
+
+def test_between_two_frames_that_are_alike_all_give_that_frame() -> None:
+    frame = 0.05 + 0.9 * torch.rand(3, 48, 48)
+    for method in METHODS:
+        made = made_by(method, frame, frame)
+        # Through light and its log and back in float32: a hundredth of a code of 8 bits.
+        torch.testing.assert_close(made, frame.expand(len(TIMES), -1, -1, -1), atol=0.01 / 255, rtol=0, msg=method)
+
+
+def test_nearest_and_linear_are_what_they_are_called() -> None:
+    black, white = torch.zeros(3, 48, 48), torch.ones(3, 48, 48)
+    assert made_by("nearest", black, white).mean((1, 2, 3)).tolist() == [0, 0, 1]
+    assert made_by("linear", black, white).mean((1, 2, 3)).tolist() == TIMES.tolist()
+
+
+def test_flow_carries_what_moves() -> None:
+    texture = F.interpolate(torch.rand(1, 3, 16, 16), size=(80, 80), mode="bicubic")[0].clamp(0.1, 0.9)
+    shifted = [texture[:, 8:56, 8 + k : 56 + k] for k in (0, 2, 4, 7, 8)]  # 8 px to the left
+    made = made_by("flow", shifted[0], shifted[-1])
+    crossed = made_by("linear", shifted[0], shifted[-1])
+    inner = (slice(None), slice(None), slice(10, -10), slice(10, -10))
+    truth = torch.stack(shifted[1:4])
+    assert float((made - truth)[inner].pow(2).mean()) < 0.5 * float((crossed - truth)[inner].pow(2).mean())
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "needs_events"),
+    [
+        ("rrin", {}, False),
+        ("superslomo", {}, False),
+        ("rrin_events", {}, True),
+        ("rrin_events_light", {}, True),
+        ("rrin_events_light", {"bins": 0, "candidate": "none"}, False),
+        ("slomo_events", {}, True),
+        ("timelens", {}, True),
+        ("firenet", {}, True),
+        ("e2vid", {}, True),
+    ],
+)
+def test_networks_of_files_are_methods(
+    tmp_path: Path, name: str, options: dict[str, object], needs_events: bool
+) -> None:
+    path = tmp_path / f"{name}.safetensors"
+    save(path, name, make(name, "tiny", **options))
+    method = open_method(str(path))
+    assert (method.name, method.needs_events) == (name, needs_events)
+    frames = torch.rand(2, 3, 48, 40)
+    assert made_by(path, *frames).shape == (3, 3, 48, 40)
+    without = Gap(*frames, None, 33_333)
+    if needs_events:
+        with pytest.raises(UsageError, match="events"):
+            method.between(without, TIMES)
+    else:
+        assert method.between(without, TIMES).shape == (3, 3, 48, 40)
+
+
+def test_a_network_of_events_remembers_until_it_begins_again(tmp_path: Path) -> None:
+    path = tmp_path / "firenet.safetensors"
+    save(path, "firenet", make("firenet", "tiny"))
+    frame = torch.rand(3, 16, 16)
+    gap = Gap(frame, frame, EventCounts(torch.randint(0, 2, (1, 2, 8, 16, 16)), torch.full((1, 2), 0.15)), 33_333)
+    method = open_method(str(path))
+    once, again = (method.between(gap, TIMES) for _ in range(2))
+    assert method.sequential and not torch.equal(once, again)
+    torch.testing.assert_close(method.begin().between(gap, TIMES), once, atol=0, rtol=0)
+
+
+def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="did you mean bridge"):
+        open_method("brige")
+    path = tmp_path / "hdr.safetensors"
+    save(path, "hdr", make("hdr", "tiny"))
+    with pytest.raises(DataError, match="rebuilds no frames"):
+        open_method(str(path))
