@@ -85,7 +85,7 @@ def train(
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
     check_installed()
-    machines = Machines(devices, nodes, "cpu" if cpu else "auto")  # type: ignore[arg-type]
+    machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json)
     if machines.first:
         _tell(outcome, path, as_json, quiet)

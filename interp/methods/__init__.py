@@ -12,6 +12,7 @@ line in `METHODS`.
     integration   events integrated from the nearer key frame
     both          events integrated from both, with weights 1 - t and t: the complementary filter
     bridge        the same with the drift spread in proportion to events: the closed form to beat
+    ramps         the bridge with light on its way between events, instead of in stairs
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pathlib import Path
 
 import torch
 
-from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events
+from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events, of_ramps
 from interp.methods.flow import flow
 from interp.methods.gap import Gap, Method
 from interp.methods.of_networks import of_weights
@@ -37,6 +38,7 @@ METHODS: dict[str, Callable[[], Method]] = {
     "integration": lambda: ClosedForm("integration", of_events("nearest")),
     "both": lambda: ClosedForm("both", of_events("both")),
     "bridge": lambda: ClosedForm("bridge", of_events("bridge")),
+    "ramps": lambda: ClosedForm("ramps", of_ramps),
 }
 
 

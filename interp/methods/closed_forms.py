@@ -10,6 +10,7 @@ import torch
 
 from interp.candidates.bridge import Method as Way
 from interp.candidates.bridge import bridge
+from interp.candidates.ramps import ramps
 from interp.methods.gap import Gap
 from interp.representation.carried import over
 from vid2ev.errors import UsageError
@@ -45,6 +46,13 @@ def nearest(gap: Gap, times: torch.Tensor) -> torch.Tensor:
 def linear(gap: Gap, times: torch.Tensor) -> torch.Tensor:
     """A blend of the codes of both."""
     return gap.frame_0 + times[:, None, None, None] * (gap.frame_1 - gap.frame_0)
+
+
+def of_ramps(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    """Integration of events, as `candidates.ramps` does it."""
+    assert gap.events is not None
+    height, width = gap.frame_0.shape[-2:]
+    return ramps(gap.frame_0[None], gap.frame_1[None], over(gap.events, (height, width)), times[None])[0]
 
 
 def of_events(way: Way) -> Law:

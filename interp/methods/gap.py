@@ -26,16 +26,19 @@ class Gap:
 
 
 class Method(Protocol):
-    """What rebuilds frames.
+    """What rebuilds frames."""
 
-    name           for tables and files
-    needs_events   whether gaps must have events
-    sequential     whether what it makes depends on the gaps before; if not, gaps may come in any order
-    """
+    @property
+    def name(self) -> str:
+        """For tables and files."""
 
-    name: str
-    needs_events: bool
-    sequential: bool
+    @property
+    def needs_events(self) -> bool:
+        """Whether gaps must have events."""
+
+    @property
+    def sequential(self) -> bool:
+        """Whether what it makes depends on the gaps before; if not, gaps may come in any order."""
 
     def begin(self) -> Self:
         """The same for a new sequence, which knows of no gap before."""

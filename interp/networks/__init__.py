@@ -37,7 +37,7 @@ NETWORKS = {
     "rrin_events_light": Entry(
         "rrin_events",
         "RrinEvents",
-        {"coarse": True, "candidate": "mixed", "gate": True, "depths": (5, 4, 4, 4)},
+        {"coarse": True, "candidate": "mixed", "events_into_residue": True, "gate": True, "depths": (5, 4, 4, 4)},
     ),
     "rrin_slomo_events": Entry("rrin_slomo_events", "RrinSlomoEvents"),
     "timelens": Entry("timelens", "TimeLens"),

@@ -12,7 +12,8 @@ The defaults are the paper's network; the depths of its UNets are inferred from 
 that learn on two cores in minutes; the register has them as `rrin_events_light`:
 
     coarse       U1 to U3 at half the resolution, U4 on squares of 2 x 2 pixels: a quarter of the cost
-    candidate    the bridge (`candidates/bridge.py`) as a third picture: from it on, not from nothing
+    candidate    what events and key frames give in closed form (`candidates/ramps.py`) as a third picture: from it
+                 on, not from nothing
     gate         no residue where nothing happens, so that what stands still stays untouched
 
 In a blend with warps the candidate wins before flows have learnt anything, and then they never do.  So it is either
@@ -40,11 +41,11 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.bridge import bridge
+from interp.candidates.ramps import Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
 from interp.networks.spec import FrameFedSpec
-from interp.representation.event_counts import EventCounts
+from interp.representation.event_counts import EventCounts, as_voxels
 from interp.warp import flows_at
 
 Depth = Annotated[int, Field(ge=2, le=7)]
@@ -74,8 +75,8 @@ class RrinEventsSpec(FrameFedSpec):
     )
     candidate: Literal["none", "input", "base", "mixed", "softmax"] = Field(
         default="none",
-        description="the bridge: none; input of U3 and U4; base that U4 corrects; mixed: base, of which U4 takes part"
-        " of the way to the blend; softmax: a third picture in the blend, too. 864 parameters and 0.864 kMAC/px in"
+        description="the closed form: none; input of U3 and U4; base that U4 corrects; mixed: base, of which U4 takes"
+        " part of the way to the blend; softmax: a third picture in the blend, too. 864 parameters and 0.864 kMAC/px in"
         " each, and two products with the events",
     )
     candidate_dropout: float = Field(
@@ -83,6 +84,11 @@ class RrinEventsSpec(FrameFedSpec):
     )
     chroma: Literal["keyframes", "warps"] = Field(
         default="keyframes", description="where the candidate has its colours from; free"
+    )
+    events_into_residue: bool = Field(
+        default=False,
+        description="into U4, with a candidate, what events say of each pixel before and after the target: 1,152"
+        " parameters and 1.152 kMAC/px, coarse 9,216 and 2.304",
     )
     gate: bool = Field(default=False, description="no residue where no event is near; costs one mean of counts")
     transfer: Transfer = Field(
@@ -106,16 +112,21 @@ class RrinEvents(FrameFed):
         self.refine = Unet(2 * colours + 4 + events, 4, layouts[1], zero)
         self.masks = Unet(masks_in, pictures, layouts[2], zero)
         corrections = colours + (spec.candidate == "mixed")
+        corrected = 3 * colours + candidate + 4 * self._residue_sees_events
         if spec.coarse:
             halved = rrin_layout(spec.depths[3] - 1, 2 * spec.base)
-            self.residue: nn.Module = HalfSized(3 * colours + candidate, corrections, halved, zero)
+            self.residue: nn.Module = HalfSized(corrected, corrections, halved, zero)
         else:
-            self.residue = Unet(3 * colours + candidate, corrections, layouts[3], zero)
+            self.residue = Unet(corrected, corrections, layouts[3], zero)
         self.multiple = self.scale.factor * 2 ** (max(spec.depths) - 1)
 
     @property
     def _blends_candidate(self) -> bool:
         return self.spec.candidate in ("input", "softmax")
+
+    @property
+    def _residue_sees_events(self) -> bool:
+        return self.spec.events_into_residue and self.spec.candidate != "none"
 
     def flows_of(self, pair: Pair) -> torch.Tensor:
         """Flows between the frames, in pixels of the resolution of U1 to U3."""
@@ -135,15 +146,17 @@ class RrinEvents(FrameFed):
         at = at + run(self.refine, [at, *frames, *events]) * self.spec.flow_scale
         flows = self.scale.flow_up(at)
         warps = warped(pair, flows)
-        candidate = self._candidate(pair, times, warps)
+        found = risen(pair.events, times) if self.spec.candidate != "none" else None
+        candidate = self._candidate(pair, times, warps, found)
         beside = events if self.spec.events_into_masks else []
         logits = self._visible([at, *frames], warps, beside, candidate)
         of_warps, weights = blend(warps, logits[:, :, :2], shares_at(times))
         draft = of_warps
         if self.spec.candidate == "softmax":
             draft, weights = self._blend_with_candidate(warps, candidate[0], logits, times)
-        found = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate])
-        image = self._start(draft, candidate) + pair.once[1][:, None] * self._correction(found, draft, candidate)
+        said = [_as_input(found)] if found and self._residue_sees_events else []
+        correction = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate, *said])
+        image = self._start(draft, candidate) + pair.once[1][:, None] * self._correction(correction, draft, candidate)
         return Interpolated(image, self.scale.flow_up(pair.flows), flows, warps, weights, of_warps)
 
     def _events(self, pair: Pair, times: torch.Tensor) -> list[torch.Tensor]:
@@ -152,14 +165,16 @@ class RrinEvents(FrameFed):
             return []
         return [EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins)]
 
-    def _candidate(self, pair: Pair, times: torch.Tensor, warps: torch.Tensor) -> list[torch.Tensor]:
-        """The bridge, in a list that is empty if none is asked for."""
-        if self.spec.candidate == "none":
+    def _candidate(
+        self, pair: Pair, times: torch.Tensor, warps: torch.Tensor, found: Risen | None
+    ) -> list[torch.Tensor]:
+        """The closed form, in a list that is empty if none is asked for."""
+        if found is None:
             return []
         around = None
         if self.spec.chroma == "warps":
             around = warps[:, :, 0] + times[..., None, None, None] * (warps[:, :, 1] - warps[:, :, 0])
-        return [bridge(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around=around)]
+        return [ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around, found)]
 
     def _visible(
         self, seen: list[torch.Tensor], warps: torch.Tensor, events: list[torch.Tensor], candidate: list[torch.Tensor]
@@ -195,3 +210,9 @@ class RrinEvents(FrameFed):
         number = pair.events.off_on.float().sum((1, 2)).unsqueeze(1)
         near = F.avg_pool2d(number, GATE_REACH_PX, stride=1, padding=GATE_REACH_PX // 2)
         return 1 - torch.exp(-GATE_STEEPNESS * near)
+
+
+def _as_input(found: Risen) -> torch.Tensor:
+    """[B, N, 4, H, W]: change and number of events before and after the target, all about 0 ... 1 where little is."""
+    numbers = torch.cat([found.number, found.more], 2)
+    return torch.cat([as_voxels(found.change), as_voxels(found.left), torch.log1p(numbers) / 2], 2)

@@ -36,7 +36,12 @@ class Recipe(BaseModel):
     cut_every: int = Field(
         8, ge=0, description="windows of events that gradients of recurrent networks go back through; 0 for all"
     )
-    threads: int = Field(2, ge=1, description="threads of a process that trains on a CPU; decides its last bits")
+    processes: int = Field(
+        2,
+        ge=1,
+        description="processes that train without a GPU, unless --devices says otherwise; decides the last bits",
+    )
+    threads: int = Field(1, ge=1, description="threads of a process that trains without a GPU; decides the last bits")
     save_s: float = Field(60.0, gt=0, description="time between checkpoints [s]")
 
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 from pairs import FRAME_FED, counts, frames
 
-from interp.candidates.bridge import bridge
+from interp.candidates.ramps import ramps
 from interp.networks import make
 from interp.networks.event_input import first_last_and_target
 from interp.networks.frame_fed import FrameFed
@@ -75,12 +75,12 @@ def test_a_fresh_network_is_a_cross_fade_at_any_size(name: str) -> None:
     torch.testing.assert_close(images, expected, rtol=0, atol=1e-6)
 
 
-def test_a_fresh_light_network_is_the_bridge() -> None:
+def test_a_fresh_light_network_is_its_candidate() -> None:
     first, second = frames(2, (19, 35))
     some = counts(2, (19, 35))
     with torch.no_grad():
         images = make("rrin_events_light")(first, second, TIMES, some).images
-    torch.testing.assert_close(images, bridge(first, second, some, torch.tensor([TIMES] * 2)), rtol=0, atol=1e-6)
+    torch.testing.assert_close(images, ramps(first, second, some, torch.tensor([TIMES] * 2)), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", FRAME_FED)

@@ -10,7 +10,7 @@ import torch
 from overfit_clip import affine_psnr_db, made_clip, psnr_db
 from pairs import FRAME_FED
 
-from interp.candidates.bridge import bridge
+from interp.candidates.ramps import ramps
 from interp.losses import objectives
 from interp.losses.perceptual import Perceptual
 from interp.losses.terms import charbonnier
@@ -55,10 +55,10 @@ def test_networks_of_frames_learn_a_clip_by_heart(name: str) -> None:
 
 
 def goal_db(name: str) -> float:
-    """What is asked of all; of a network that starts at the bridge, to be better than that."""
+    """What is asked of all; of a network that starts at the ramps, to be better than that."""
     if name != "rrin_events_light":
         return ENOUGH_DB
-    closed = bridge(*CLIP.pair(), CLIP.counts(), CLIP.times()[None])
+    closed = ramps(*CLIP.pair(), CLIP.counts(), CLIP.times()[None])
     return max(ENOUGH_DB, psnr_db(closed, CLIP.truth()) + 1)
 
 

@@ -18,7 +18,7 @@ from interp.train.batches import Feed
 from interp.train.job import UNTRAINABLE
 from vid2ev.commands import Commands
 
-FEW = ["--steps", "3", "--set", "batch=2", "--set", "threads=1", "--set", "validations=1", "--workers", "0", "--cpu"]
+FEW = ["--steps", "3", "--set", "batch=2", "--set", "processes=1", "--set", "validations=1", "--workers", "0", "--cpu"]
 
 
 @pytest.fixture(autouse=True)

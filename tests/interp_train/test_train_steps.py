@@ -67,7 +67,16 @@ def test_a_torn_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
 
 def test_a_run_keeps_all_that_it_has_to_show(tmp_path: Path) -> None:
     done = session(tmp_path / "run")
-    assert set(done.scores["scenes"]) == {"network", "nearest", "linear", "flow", "integration", "both", "bridge"}
+    assert set(done.scores["scenes"]) == {
+        "network",
+        "nearest",
+        "linear",
+        "flow",
+        "integration",
+        "both",
+        "bridge",
+        "ramps",
+    }
     run = json.loads((tmp_path / "run" / "run.json").read_text())
     assert {"torch", "lightning", "vid2ev"} <= run["versions"].keys()
     assert [row["step"] for row in read_curve(tmp_path / "run" / "validation.csv")] == ["0", "6", f"{STEPS_OF_RUN}"]

@@ -1,0 +1,129 @@
+"""Ramps: light integrated from both key frames, which goes to the level of an event instead of jumping there.
+
+A sensor sends an event where light has reached a level, so between two events it was on its way, and before the first
+one it was, at a random phase of the levels, half a threshold away on average.  So of event k, of c_k nats at time t_k,
+
+    E(t) = sum over t_k <= t of v_k c_k  +  f^2 v_n c_n        f = (t - t_p) / (t_n - t_p)
+    N(t) = sum over t_k <= t of v_k      +  f^2 v_n            v = 1/2 for the first event of a pixel, 1 for the others
+
+with p the last event until t (t_p = 0 where there is none) and n the next one.  The drift is spread as in the bridge:
+
+    L = L0 + E(t) + w (L1 - L0 - E(1))        w = (N(t) + 2 t) / (N(1) + 2)        L = ln(Y + 0.001)
+
+So it goes through the key frames, and without events it is the bridge.  A lone event of noise, of which the key frames
+know nothing, is a hump of half its height on either side of it.
+
+Measured on 16 clips of scenes and 16 of real videos (x8), PSNR over that of the bridge: clean sensor +0.5 and +1.2 dB,
+noisy sensor +0.8 and +3.3 dB.  The exponent of f and the half were compared with 1, 3 and 0.3, 0.7 there: a tenth of a
+decibel for the one, and between 0.5 and 0.7 whichever there is more of, noise or motion, for the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, EVEN_EVENTS, coloured, ratios_of
+from interp.light import Transfer, luminance, to_codes, to_light
+from interp.precision import in_full_precision
+from interp.representation.event_counts import EventCounts
+
+FIRST = 0.5  # share of the first event of a pixel
+Steps = torch.Tensor  # [B, S, H, W]
+
+
+@dataclass(frozen=True, slots=True)
+class Risen:
+    """What the events of N windows from the first frame on say, [B, N, 1, H, W].
+
+    change   E(t) [nat]          number   N(t)
+    left     E(1) - E(t)         more     N(1) - N(t)
+    """
+
+    change: torch.Tensor
+    left: torch.Tensor
+    number: torch.Tensor
+    more: torch.Tensor
+
+    def drift(self, times: torch.Tensor) -> torch.Tensor:
+        """w, the share of the drift at times [B, N], 0 ... 1."""
+        t = times[..., None, None, None]
+        return (self.number + EVEN_EVENTS * t) / (self.number + self.more + EVEN_EVENTS)
+
+
+@in_full_precision
+def risen(events: EventCounts, times: torch.Tensor) -> Risen:
+    """E and N at times [B, N]; all events of a sub-interval are taken to be in its middle."""
+    off, on = events.off_on.float().unbind(1)
+    off_nats, on_nats = events.contrast.float()[..., None, None, None].unbind(1)
+    number, change = on + off, on_nats * on - off_nats * off
+    each = change / number.clamp(min=1)  # what an event of the sub-interval stands for
+    share = _shares(number)
+    lost = (1 - share) * (number > 0)
+    number, change = number - lost, change - lost * each
+    seen = (times * events.steps + 0.5).floor().long().clamp(0, events.steps)  # sub-intervals whose middle is past
+    way, at = _on_the_way(number > 0, seen, times)
+    comes = torch.where(way > 0, way**2 * share.gather(1, at), 0)
+    changed = _until(change, seen) + comes * each.gather(1, at)
+    numbered = _until(number, seen) + comes
+    total, most = change.sum(1, keepdim=True), number.sum(1, keepdim=True)
+    return Risen(*(part[:, :, None] for part in (changed, total - changed, numbered, most - numbered)))
+
+
+@in_full_precision
+def ramps(
+    frame_0: torch.Tensor,
+    frame_1: torch.Tensor,
+    events: EventCounts,
+    times: torch.Tensor,
+    transfer: Transfer = "srgb",
+    around: torch.Tensor | None = None,
+    found: Risen | None = None,
+) -> torch.Tensor:
+    """Frames [B, N, C, H, W] at times [B, N], from codes [B, C, H, W] of the two frames around.
+
+    around   codes [B, N, C, H, W] to take the colours from; those of the two frames unless given
+    found    what `risen` gives for the times, if it is known already
+    """
+    found = risen(events, times) if found is None else found
+    lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
+    before, after = (torch.log(luminance(light).clamp(min=0) + DARK)[:, None] for light in lights)
+    drift = found.drift(times)
+    logs = before + found.change + drift * (after - before - found.change - found.left)
+    top = torch.maximum(before, after).amax((1, 2, 3, 4), keepdim=True).clamp(min=BRIGHTEST)
+    made = (torch.exp(torch.minimum(logs.clamp(min=DARKEST), top)) - DARK).clamp(min=0)
+    if around is None:
+        first, second = (ratios_of(light)[:, None] for light in lights)
+        ratios = first + drift * (second - first)
+    else:
+        ratios = ratios_of(to_light(around, transfer))
+    return to_codes(coloured(made, ratios), transfer)
+
+
+def _shares(number: Steps) -> Steps:
+    """v of the first event of each sub-interval."""
+    any_before = number.cumsum(1) > number
+    return torch.where(any_before, 1.0, FIRST)
+
+
+def _on_the_way(some: torch.Tensor, seen: torch.Tensor, times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """f [B, N, H, W], 0 where no event comes any more, and the sub-interval of the next event."""
+    steps = some.shape[1]
+    place = torch.arange(steps, device=some.device)[:, None, None].expand_as(some[0])[None]
+    last = torch.where(some, place, -1).cummax(1).values
+    coming = torch.where(some, place, steps).flip(1).cummin(1).values.flip(1)
+    last = torch.cat([torch.full_like(last[:, :1], -1), last], 1)  # by the number of sub-intervals seen
+    coming = torch.cat([coming, torch.full_like(coming[:, :1], steps)], 1)
+    index = seen[..., None, None].expand(-1, -1, *some.shape[2:])
+    p, n = last.gather(1, index), coming.gather(1, index)
+    since = torch.where(p < 0, 0, (p + 0.5) / steps)
+    until = (n + 0.5) / steps
+    way = ((times[..., None, None] - since) / (until - since)).clamp(0, 1)
+    return torch.where(n < steps, way, 0), n.clamp(max=steps - 1)
+
+
+def _until(values: Steps, seen: torch.Tensor) -> torch.Tensor:
+    """Sums [B, N, H, W] over the first sub-intervals."""
+    before = torch.arange(values.shape[1], device=values.device) < seen[..., None]
+    return (before.to(values) @ values.flatten(2)).unflatten(2, values.shape[2:])

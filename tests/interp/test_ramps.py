@@ -1,0 +1,105 @@
+"""Ramps: through both key frames, and by the slow way the same pixel by pixel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from interp.candidates.bridge import DARK, bridge
+from interp.candidates.ramps import ramps, risen
+from interp.light import luminance, to_codes, to_light
+from interp.representation.event_counts import EventCounts
+
+C = 0.2
+STEPS = 8
+
+
+def of_one_pixel(net: list[int]) -> EventCounts:
+    """Events of one pixel: ON where above 0, OFF where below."""
+    counts = torch.tensor(net)
+    off_on = torch.stack([(-counts).clamp(min=0), counts.clamp(min=0)])[None, :, :, None, None]
+    return EventCounts(off_on, torch.full((1, 2), C))
+
+
+def slowly(off_on: np.ndarray, contrast: tuple[float, float], t: float) -> tuple[float, float]:
+    """E(t) and N(t) of one pixel as the docstring has them; off_on [2, S]; events of a sub-interval share its middle
+    and what they stand for."""
+    steps = off_on.shape[1]
+    events = list[tuple[float, float]]()
+    for s in range(steps):
+        off, on = (int(each) for each in off_on[:, s])
+        each = (contrast[1] * on - contrast[0] * off) / max(on + off, 1)
+        events += [((s + 0.5) / steps, each)] * (on + off)
+    change = number = last = 0.0
+    for k, (at, nats) in enumerate(events):
+        v = 0.5 if k == 0 else 1.0
+        if at <= t:
+            change, number, last = change + v * nats, number + v, at
+            continue
+        way = (t - last) / (at - last)
+        return change + way**2 * v * nats, number + way**2 * v
+    return change, number
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.floats(0, 1))
+def test_it_is_the_law_pixel_by_pixel(seed: int, steps: int, t: float) -> None:
+    draw = np.random.default_rng(seed)
+    off_on = draw.poisson(draw.uniform(0.05, 1), (1, 2, steps, 3, 4))
+    contrast = draw.uniform(0.1, 0.4, 2)
+    t = round(t * steps * 4) / (steps * 4)  # (what is exactly in the middle is on the same side both ways)
+    found = risen(EventCounts(torch.from_numpy(off_on), torch.tensor(contrast[None])), torch.tensor([[t]]))
+    for y, x in np.ndindex(3, 4):
+        change, number = slowly(off_on[0, :, :, y, x], (contrast[0], contrast[1]), t)
+        assert math.isclose(float(found.change[0, 0, 0, y, x]), change, abs_tol=1e-5)
+        assert math.isclose(float(found.number[0, 0, 0, y, x]), number, abs_tol=1e-5)
+        total, most = slowly(off_on[0, :, :, y, x], (contrast[0], contrast[1]), 1.0)
+        assert math.isclose(float(found.change[0, 0, 0, y, x] + found.left[0, 0, 0, y, x]), total, abs_tol=1e-5)
+        assert math.isclose(float(found.number[0, 0, 0, y, x] + found.more[0, 0, 0, y, x]), most, abs_tol=1e-5)
+
+
+def test_it_goes_through_both_key_frames() -> None:
+    first, second = 0.05 + 0.9 * torch.rand(2, 2, 3, 6, 7)
+    events = EventCounts(torch.randint(0, 3, (2, 2, STEPS, 6, 7)), torch.full((2, 2), C))
+    made = ramps(first, second, events, torch.tensor([[0.0, 1.0], [0.0, 1.0]]))
+    torch.testing.assert_close(made, torch.stack([first, second], 1), atol=1e-4, rtol=0)
+
+
+def test_without_events_it_is_the_bridge() -> None:
+    first, second = torch.rand(2, 1, 3, 6, 7)
+    times = torch.tensor([[0.1, 0.5, 0.9]])
+    nothing = EventCounts.none(1, (6, 7), STEPS)
+    torch.testing.assert_close(ramps(first, second, nothing, times), bridge(first, second, nothing, times))
+
+
+def test_a_lone_event_of_noise_is_a_hump_of_half_its_height() -> None:
+    key = torch.full((1, 1, 1, 1), 0.5)
+    times = torch.tensor([[0.5 / STEPS, 3.499 / STEPS, 3.501 / STEPS]])
+    made = ramps(key, key, of_one_pixel([0, 0, 0, 1, 0, 0, 0, 0]), times)
+    logs = torch.log(luminance(to_light(made, "srgb")) + DARK).flatten() - math.log(float(to_light(key, "srgb")) + DARK)
+    # w before and after the event: of 0.5 events and 2 more that are spread evenly
+    weight = [(n + 2 * float(t)) / 2.5 for n, t in zip((0.5 * (0.5 / 3.5) ** 2, 0.5, 0.5), times[0], strict=True)]
+    expected = [C * (n - 0.5 * w) for n, w in zip((0.5 * (0.5 / 3.5) ** 2, 0.5, 0.5), weight, strict=True)]
+    torch.testing.assert_close(logs, torch.tensor(expected), atol=1e-3, rtol=0)
+    assert float(logs.abs().max()) < 0.5 * C
+
+
+def test_light_that_rises_steadily_is_nearer_than_by_stairs() -> None:
+    steps, rise = 64, 3.3 * C
+    errors = {"ramps": 0.0, "bridge": 0.0}
+    times = torch.linspace(0.02, 0.98, 25)[None]
+    for phase in (0.1, 0.3, 0.5, 0.7, 0.9):
+        crossings = [(k + phase) * C / rise for k in range(4) if (k + phase) * C < rise]
+        net = np.bincount([int(t * steps) for t in crossings], minlength=steps).tolist()
+        dark = torch.tensor(0.1)
+        light = torch.exp(torch.log(dark + DARK) + rise * torch.tensor([0.0, 1.0])) - DARK
+        first, second = (to_codes(each.reshape(1, 1, 1, 1), "srgb") for each in light)
+        for name, method in (("ramps", ramps), ("bridge", bridge)):
+            made = luminance(to_light(method(first, second, of_one_pixel(net), times), "srgb"))  # type: ignore[operator]
+            off = torch.log(made.flatten() + DARK) - torch.log(dark + DARK) - rise * times[0]
+            errors[name] += float(off.square().sum())
+    assert errors["ramps"] < 0.7 * errors["bridge"]  # (0.62: straight lines, which parabolas are not)
