@@ -23,8 +23,9 @@ WORD = "auto"
 
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
 @click.option(
-    "--network", default="rrin-events-light", show_default=True, metavar="NAME",
-    help="superslomo, slomo-events, rrin, rrin-events, rrin-events-light, rrin-slomo-events, timelens, e2vid, firenet,"
+    "--network", default="rrin-events-guided", show_default=True, metavar="NAME",
+    help="superslomo, slomo-events, rrin, rrin-events, rrin-events-light, rrin-events-guided,"
+    " rrin-slomo-events, timelens, e2vid, firenet,"
     " hdr.",
 )  # fmt: skip
 @click.option("--size", type=click.Choice(["tiny", "small", "paper"]), default="tiny", show_default=True, help="Width.")

@@ -3,7 +3,8 @@
     Super SloMo, SloMoEvents   204 L1 + 102 warps + 0.005 features + smoothness of flows
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
     Time Lens                  L1 + 0.1 features
-    rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
+    rrin_events_light, rrin_events_guided     Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades
+                               + 0.1 pyramid
     E2VID, FireNet             L1 + features from the second image on; FireNet + 2 inconsistency
     HDR                        100 inconsistency, from image to image and to the first + 10 features + 100 L1
 

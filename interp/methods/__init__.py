@@ -13,6 +13,7 @@ line in `METHODS`.
     both          events integrated from both, with weights 1 - t and t: the complementary filter
     bridge        the same with the drift spread in proportion to events: the closed form to beat
     ramps         the bridge with light on its way between events, instead of in stairs
+    guided        the key frames carried to where the light of the ramps is, half and half with these in their colours
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pathlib import Path
 
 import torch
 
-from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events, of_ramps
+from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events, of_guided, of_ramps
 from interp.methods.flow import flow
 from interp.methods.gap import Gap, Method
 from interp.methods.of_networks import of_weights
@@ -39,6 +40,7 @@ METHODS: dict[str, Callable[[], Method]] = {
     "both": lambda: ClosedForm("both", of_events("both")),
     "bridge": lambda: ClosedForm("bridge", of_events("bridge")),
     "ramps": lambda: ClosedForm("ramps", of_ramps),
+    "guided": lambda: ClosedForm("guided", of_guided),
 }
 
 

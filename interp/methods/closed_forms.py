@@ -10,6 +10,7 @@ import torch
 
 from interp.candidates.bridge import Method as Way
 from interp.candidates.bridge import bridge
+from interp.candidates.guided import guided, recoloured
 from interp.candidates.ramps import ramps
 from interp.methods.gap import Gap
 from interp.representation.carried import over
@@ -53,6 +54,14 @@ def of_ramps(gap: Gap, times: torch.Tensor) -> torch.Tensor:
     assert gap.events is not None
     height, width = gap.frame_0.shape[-2:]
     return ramps(gap.frame_0[None], gap.frame_1[None], over(gap.events, (height, width)), times[None])[0]
+
+
+def of_guided(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    """Halfway between integration in the colours of carried frames and these frames (`candidates.guided`)."""
+    pictures = of_ramps(gap, times)[None]
+    frames = gap.frame_0[None], gap.frame_1[None]
+    carried = guided(*frames, pictures).blend(times[None])
+    return ((recoloured(pictures, carried) + carried) / 2)[0]
 
 
 def of_events(way: Way) -> Law:

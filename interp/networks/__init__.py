@@ -39,6 +39,7 @@ NETWORKS = {
         "RrinEvents",
         {"coarse": True, "candidate": "mixed", "events_into_residue": True, "gate": True, "depths": (5, 4, 4, 4)},
     ),
+    "rrin_events_guided": Entry("rrin_events_guided", "RrinEventsGuided"),
     "rrin_slomo_events": Entry("rrin_slomo_events", "RrinSlomoEvents"),
     "timelens": Entry("timelens", "TimeLens"),
     "flow": Entry("flow", "FlowNetwork"),

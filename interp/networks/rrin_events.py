@@ -44,13 +44,12 @@ from interp.blocks.unet import HalfSized, Unet, rrin_layout
 from interp.candidates.ramps import Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
+from interp.networks.gate import gate_of
 from interp.networks.spec import FrameFedSpec
 from interp.representation.event_counts import EventCounts, as_voxels
 from interp.warp import flows_at
 
 Depth = Annotated[int, Field(ge=2, le=7)]
-GATE_REACH_PX = 5  # events so far apart open the gate between them
-GATE_STEEPNESS = 4.0
 
 
 class RrinEventsSpec(FrameFedSpec):
@@ -204,12 +203,7 @@ class RrinEvents(FrameFed):
         return found[:, :, :-1] + share * (draft - candidate[0])
 
     def _gate(self, pair: Pair) -> torch.Tensor:
-        """How much residue is let through, [B, 1, H, W]: none where no event is near; all without events or a gate."""
-        if not (self.spec.gate and pair.seen):
-            return torch.ones_like(pair.frame_0[:, :1])
-        number = pair.events.off_on.float().sum((1, 2)).unsqueeze(1)
-        near = F.avg_pool2d(number, GATE_REACH_PX, stride=1, padding=GATE_REACH_PX // 2)
-        return 1 - torch.exp(-GATE_STEEPNESS * near)
+        return gate_of(pair) if self.spec.gate else torch.ones_like(pair.frame_0[:, :1])
 
 
 def _as_input(found: Risen) -> torch.Tensor:

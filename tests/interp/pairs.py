@@ -8,7 +8,16 @@ import torch
 from interp.representation.event_counts import EventCounts
 from vid2ev import Events
 
-FRAME_FED = ("superslomo", "slomo_events", "rrin", "rrin_events", "rrin_events_light", "rrin_slomo_events", "timelens")
+FRAME_FED = (
+    "superslomo",
+    "slomo_events",
+    "rrin",
+    "rrin_events",
+    "rrin_events_light",
+    "rrin_events_guided",
+    "rrin_slomo_events",
+    "timelens",
+)
 
 
 def frames(batch: int = 1, size: tuple[int, int] = (32, 32), colours: int = 3) -> tuple[torch.Tensor, torch.Tensor]:

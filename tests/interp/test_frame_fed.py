@@ -14,6 +14,7 @@ from interp.representation.event_counts import EventCounts
 from vid2ev import UsageError
 
 TIMES = [0.25, 0.5, 0.9]
+FROM_CANDIDATES = ("rrin_events_light", "rrin_events_guided")
 
 
 def shaken(network: FrameFed, scale: float = 0.02) -> FrameFed:
@@ -64,7 +65,7 @@ def test_frames_go_on_as_their_border_and_events_end() -> None:
     assert float(pair.events.off_on.sum()) == 2 * 3 * 5 * 20
 
 
-@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in ("timelens", "rrin_events_light")])
+@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in (*FROM_CANDIDATES, "timelens")])
 def test_a_fresh_network_is_a_cross_fade_at_any_size(name: str) -> None:
     # so nothing is resampled, shifted or mixed with what was put around
     first, second = frames(2, (19, 35))
@@ -99,7 +100,7 @@ def test_targets_may_come_in_any_number_and_order(name: str) -> None:
     torch.testing.assert_close(own.images[1].flip(0), together.images[1], rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("name", [name for name in FRAME_FED if name != "timelens"])
+@pytest.mark.parametrize("name", [name for name in FRAME_FED if name not in ("timelens", "rrin_events_guided")])
 def test_the_first_flow_network_runs_once_per_pair(name: str) -> None:
     made = network(name)
     runs = []

@@ -67,7 +67,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--time", "0"], "error: --time 0: expected a time above 0; give it as 90s, 55m or 2h"),
         (["--session", "soon"], "error: --session soon: expected a time above 0"),
         (["--set", "rate"], "error: Setting 'rate' is not of the form key=value"),
-        (["--resume"], "error: rrin_events_light_tiny holds no run to go on with"),
+        (["--resume"], "error: rrin_events_guided_tiny holds no run to go on with"),
         (["--devices", "0"], "0 is less than 1"),
         (["--size", "huge"], "'huge' is not one of"),
         (["--data", "nowhere"], "Path 'nowhere' does not exist"),
