@@ -13,9 +13,10 @@ from moving_texture import texture
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from vid2ev.compare.comparison import compare
+from vid2ev.compare.pictures import HIGHEST_DB
 from vid2ev.cost.errors import Reference
 from vid2ev.cost.passes import Sent, repeated
-from vid2ev.cost.quality import BEST_DB, interpolated, quality, triples_of
+from vid2ev.cost.quality import interpolated, quality, triples_of
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.sources import open_source
 from vid2ev.sources.edit import Edit
@@ -108,7 +109,7 @@ def test_quality_is_that_of_scikit_image() -> None:
     options: dict[str, Any] = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
     ssim = np.mean([structural_similarity(a, b, data_range=255, **options) for a, b in zip(true, made, strict=True)])
     assert found == pytest.approx((psnr, ssim), rel=1e-12)
-    assert quality([(true[0], true[0])]) == (BEST_DB, 1.0)
+    assert quality([(true[0], true[0])]) == (HIGHEST_DB, 1.0)
     assert quality([]) is None and quality([(true[0][:5], true[0][:5])]) is None
 
 

@@ -1,24 +1,20 @@
 """How good pictures are against true ones: PSNR and SSIM.
 
-    PSNR = 10 log10(255^2 / MSE), of each picture, in 8 bits of sRGB; then the mean over the pictures
-    SSIM = mean over the picture of the index of Wang et al., Gaussian window of sigma 1.5
+Both are those of `vid2ev.compare.pictures`, of each picture, in 8 bits of sRGB; then the mean over the pictures.
 
 Views are compared with those of the reference.  Light between the frames is compared with frames that are left out: of
 three frames in a row the middle one is made from the other two, which are twice as far apart as they are for a
 recording, so the numbers are those of a harder task.
-
-Source: Z. Wang, A. Bovik, H. Sheikh, E. Simoncelli (2004), "Image quality assessment: from error visibility to
-structural similarity", IEEE Trans. Image Processing 13(4).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from vid2ev.compare.pictures import psnr, squared_error, ssim
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.sources import Source
 from vid2ev.stream.frames import Frame
@@ -26,7 +22,6 @@ from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
 TRIPLES = 12  # of frames, spread over the clip
-BEST_DB = 100.0  # of pictures that are the same
 SMALLEST = 11  # px: the window of SSIM
 
 
@@ -39,16 +34,9 @@ class Quality(NamedTuple):
 
 def quality(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Quality | None:
     """Of pictures [H, W, uint8] against true ones; None of none, or of pictures smaller than the window."""
-    from skimage.metrics import structural_similarity
-
-    each = []
-    for made, true in pairs:
-        if min(true.shape[:2]) < SMALLEST:
-            continue
-        mean = float(np.mean(np.square(made.astype(np.float64) - true)))
-        psnr_db = BEST_DB if mean == 0 else min(BEST_DB, 10 * math.log10(255**2 / mean))
-        window: dict[str, Any] = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-        each.append((psnr_db, float(structural_similarity(made, true, data_range=255, **window))))
+    each = [
+        (psnr(squared_error(made, true)), ssim(made, true)) for made, true in pairs if min(true.shape[:2]) >= SMALLEST
+    ]
     return Quality(*(float(mean) for mean in np.mean(each, axis=0))) if each else None
 
 

@@ -1,0 +1,132 @@
+"""How alike two pictures are: PSNR and SSIM, of whole pictures, and of the worst of all windows in them.
+
+    PSNR = 10 lg(peak^2 / MSE)                                                                  at most 100 dB
+    SSIM = (2 m_x m_y + C1) (2 s_xy + C2) / ((m_x^2 + m_y^2 + C1) (s_x^2 + s_y^2 + C2))         C = (0.01 peak)^2,
+                                                                                                    (0.03 peak)^2
+m, s^2 and s_xy are means, variances and covariance under a Gaussian window of sigma 1.5 px, 11 x 11, where it lies
+within the picture.  `peak` is 255, or the range of the true picture, as the Time Lens protocol has it; with `sample`,
+variances and covariances are larger by 121 / 120, as that of a sample is.
+
+Everything is float64: pictures are whole numbers, of which differences, squares and sums over windows are exact then.
+Both are those of scikit-image (`structural_similarity` with gaussian_weights, and use_sample_covariance=sample).
+
+Source of SSIM: Z. Wang, A. Bovik, H. Sheikh, E. Simoncelli (2004), "Image quality assessment: from error visibility to
+structural similarity", IEEE Trans. Image Processing 13(4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+PEAK = 255.0
+HIGHEST_DB = 100.0  # of pictures without an error
+SIGMA_PX, RADIUS_PX = 1.5, 5  # 3.5 sigma, as scikit-image cuts it
+WINDOW_PX = 99  # of the worst window
+
+
+class Worst(NamedTuple):
+    """The worst window: the mean in it, and its left and top [px]."""
+
+    value: float
+    x: int
+    y: int
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """What SSIM is made of: m_x m_y, m_x^2 + m_y^2, s_xy and s_x^2 + s_y^2, each [H - 10, W - 10] or with channels."""
+
+    product: np.ndarray
+    squares: np.ndarray
+    covariance: np.ndarray
+    variances: np.ndarray
+
+    def ssim_map(self, peak: float = PEAK, sample: bool = False) -> np.ndarray:
+        """SSIM around each pixel, mean over channels, [H - 10, W - 10]; NaN where there is no range."""
+        c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
+        taps = (2 * RADIUS_PX + 1) ** 2
+        scale = taps / (taps - 1) if sample else 1.0
+        if not peak > 0:
+            return np.full(self.product.shape[:2], np.nan)
+        found = (2 * self.product + c1) * (2 * scale * self.covariance + c2)
+        found /= (self.squares + c1) * (scale * self.variances + c2)
+        return found if found.ndim == 2 else found.mean(axis=2)
+
+
+def squared_error(made: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Squares of differences of codes, float64, of the shape of the pictures."""
+    difference = np.subtract(made, true, dtype=np.float64)
+    return np.square(difference, out=difference)
+
+
+def psnr(squared: np.ndarray, peak: float = PEAK) -> float:
+    """PSNR [dB] of squared errors; NaN of none, and against a range of 0."""
+    return psnr_of_mean(float(squared.mean()), peak) if squared.size else math.nan
+
+
+def psnr_of_mean(mean: float, peak: float = PEAK) -> float:
+    """PSNR [dB] of a mean squared error; NaN against a range of 0."""
+    if not peak > 0 or math.isnan(mean):
+        return math.nan
+    return min(10 * math.log10(peak**2 / mean), HIGHEST_DB) if mean else HIGHEST_DB
+
+
+def moments(made: np.ndarray, true: np.ndarray) -> Moments | None:
+    """The moments of pictures [H, W] or [H, W, C]; None of those smaller than the window."""
+    if min(true.shape[:2]) <= 2 * RADIUS_PX:
+        return None
+    x, y = made.astype(np.float64), true.astype(np.float64)
+    mean_x, mean_y = _blurred(x), _blurred(y)
+    product, squares = mean_x * mean_y, mean_x * mean_x + mean_y * mean_y
+    # (a sum of variances may come out below 0, by rounding)
+    variances = np.maximum(_blurred(x * x + y * y) - squares, 0)
+    return Moments(product, squares, _blurred(x * y) - product, variances)
+
+
+def ssim(made: np.ndarray, true: np.ndarray, peak: float = PEAK, sample: bool = False) -> float:
+    """SSIM of pictures of codes [H, W] or [H, W, C], mean over channels; NaN of those smaller than the window."""
+    found = moments(made, true)
+    return math.nan if found is None else float(found.ssim_map(peak, sample).mean())
+
+
+def windows(plane: np.ndarray, side: int = WINDOW_PX) -> np.ndarray:
+    """Means of a plane [H, W] in all windows of side x side pixels, [H - side + 1, W - side + 1], at a stride of 1.
+
+    A window is no larger than the plane.  Sums of whole numbers are exact.
+    """
+    down, across = (min(side, length) for length in plane.shape)
+    sums = cv2.integral(np.ascontiguousarray(plane, np.float64), sdepth=cv2.CV_64F)
+    inside = sums[down:, across:] - sums[:-down, across:] - sums[down:, :-across] + sums[:-down, :-across]
+    return inside / (down * across)
+
+
+def highest(plane: np.ndarray, side: int = WINDOW_PX) -> Worst:
+    """The window in which the mean of a plane [H, W], such as the squared error, is highest; the first of several."""
+    means = windows(plane, side)
+    y, x = np.unravel_index(int(np.argmax(means)), means.shape)
+    return Worst(float(means[y, x]), int(x), int(y))
+
+
+def lowest(plane: np.ndarray, side: int = WINDOW_PX) -> Worst:
+    """The window in which the mean of a plane [H, W], such as SSIM, is lowest; the first of several."""
+    found = highest(-plane, side)
+    return found._replace(value=-found.value)
+
+
+def _blurred(plane: np.ndarray) -> np.ndarray:
+    """Means under the window, where it lies within the picture."""
+    blurred = cv2.sepFilter2D(plane, cv2.CV_64F, _WINDOW, _WINDOW, borderType=cv2.BORDER_REPLICATE)
+    return blurred[RADIUS_PX:-RADIUS_PX, RADIUS_PX:-RADIUS_PX]
+
+
+def _window() -> np.ndarray:
+    falling = np.exp(-0.5 * (np.arange(-RADIUS_PX, RADIUS_PX + 1) / SIGMA_PX) ** 2)
+    return falling / falling.sum()
+
+
+_WINDOW = _window()
