@@ -12,8 +12,9 @@ standard deviation would take away, and there is nothing to divide by where ther
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,10 +136,20 @@ def count_events(
     if len(x) and (min(x.min(), y.min()) < 0 or x.max() >= width or y.max() >= height):
         raise UsageError(f"events outside of the {width}x{height} sensor; give the size of the sensor that sent them")
     step = ((t[kept] - start_us) * steps - 1) // max(stop_us - start_us, 1)
-    flat = ((np.minimum(p, 1) * steps + step) * height + y) * width + x
-    counts = np.bincount(flat, minlength=2 * steps * height * width).reshape(1, 2, steps, height, width)
-    kind = np.uint8 if counts.max(initial=0) < 256 else np.int32
-    return EventCounts(torch.from_numpy(counts.astype(kind)), torch.tensor([contrast], dtype=torch.float32))
+    place, counts = (np.minimum(p, 1) * height + y) * width + x, np.zeros((2, steps, height, width), np.uint8)
+    for k, chosen in enumerate(_parts(step, steps)):
+        part = np.bincount(place[chosen], minlength=2 * height * width).reshape(2, height, width)
+        if counts.dtype == np.uint8 and part.max(initial=0) > 255:
+            counts = counts.astype(np.int32)
+        counts[:, k] = part
+    return EventCounts(torch.from_numpy(counts)[None], torch.tensor([contrast], dtype=torch.float32))
+
+
+def _parts(step: np.ndarray, steps: int) -> Iterator[np.ndarray]:
+    """The places of the events of each sub-interval."""
+    order = np.argsort(step, kind="stable")
+    edges = np.searchsorted(step[order], np.arange(steps + 1))
+    yield from (order[start:stop] for start, stop in pairwise(edges))
 
 
 def as_voxels(nats: torch.Tensor) -> torch.Tensor:

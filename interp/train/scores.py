@@ -16,9 +16,7 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 import torch
 
-from vid2ev.compare.pictures import PEAK, psnr, squared_error, ssim
-
-MOVED = 10.0  # codes
+from vid2ev.compare.pictures import PEAK, moving, psnr, squared_error, ssim
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +54,6 @@ def rounded(images: torch.Tensor) -> np.ndarray:
     """Images [N, C, H, W] as codes of 8 bits, uint8 [N, H, W, C]."""
     codes = (images.double().clamp(0, 1) * PEAK).round().to(torch.uint8)
     return codes.movedim(1, -1).contiguous().cpu().numpy()
-
-
-def moving(true: np.ndarray, keys: np.ndarray) -> np.ndarray:
-    """Which pixels [H, W] of a true picture [H, W, C] move, with key frames [2, H, W, C] around it; uint8."""
-    away = np.abs(true.astype(np.int16) - keys.astype(np.int16))
-    return np.asarray((away > MOVED).any(axis=(0, 3)))
 
 
 def _mean(values: list[float]) -> float:

@@ -27,6 +27,7 @@ PEAK = 255.0
 HIGHEST_DB = 100.0  # of pictures without an error
 SIGMA_PX, RADIUS_PX = 1.5, 5  # 3.5 sigma, as scikit-image cuts it
 WINDOW_PX = 99  # of the worst window
+MOVED = 10  # codes
 
 
 class Worst(NamedTuple):
@@ -62,6 +63,13 @@ def squared_error(made: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Squares of differences of codes, float64, of the shape of the pictures."""
     difference = np.subtract(made, true, dtype=np.float64)
     return np.square(difference, out=difference)
+
+
+def moving(true: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Which pixels [H, W] of a picture move: those more than 10 codes away from any of the key frames around it, in any
+    channel; uint8 [H, W, C] and [N, H, W, C]."""
+    away = np.maximum(true, keys) - np.minimum(true, keys)  # (as small numbers: no sign, and none is needed)
+    return np.asarray((away > MOVED).any(axis=(0, 3)))
 
 
 def psnr(squared: np.ndarray, peak: float = PEAK) -> float:

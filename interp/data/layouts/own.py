@@ -24,6 +24,8 @@ ROUNDED_US = 2  # that two instants which are the same may be apart in files
 class Own:
     """The recording in a folder.
 
+    keys_folder     the pictures of the slow frame camera
+    events_folder   what the event camera wrote
     Raises DataError for a recording that has no events or no frames in 8 bits.
     """
 
@@ -36,8 +38,12 @@ class Own:
             raise DataError(
                 f"{folder}: a recording without events or frames in 8 bits; expected --cis-out png with --frames"
             )
-        self._keys, self._frames, self._events = frames[0]["folder"], frames[-1]["folder"], events[0]["folder"]
-        self.times_us, key_times = (_times_us(each) for each in (self._frames, self._keys))
+        self.keys_folder, self._frames, self.events_folder = (
+            frames[0]["folder"],
+            frames[-1]["folder"],
+            events[0]["folder"],
+        )
+        self.times_us, key_times = (_times_us(each) for each in (self._frames, self.keys_folder))
         self._key_of = {
             int(k): number
             for number, t in enumerate(key_times)
@@ -69,11 +75,11 @@ class Own:
 
     def key(self, k: int) -> np.ndarray:
         """The frame of the slow camera at that instant, if there is one."""
-        return _rgb(self._keys, self._key_of[k]) if k in self._key_of else self.frame(k)
+        return _rgb(self.keys_folder, self._key_of[k]) if k in self._key_of else self.frame(k)
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""
-        parts = list(read_events(self._events, start_us + 1, stop_us + 1))
+        parts = list(read_events(self.events_folder, start_us + 1, stop_us + 1))
         t, x, y, p = (np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in "txyp")
         return Placed(t.astype(np.int64), x.astype(np.float32), y.astype(np.float32), p.astype(np.uint8))
 

@@ -75,20 +75,20 @@ class Windows:
     unusable: dict[str, int]
 
 
-def windows(sequence: Sequence, multiple: int, every: int = 1) -> Windows:
-    """The windows of a sequence that begin with each `every`-th frame."""
+def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0) -> Windows:
+    """The windows of a sequence that begin with each `every`-th frame from frame `begin` on."""
     times = sequence.times_us
-    begin, end = sequence.covered_us
+    since, end = sequence.covered_us
     good, unusable = [], dict[str, int]()
-    for k in range(0, max(0, len(times) - multiple), every):
+    for k in range(begin, len(times) - multiple, every):
         part = times[k : k + multiple + 1]
         if (np.diff(part) <= 0).any():
             reason = "times of the frames do not increase"
         elif part[-1] > end:
             reason = "the events end before the last frame"
-        elif part[0] < begin:
+        elif part[0] < since:
             reason = "the events begin after the first frame"
-        elif any(since < part[-1] and until > part[0] for since, until in sequence.unknown_us):
+        elif any(from_us < part[-1] and until_us > part[0] for from_us, until_us in sequence.unknown_us):
             reason = "a file of events cannot be read"
         else:
             good.append(k)

@@ -1,0 +1,114 @@
+"""`vid2ev eval`: how good methods are that rebuild frames."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from vid2ev.commands.source_options import source_options
+
+GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {remaining} left{postfix}"
+
+
+@click.command("eval", short_help="Score what rebuilds frames, as the field does.")
+@click.argument("datasets", nargs=-1, required=True, metavar="DATASET...")
+@click.option(
+    "--network", "networks", multiple=True, metavar="WEIGHTS", type=click.Path(exists=True),
+    help="Score a network: its weights, or the folder of its run; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--baseline", "baselines", multiple=True, metavar="NAME",
+    help="Score a closed form; may be repeated.  [default: nearest, linear, flow, integration, both, bridge]",
+)  # fmt: skip
+@click.option(
+    "--predictions", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
+    help="Score pictures that others have made: DIR/SEQUENCE/*.png, or DIR/SEQUENCE/METHOD/*.png; may be repeated.",
+)  # fmt: skip
+@click.option("--skip", type=click.IntRange(1), default=7, show_default=True, help="Frames between two key frames.")
+@click.option(
+    "--insert", type=click.IntRange(1), metavar="N", help="Frames rebuilt between them.  [default: as many as skipped]"
+)
+@click.option(
+    "--times", type=click.Choice(["frames", "even"]), default="frames", show_default=True,
+    help="Rebuild frames at their own times, or evenly between key frames as the field's scripts do.",
+)  # fmt: skip
+@click.option(
+    "--rounding", type=click.Choice(["round", "truncate"]), default="round", show_default=True,
+    help="Of codes to 8 bits; the field's scripts truncate.",
+)  # fmt: skip
+@click.option(
+    "--sensor", default="clean", show_default=True, metavar="PRESET|FILE",
+    help="Event camera that looks at videos and scenes: clean is that of the paper without its low-pass; noisy a hard"
+    " one; others as for convert.",
+)  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor.")
+@source_options
+@click.option("--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Of the event camera.")
+@click.option("--limit", type=click.IntRange(1), metavar="N", help="Only the first N gaps of each sequence.")
+@click.option(
+    "-o", "--output", metavar="REPORT", help="Folder of rows, summary and pictures.  [default: DATASET_eval here]"
+)
+@click.option("--resume", is_flag=True, help="Go on where an interrupted run was; networks may be added.")
+@click.option("--device", default="cpu", show_default=True, metavar="DEVICE", help="Of networks: cpu or cuda.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def evaluate(
+    datasets: tuple[str, ...],
+    output: str | None,
+    skip: int,
+    insert: int | None,
+    times: Any,
+    rounding: Any,
+    sensor: str,
+    overrides: tuple[str, ...],
+    baselines: tuple[str, ...],
+    seed: int,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Score baselines, networks and predictions by the protocol of Time Lens: every 8th frame is a key frame, and those
+    between are rebuilt and compared.
+
+    DATASET is a folder of recordings (of vid2ev, HS-ERGB or BS-ERGB), a video of 240 frames a second or more, a folder
+    of such, or scene:NAME.  Of videos frames are dropped, and an event camera is simulated that saw them all.
+    """
+    from interp.evaluate.films import Simulated
+    from interp.evaluate.protocol import Protocol
+    from interp.evaluate.run import BASELINES
+    from interp.evaluate.run import evaluate as evaluated
+    from interp.evaluate.table import notes, table
+    from vid2ev.commands.progress import counting
+    from vid2ev.sources import OPTIONS
+
+    edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}
+    folder = Path(output or f"{_name(datasets[0])}_eval")
+    with counting(quiet or as_json, GROUPS) as report:
+        found = evaluated(
+            datasets,
+            folder,
+            baselines=baselines or BASELINES,
+            protocol=Protocol(skip, insert or skip, times, rounding),
+            simulated=Simulated.of(sensor, overrides, seed, **edits),
+            report=report,
+            **options,
+        )
+    if as_json:
+        click.echo(json.dumps(found.summary, indent=2))
+        return
+    if not quiet:
+        click.echo(table(found.summary))
+        click.echo(f"\n{folder}: {len(found.rows)} rows, {len(found.summary['sequences'])} sequences")
+    for note in notes(found.summary):
+        click.echo(f"note: {note}", err=True)
+
+
+def _name(dataset: str) -> str:
+    from interp.evaluate.identity import plain
+    from vid2ev.sources import SCENE_PREFIX
+
+    name = dataset.removeprefix(SCENE_PREFIX)
+    return plain(Path(name).stem if name == dataset else name)

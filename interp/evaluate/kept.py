@@ -1,0 +1,128 @@
+"""What is done of an evaluation, on disk, so that one that was interrupted goes on to the same bytes.
+
+    job.json                       what decides all numbers; only the same is continued
+    kept/SEQUENCE/METHOD.jsonl     a line for each group, when it is done: {"group": 3, "rows": [[...], ...]}
+    kept/SEQUENCE/about.json       what is known of the sequence; there when it is done
+
+A line is written at once and brought to the disk; half a line at the end, of a kill, is cut off.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, fields
+from pathlib import Path
+from typing import Any
+
+from interp.evaluate.row import Row
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import lock, whole_file, writing
+from vid2ev.recording.manifest import difference
+
+JOB = "job.json"
+KEPT = "kept"
+ABOUT = "about.json"
+
+
+class Kept:
+    """The folder of an evaluation, as a context: no other process writes it meanwhile.
+
+    job       what decides all numbers, ready for JSON
+    methods   what decides those of each method, by their names; others may be added later
+    Raises UsageError where the folder is taken, or was begun with something else, DataError where it cannot be written.
+    """
+
+    def __init__(self, folder: Path, job: Mapping[str, Any], methods: Mapping[str, Any], resume: bool):
+        self.folder = folder
+        wanted = json.loads(json.dumps({**job, "methods": methods}))
+        there = (folder / JOB).exists()
+        if folder.exists() and not there and any(folder.iterdir()):
+            raise UsageError(f"{folder} holds something else; choose another folder with -o")
+        if there and not resume:
+            raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")
+        before = read_job(folder) if there else wanted
+        known = before["methods"]
+        shared = {name: of for name, of in wanted["methods"].items() if name in known}
+        begun, asked = (before | {"methods": {name: known[name] for name in shared}}, wanted | {"methods": shared})
+        if changed := difference(begun, asked):
+            raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            self._handle = lock(folder)
+            with whole_file(folder / JOB) as file:
+                file.write(_line(wanted | {"methods": known | wanted["methods"]}))
+
+    def __enter__(self) -> Kept:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._handle)
+
+    def rows(self, sequence: str, method: str) -> dict[int, list[Row]]:
+        """The rows of each group that is done; what was written in part is cut off.  Raises DataError."""
+        path = self._path(sequence, method)
+        if not path.exists():
+            return {}
+        whole, _, rest = path.read_bytes().rpartition(b"\n")
+        if rest:
+            with writing(path):
+                os.truncate(path, len(whole) + bool(whole))
+        try:
+            lines = [json.loads(line) for line in whole.splitlines()]
+            return {line["group"]: [row_of(values) for values in line["rows"]] for line in lines}
+        except (ValueError, TypeError, KeyError) as error:
+            raise DataError(f"{path} cannot be read ({error}); remove it, and it is made again") from error
+
+    def add(self, sequence: str, method: str, group: int, rows: Sequence[Row]) -> None:
+        """The rows of a group are done."""
+        path = self._path(sequence, method)
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with open(path, "ab") as file:
+                file.write(_line({"group": group, "rows": [values_of(row) for row in rows]}))
+                file.flush()
+                os.fsync(file.fileno())
+
+    def about(self, sequence: str) -> dict[str, Any] | None:
+        """What is known of a sequence all groups of which are done for some methods; None before."""
+        path = self.folder / KEPT / sequence / ABOUT
+        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+
+    def finish(self, sequence: str, about: Mapping[str, Any]) -> None:
+        """A sequence is done; `about` says for which methods."""
+        with writing(self.folder):
+            (self.folder / KEPT / sequence).mkdir(parents=True, exist_ok=True)
+            with whole_file(self.folder / KEPT / sequence / ABOUT) as file:
+                file.write(_line(about))
+
+    def _path(self, sequence: str, method: str) -> Path:
+        return self.folder / KEPT / sequence / f"{method}.jsonl"
+
+
+def read_job(folder: Path) -> dict[str, Any]:
+    """The job of an evaluation.  Raises DataError."""
+    try:
+        return json.loads((folder / JOB).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DataError(f"{folder / JOB} cannot be read ({error}); remove {folder} and evaluate again") from error
+
+
+def values_of(row: Row) -> list[Any]:
+    """The values of a row, ready for JSON: None for NaN."""
+    return [None if isinstance(value, float) and math.isnan(value) else value for value in astuple(row)]
+
+
+def row_of(values: Sequence[Any]) -> Row:
+    """The row of `values_of`.  Raises TypeError for values of another length."""
+    names = [each.name for each in fields(Row)]
+    if len(values) != len(names):
+        raise TypeError(f"{len(values)} values, expected {len(names)}")
+    known: list[Any] = [math.nan if value is None else value for value in values]
+    return Row(**dict(zip(names, known, strict=True)))
+
+
+def _line(facts: Mapping[str, Any]) -> bytes:
+    return f"{json.dumps(facts, allow_nan=False)}\n".encode()

@@ -1,0 +1,90 @@
+"""What gives frames to be scored: methods of `interp.methods`, each by the protocol's times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+import numpy as np
+import torch
+
+from interp.data.tensors import as_tensor
+from interp.evaluate import protocol as protocols
+from interp.evaluate.group import Footage, Group
+from interp.evaluate.identity import apart, digest_of
+from interp.methods import METHODS, Gap, Method, open_method
+from interp.methods.of_networks import of_weights
+from vid2ev.errors import UsageError, nearest
+
+WEIGHTS = "weights.safetensors"  # of a run of training
+
+
+class Rebuilder(Protocol):
+    """What gives the frames of groups."""
+
+    @property
+    def name(self) -> str:
+        """For tables and files."""
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What tells it from another, ready for JSON."""
+
+    @property
+    def sequential(self) -> bool:
+        """Whether groups must come in their order, and none may be left out."""
+
+    def begin(self, footage: Footage) -> Self:
+        """The same for a sequence."""
+
+    def frames(self, group: Group) -> Sequence[np.ndarray | None]:
+        """Pictures at the positions of a group, uint8 [H, W, 3]; None for those that are not there."""
+
+
+@dataclass(frozen=True)
+class OfMethod:
+    """A method under a name, and the protocol that says for which times it is asked."""
+
+    name: str
+    identity: dict[str, Any]
+    method: Method
+    protocol: protocols.Protocol
+    device: str = "cpu"
+
+    @property
+    def sequential(self) -> bool:
+        """See `Rebuilder`."""
+        return self.method.sequential
+
+    def begin(self, footage: Footage) -> Self:
+        """See `Rebuilder`."""
+        return replace(self, method=self.method.begin())
+
+    def frames(self, group: Group) -> Sequence[np.ndarray | None]:
+        """See `Rebuilder`."""
+        keys = as_tensor(group.keys).to(self.device)
+        gap = Gap(keys[0], keys[1], group.events.to(self.device), group.gap_us)
+        targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
+        return list(self.protocol.coded(self.method.between(gap, targets)[self.protocol.picked]))
+
+
+def methods_of(
+    baselines: Sequence[str], networks: Sequence[str | Path], protocol: protocols.Protocol, device: str = "cpu"
+) -> list[OfMethod]:
+    """Closed forms by their names, and networks by files of weights or folders of runs; in this order.
+
+    Raises UsageError for a name that is none, DataError for a file that holds no network which rebuilds frames.
+    """
+    for name in baselines:
+        if name not in METHODS:
+            raise UsageError(f"baseline '{name}'{nearest(name, METHODS)}: expected some of {', '.join(METHODS)}")
+    paths = [Path(network) / WEIGHTS if Path(network).is_dir() else Path(network) for network in networks]
+    called = [path.parent.name if path.name == WEIGHTS and path.parent.name else path.stem for path in paths]
+    forms = list(dict.fromkeys(baselines))
+    found = [OfMethod(name, {"closed_form": name}, open_method(name, device), protocol, device) for name in forms]
+    for name, path in zip(apart([*forms, *called])[len(forms) :], paths, strict=True):
+        method = of_weights(path, device, name)
+        found.append(OfMethod(name, {"weights_sha256": digest_of(path)}, method, protocol, device))
+    return found

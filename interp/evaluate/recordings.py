@@ -1,0 +1,114 @@
+"""Recordings on disk as footage: own ones, and those in the HS-ERGB or BS-ERGB layout."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interp.candidates.contrast import with_fitted_contrast
+from interp.data.layouts import Sequence, open_sequence, windows
+from interp.data.layouts.own import Own
+from interp.data.tensors import as_tensor
+from interp.evaluate.cameras import CamerasOf
+from interp.evaluate.group import Cameras, Group
+from interp.evaluate.identity import contents
+from interp.evaluate.protocol import Protocol
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts, count_events
+from vid2ev.errors import DataError
+
+
+class Recording:
+    """The recording in a folder.
+
+    name    by which it is called
+    limit   groups that are scored, from the first on; None for all
+    Raises UsageError for a folder that is none, DataError for one that is damaged.
+    """
+
+    def __init__(self, folder: Path, protocol: Protocol, name: str, limit: int | None = None):
+        self.name, self.folder, self._protocol = name, folder, protocol
+        self.multiple = multiple = protocol.multiple
+        self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
+        self._begin = self._own_keys[0] if self._own_keys else 0
+        self.frames = len(self._sequence.times_us)
+        found = windows(self._sequence, multiple, multiple, self._begin)
+        self._not_scored = dict(found.unusable)
+        self._firsts = [int(first) for first in found.first][:limit]
+        if left := len(found.first) - len(self._firsts):
+            self._not_scored[f"beyond the limit of {limit}"] = left
+        self.expected, self._scored = len(self._firsts), 0
+        self.identity: dict[str, Any] = contents(folder)
+
+    @cached_property
+    def _sequence(self) -> Sequence:
+        return open_sequence(self.folder)
+
+    def groups(self) -> Iterator[Group]:
+        """See `interp.evaluate.group.Footage`; groups with a file that cannot be read are counted."""
+        cameras = CamerasOf(self._sequence) if isinstance(self._sequence, Own) else None
+        failed: dict[str, int] = {}
+        self._scored, before = 0, dict(self._not_scored)
+        for first in self._firsts:
+            try:
+                group = self._group(first, cameras)
+            except DataError as error:
+                failed[str(error)] = failed.get(str(error), 0) + 1
+                continue
+            yield group
+            self._scored += 1
+        self._not_scored = before | failed
+
+    def about(self) -> dict[str, Any]:
+        """See `interp.evaluate.group.Footage`."""
+        times = self._sequence.times_us
+        rate_hz = 1e6 / float(np.median(np.diff(times))) if len(times) > 1 else math.nan
+        return {
+            "kind": type(self._sequence).__name__.lower(), "frames": self.frames, "size": list(self._sequence.size),
+            "event_size": list(self._sequence.event_size), "rate_hz": round(rate_hz, 3), "groups": self._scored,
+            "not_scored": self._not_scored, "remarks": [*self._sequence.remarks, *self._remarks()],
+        }  # fmt: skip
+
+    def _group(self, first: int, cameras: CamerasOf | None) -> Group:
+        protocol, sequence = self._protocol, self._sequence
+        last = first + protocol.multiple
+        times_us = np.asarray(sequence.times_us[first : last + 1])
+        keys = np.stack([sequence.key(k) for k in (first, last)])
+        truth = np.stack([sequence.frame(first + k) for k in protocol.positions])
+        start_us, stop_us = int(times_us[0]), int(times_us[-1])
+        seen, _ = sequence.events(start_us, stop_us).within(sequence.event_size)
+        counts = count_events(seen, sequence.event_size, start_us, stop_us, protocol.steps)
+        number = (first - self._begin) // protocol.multiple
+        known = cameras.at((start_us + stop_us) // 2) if cameras else Cameras()
+        events = with_contrast(counts, keys, sequence.contrast)
+        return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
+
+    def _remarks(self) -> list[str]:
+        multiple, remarks = self._protocol.multiple, list[str]()
+        if left := max(self.frames - 1 - self._begin, 0) % multiple:
+            remarks.append(f"{left} frames after the last complete group of {multiple} are not rebuilt")
+        if self._begin:
+            remarks.append(f"{self._begin} frames before the first key frame are not rebuilt")
+        used = [k for first in self._firsts for k in (first, first + multiple)]
+        if self._own_keys and (others := sum(k not in self._own_keys for k in used)):
+            apart = self._own_keys[1] - self._own_keys[0] if len(self._own_keys) > 1 else 0
+            remarks.append(
+                f"{others} of {len(used)} key frames are frames of the truth, as the frame camera took one in {apart};"
+                f" --skip {apart - 1} takes its own"
+            )
+        return remarks
+
+
+def with_contrast(counts: EventCounts, keys: np.ndarray, contrast: tuple[float, float] | None) -> EventCounts:
+    """Counts with what an OFF and an ON event stand for [nat]; where nobody knows, what fits the key frames best."""
+    if contrast is not None:
+        return replace(counts, contrast=counts.contrast.new_tensor([contrast]))
+    frames = as_tensor(keys)[:, None]
+    laid = over(counts, (keys.shape[1], keys.shape[2]))
+    return replace(counts, contrast=with_fitted_contrast(frames[0], frames[1], laid).contrast)

@@ -1,0 +1,174 @@
+"""An evaluation: every method rebuilds every group of every sequence, and what is known of each frame becomes a row.
+
+REPORT/rows.csv        a line for each frame and method         REPORT/worst/          pictures of the worst frames
+REPORT/summary.json    what they come to                        REPORT/job.json, kept/ what it takes to go on
+
+Sequences are gone through in order, and groups within, all methods together, so that a film is simulated once.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from interp.evaluate.films import Simulated
+from interp.evaluate.group import Footage, Group
+from interp.evaluate.kept import Kept
+from interp.evaluate.predictions import predictions_in
+from interp.evaluate.protocol import Protocol
+from interp.evaluate.rebuilders import Rebuilder, methods_of
+from interp.evaluate.row import Row
+from interp.evaluate.rows import ROWS, write_rows
+from interp.evaluate.scoring import conditions_of, rows_of
+from interp.evaluate.sets import Found, footage_of
+from interp.evaluate.summary import summarised
+from interp.evaluate.worst import WorstPictures
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.manifest import versions
+
+BASELINES = ("nearest", "linear", "flow", "integration", "both", "bridge")
+SUMMARY = "summary.json"
+Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """All rows, in order of sequences, methods, groups and positions; and what they come to (`summary.json`)."""
+
+    rows: list[Row]
+    summary: dict[str, Any]
+
+
+def evaluate(
+    datasets: Sequence[str],
+    folder: str | Path,
+    *,
+    networks: Sequence[str | Path] = (),
+    baselines: Sequence[str] = BASELINES,
+    predictions: Sequence[str | Path] = (),
+    protocol: Protocol | None = None,
+    simulated: Simulated | None = None,
+    limit: int | None = None,
+    resume: bool = False,
+    device: str = "cpu",
+    report: Report | None = None,
+) -> Evaluation:
+    """Score methods on data sets, into a folder.
+
+    datasets      folders with recordings (own, HS-ERGB, BS-ERGB), videos, folders of these or of pictures, `scene:NAME`
+    networks      files of weights, or folders of runs of training
+    baselines     names of closed forms (`interp.methods.METHODS`)
+    predictions   folders with pictures that others have made (`predictions.py`)
+    simulated     the event camera that looks at films
+    limit         groups of each sequence, from its first on
+    resume        go on with what is in the folder; methods may be added
+    Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
+    scored.
+    """
+    folder, protocol = Path(folder), protocol or Protocol()
+    simulated = simulated or Simulated.of("clean")
+    methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
+    methods += [made for place in predictions for made in predictions_in(place)]
+    _check(methods)
+    found = footage_of(datasets, protocol, simulated, limit)
+    job = {
+        "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit,
+        "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},
+    }  # fmt: skip
+    with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:
+        rows, about = _scored(found.footage, methods, len(protocol.positions), kept, report)
+        if not rows:
+            reasons = [*found.unusable.values(), *(f"{name}: {of['not_scored']}" for name, of in about.items())]
+            raise DataError(f"no frame could be scored: {'; '.join(reasons[:3])}")
+        summary = _summary(job, found, methods, rows, about)
+        with writing(folder):
+            write_rows(folder / ROWS, rows)
+            with whole_file(folder / SUMMARY) as file:
+                file.write(f"{json.dumps(summary, indent=1, allow_nan=False)}\n".encode())
+    return Evaluation(rows, summary)
+
+
+def _check(methods: Sequence[Rebuilder]) -> None:
+    names = [method.name for method in methods]
+    if not names:
+        raise UsageError("nothing to score: expected a baseline, a network or predictions")
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise UsageError(f"two methods are called '{twice}': expected names that differ; rename a file or folder")
+
+
+def _scored(
+    footage: Sequence[Footage], methods: Sequence[Rebuilder], frames: int, kept: Kept, report: Report | None
+) -> tuple[list[Row], dict[str, Any]]:
+    """All rows, and what is known of each sequence; `frames` of a group are scored."""
+    before = {(each.name, method.name): kept.rows(each.name, method.name) for each in footage for method in methods}
+    worst = {
+        method.name: WorstPictures(
+            kept.folder, [row for each in footage for rows in before[each.name, method.name].values() for row in rows]
+        )
+        for method in methods
+    }
+    rows, known, total, done = list[Row](), dict[str, Any](), sum(each.expected for each in footage), 0
+    for each in footage:
+        about = kept.about(each.name)
+        unfinished = [method for method in methods if about is None or method.name not in about["missing"]]
+        found = {method.name: dict(before[each.name, method.name]) for method in methods}
+        if unfinished:
+            running = [method.begin(each) for method in unfinished]
+            for group in each.groups():
+                if report:
+                    report(min(done + group.number, total), total, each.name)
+                _score_group(each.name, group, running, found, kept, worst)
+            facts = each.about()
+            whole = facts["groups"] * frames
+            missing = {method.name: whole - sum(map(len, found[method.name].values())) for method in unfinished}
+            about = facts | {"missing": (about["missing"] if about else {}) | missing}
+            kept.finish(each.name, about)
+        assert about is not None
+        done += each.expected
+        known[each.name] = about | {"missing": {method.name: about["missing"][method.name] for method in methods}}
+        rows += [row for method in methods for group in sorted(found[method.name]) for row in found[method.name][group]]
+    if report:
+        report(total, total, "")
+    return rows, known
+
+
+def _score_group(
+    sequence: str,
+    group: Group,
+    methods: Sequence[Rebuilder],
+    found: Mapping[str, dict[int, list[Row]]],
+    kept: Kept,
+    worst: Mapping[str, WorstPictures],
+) -> None:
+    """Score a group, where that is not done yet."""
+    conditions: dict[str, float] = {}
+    for method in methods:
+        done = group.number in found[method.name]
+        if done and not method.sequential:
+            continue
+        made = method.frames(group)
+        if done:  # (made for what it leaves in the method's memory)
+            continue
+        conditions = conditions or conditions_of(group)
+        rows = rows_of(sequence, method.name, group, made, conditions)
+        worst[method.name].see(rows, group, made)
+        kept.add(sequence, method.name, group.number, rows)
+        found[method.name][group.number] = rows
+
+
+def _summary(
+    job: Mapping[str, Any], found: Found, methods: Sequence[Rebuilder], rows: Sequence[Row], about: Mapping[str, Any]
+) -> dict[str, Any]:
+    names = [method.name for method in methods]
+    facts = {key: job[key] for key in ("vid2ev", "protocol", "limit", "sensor")}
+    return facts | {
+        "sets": found.sets,
+        "sequences": about,
+        "unusable": found.unusable,
+        "identities": {method.name: method.identity for method in methods},
+        "methods": summarised(rows, names, found.sets),
+    }

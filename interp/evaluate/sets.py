@@ -1,0 +1,74 @@
+"""From what is named on the command line to footage: recordings, videos and scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from interp.data.layouts import sequences_in
+from interp.evaluate.films import Film, Simulated
+from interp.evaluate.group import Footage
+from interp.evaluate.identity import apart, plain
+from interp.evaluate.protocol import Protocol
+from interp.evaluate.recordings import Recording
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources import SCENE_PREFIX, is_scene
+
+
+class Found(NamedTuple):
+    """Footage, in order; names of each data set's; and what cannot be used, with the reason."""
+
+    footage: list[Footage]
+    sets: dict[str, list[str]]
+    unusable: dict[str, str]
+
+
+def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated, limit: int | None = None) -> Found:
+    """The footage of data sets: folders with recordings, videos, folders of them or of pictures, `scene:NAME`.
+
+    Raises UsageError for what is none of these, or where nothing can be used.
+    """
+    places, unusable = list[tuple[str, str | Path]](), dict[str, str]()
+    for dataset in dict.fromkeys(datasets):
+        found, broken = _places(dataset)
+        places += [(dataset, place) for place in found]
+        unusable |= broken
+    footage, sets = list[Footage](), dict[str, list[str]]()
+    names = apart([_called(place) for _, place in places])
+    for (dataset, place), name in zip(places, names, strict=True):
+        try:
+            made = _opened(place, protocol, name, simulated, limit)
+        except DataError as error:
+            unusable[str(place)] = str(error)
+            continue
+        footage.append(made)
+        sets.setdefault(plain(Path(dataset).name), []).append(name)
+    if not footage:
+        raise DataError(f"nothing in {', '.join(datasets)} can be scored: {'; '.join(list(unusable.values())[:3])}")
+    return Found(footage, sets, unusable)
+
+
+def _opened(place: str | Path, protocol: Protocol, name: str, simulated: Simulated, limit: int | None) -> Footage:
+    if isinstance(place, Path):
+        return Recording(place, protocol, name, limit)
+    return Film(place, protocol, name, simulated, limit)
+
+
+def _places(dataset: str) -> tuple[list[str | Path], dict[str, str]]:
+    """Folders of recordings (paths), and films (texts)."""
+    from vid2ev.commands.batch import sources_in
+
+    if is_scene(dataset) or not Path(dataset).is_dir():
+        return [dataset], {}
+    try:
+        found, unusable = sequences_in(dataset)
+    except UsageError:
+        return [*sources_in(dataset)], {}
+    return [*found], unusable
+
+
+def _called(place: str | Path) -> str:
+    if isinstance(place, Path):
+        return place.resolve().name
+    return place.removeprefix(SCENE_PREFIX) if is_scene(place) else Path(place).stem

@@ -1,0 +1,194 @@
+"""What is scored, and what is not: recordings with the quirks of the releases, films, and pictures of others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from footage_made import STEP_US, pictures, write_film, write_hsergb, write_predictions
+
+from interp.data.dataset import write_dataset
+from interp.data.dataset_spec import DatasetSpec
+from interp.data.layouts.own import Own
+from interp.evaluate.films import Film, Simulated
+from interp.evaluate.predictions import predictions_in
+from interp.evaluate.protocol import Protocol
+from interp.evaluate.recordings import Recording
+from interp.evaluate.run import evaluate
+from interp.evaluate.sets import footage_of
+from interp.representation.event_counts import count_events
+from vid2ev import DataError, Events, UsageError, events_of, open_source
+
+
+def test_groups_of_a_recording_are_its_frames_and_events(tmp_path: Path) -> None:
+    frames = pictures(10)
+    write_hsergb(tmp_path / "seq", frames)
+    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq")
+    groups = list(recording.groups())
+    assert [(group.number, group.first, group.gap_us) for group in groups] == [(0, 0, 4 * STEP_US), (1, 4, 4 * STEP_US)]
+    np.testing.assert_array_equal(groups[1].keys, frames[[4, 8]])
+    np.testing.assert_array_equal(groups[1].truth, frames[5:8])
+    assert int(groups[1].events.off_on.sum()) == 4 * 50 and groups[1].events.steps == 32
+    assert not (groups[1].events.contrast == 0.15).all()  # nobody knows it: it is fitted
+    about = recording.about()
+    assert about["groups"] == 2 and about["not_scored"] == {}
+    assert about["remarks"] == ["1 frames after the last complete group of 4 are not rebuilt"]
+
+
+def test_what_cannot_be_scored_is_named_and_counted(tmp_path: Path) -> None:
+    times = [STEP_US * (k + 1) for k in range(25)]
+    times[5] = times[4]
+    write_hsergb(tmp_path / "data" / "seq", pictures(25), times, last_events=6)
+    (tmp_path / "data" / "torn" / "images").mkdir(parents=True)
+    (tmp_path / "data" / "torn" / "events").mkdir()
+    picture = sorted((tmp_path / "data" / "seq" / "images_corrected").glob("*.png"))[10]
+    picture.write_bytes(b"torn")
+    found = evaluate([str(tmp_path / "data")], tmp_path / "report", baselines=["linear"], protocol=Protocol(3, 3))
+    about = found.summary["sequences"]["seq"]
+    reasons = {
+        "times of the frames do not increase": 1, "the events end before the last frame": 2,
+        f"{picture} is no picture that can be read; leave it out with its time": 1,
+    }  # fmt: skip
+    assert about["not_scored"] == reasons and about["groups"] == 2
+    assert {row.group for row in found.rows} == {0, 3}
+    assert "no timestamp.txt" in found.summary["unusable"][str(tmp_path / "data" / "torn")]
+
+
+def test_a_limit_says_what_it_leaves_out(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "seq", pictures(17))
+    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq", limit=1)
+    assert [group.number for group in recording.groups()] == [0]
+    assert recording.about()["not_scored"] == {"beyond the limit of 1": 3}
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of vid2ev whose frames have an exposure."""
+    folder = tmp_path_factory.mktemp("own")
+    frames = [frame.light for frame in open_source("synthetic:moving-edge,size=32x24,fps=30,duration_s=1.2").frames()]
+    np.savez(folder / "film.npz", frames=np.stack(frames).astype(np.float32), fps=30)
+    spec = DatasetSpec(videos=(str(folder / "film.npz"),), slowdown=4, frames=3, count=1, preset="paper")
+    write_dataset(folder / "set", spec)
+    return next(path for path in (folder / "set").iterdir() if path.is_dir())
+
+
+def test_key_frames_of_an_own_recording_are_those_of_its_frame_camera(own: Path) -> None:
+    recording, sequence = Recording(own, Protocol(31, 31), "own"), Own(own)
+    groups = list(recording.groups())
+    begin = sequence.key_frames[0]
+    assert begin > 0 and [group.first for group in groups] == [begin, begin + 32]
+    np.testing.assert_array_equal(groups[0].keys[0], sequence.key(begin))
+    np.testing.assert_array_equal(groups[0].truth[0], sequence.frame(begin + 1))
+    assert groups[0].cameras.disparity_px == groups[0].cameras.offset_us == 0
+    assert groups[0].cameras.exposure_us == pytest.approx(4e6 / 960, abs=2)
+    assert groups[0].events.contrast.flatten().tolist() == pytest.approx(sequence.contrast)
+    assert f"{begin} frames before the first key frame are not rebuilt" in recording.about()["remarks"]
+
+
+def test_other_key_frames_than_the_frame_camera_has_are_named(own: Path) -> None:
+    remarks = Recording(own, Protocol(15, 15), "own").about()["remarks"]
+    assert any("2 of 8 key frames" not in each and "--skip 31 takes its own" in each for each in remarks)
+
+
+def test_a_film_is_seen_by_the_event_camera_of_convert(tmp_path: Path) -> None:
+    frames = pictures(10)
+    write_film(tmp_path / "film.npz", frames)
+    simulated = Simulated.of("clean", ["threshold_on=0.2"])
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", simulated)
+    groups = list(film.groups())
+    events = Events.concatenate(list(events_of(tmp_path / "film.npz", simulated.spec)))
+    assert len(events) > 100 and len(groups) == 2
+    for group in groups:
+        start_us, stop_us = int(group.times_us[0]), int(group.times_us[-1])
+        counts = count_events(events, film.size, start_us, stop_us, 32)
+        np.testing.assert_array_equal(group.events.off_on, counts.off_on)
+        assert group.events.contrast.flatten().tolist() == pytest.approx([0.15, 0.2])
+    codes = [each.shape for each in groups[1].truth]
+    assert codes == [frames[0].shape] * 3
+    assert film.about()["remarks"] == ["1 frames after the last complete group of 4 are not rebuilt"]
+
+
+def test_films_are_gone_through_a_group_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_film(tmp_path / "film.npz", pictures(40))
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"))
+    read: list[int] = []
+    seen = film._seen
+
+    def counted() -> Any:
+        for each in seen():
+            read.append(1)
+            yield each
+
+    monkeypatch.setattr(film, "_seen", counted)
+    groups = film.groups()
+    for number in range(3):
+        next(groups)
+        assert len(read) == 4 * (number + 1) + 1
+    groups.close()
+
+
+def test_slow_films_and_cuts_are_named(tmp_path: Path) -> None:
+    draw = np.random.default_rng(0)
+    one, other = (
+        np.kron(draw.integers(0, 256, (8, 12, 3)), np.ones((8, 8, 1), int)).astype(np.uint8) for _ in range(2)
+    )
+    write_film(tmp_path / "film.npz", np.stack([one] * 6 + [other] * 7), fps=30)
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"))
+    assert [group.number for group in film.groups()] == [0, 2]
+    about = film.about()
+    assert about["not_scored"] == {"a cut between the key frames": 1}
+    assert "30 frames a second" in about["remarks"][0] and "--slowdown" in about["remarks"][0]
+    fast = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean", slowdown=8))
+    assert not any("frames a second" in each for each in fast.about().get("remarks", []))
+
+
+def test_a_scene_is_rendered_denser_than_its_truth() -> None:
+    film = Film("scene:flicker,size=32x24,scene.duration_s=0.05", Protocol(3, 3), "scene", Simulated.of("clean"), 1)
+    (group,) = film.groups()
+    assert np.diff(group.times_us).tolist() == pytest.approx([1e6 / 240] * 4, abs=1.1)
+    assert film.about()["rate_hz"] == pytest.approx(240, rel=0.1)
+
+
+@pytest.mark.parametrize("with_keys", [True, False])
+def test_predictions_are_paired_by_position(tmp_path: Path, with_keys: bool) -> None:
+    truth = pictures(13)
+    write_hsergb(tmp_path / "seq", truth)
+    kept = [k for k in range(13) if with_keys or k % 4]
+    for method in ("GT", "ours", "theirs"):
+        write_predictions(tmp_path / "results" / "seq" / method, truth[kept])
+    found = predictions_in(tmp_path / "results")
+    assert [each.name for each in found] == ["ours", "theirs"]
+    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq")
+    for group in recording.groups():
+        np.testing.assert_array_equal(np.stack(found[0].begin(recording).frames(group)), group.truth)
+
+
+def test_missing_predictions_are_counted_and_those_of_another_size_refused(tmp_path: Path) -> None:
+    truth = pictures(13)
+    for name in ("a", "b"):
+        write_hsergb(tmp_path / "data" / name, truth)
+    write_predictions(tmp_path / "theirs" / "a", truth[:7])
+    options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    found = evaluate([str(tmp_path / "data")], tmp_path / "report", **options)
+    assert {name: of["missing"]["theirs"] for name, of in found.summary["sequences"].items()} == {"a": 4, "b": 9}
+    assert len(found.rows) == 5
+    write_predictions(tmp_path / "wrong" / "a", truth[:, :12])
+    options["predictions"] = [tmp_path / "wrong"]
+    with pytest.raises(DataError, match=r"40x12 pixels, expected a picture of 40x24"):
+        evaluate([str(tmp_path / "data")], tmp_path / "other", **options)
+    with pytest.raises(UsageError, match="no predictions in it"):
+        predictions_in(tmp_path / "data" / "a" / "events_aligned")
+
+
+def test_data_sets_of_all_kinds_have_names_that_differ(tmp_path: Path) -> None:
+    for name in ("close/x", "far/x"):
+        write_hsergb(tmp_path / name, pictures(9))
+    write_film(tmp_path / "x.npz", pictures(9))
+    asked = [str(tmp_path / name) for name in ("close", "far", "x.npz")]
+    found = footage_of(asked, Protocol(), Simulated.of("clean"))
+    assert [each.name for each in found.footage] == ["x", "x_2", "x_3"]
+    assert found.sets == {"close": ["x"], "far": ["x_2"], "x.npz": ["x_3"]}
+    with pytest.raises(UsageError, match="no such file"):
+        footage_of([str(tmp_path / "nothing")], Protocol(), Simulated.of("clean"))

@@ -1,0 +1,119 @@
+"""An evaluation that was interrupted goes on to the same bytes, and only with the same settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from footage_made import pictures, write_film, write_hsergb
+
+from interp.evaluate import run
+from interp.evaluate.protocol import Protocol
+from interp.evaluate.rows import read_rows
+from interp.evaluate.run import evaluate
+from interp.networks import make
+from interp.weights import save
+from vid2ev import DataError, UsageError
+
+BASELINES = ("linear", "bridge")
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("eval")
+    for seed, name in enumerate("ab"):
+        write_hsergb(folder / "data" / name, pictures(14, seed))
+    write_film(folder / "film.npz", pictures(14))
+    save(folder / "firenet.safetensors", "firenet", make("firenet", "tiny"))
+    return folder
+
+
+def options(data: Path) -> dict[str, Any]:
+    return {"baselines": BASELINES, "protocol": Protocol(3, 3), "networks": [data / "firenet.safetensors"]}
+
+
+def datasets(data: Path) -> list[str]:
+    return [str(data / "data"), str(data / "film.npz")]
+
+
+@pytest.fixture(scope="module")
+def whole(data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("whole") / "report"
+    evaluate(datasets(data), folder, **options(data))
+    return contents(folder)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name != "lock")
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize("stop", [1, 4, 8])
+def test_what_was_interrupted_goes_on_to_the_same_bytes(
+    data: Path, whole: dict[str, bytes], stop: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[int] = []
+
+    def interrupted(*_: Any) -> None:
+        said.append(1)
+        if len(said) > stop:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(datasets(data), tmp_path / "report", report=interrupted, **options(data))
+    assert not (tmp_path / "report" / "rows.csv").exists()
+    torn = sorted((tmp_path / "report").rglob("*.jsonl"))[-1]
+    torn.write_bytes(torn.read_bytes() + b'{"group": 7, "ro')  # as of a kill while it was written
+    rebuilt: list[str] = []
+    rows_of = run.rows_of
+    monkeypatch.setattr(run, "rows_of", lambda *asked: rebuilt.append(asked[1]) or rows_of(*asked))
+    evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
+    assert contents(tmp_path / "report") == whole
+    assert len(rebuilt) == 3 * (9 - stop)  # nothing is scored twice
+
+
+def test_a_finished_evaluation_is_left_as_it_is(
+    data: Path, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evaluate(datasets(data), tmp_path / "report", **options(data))
+    monkeypatch.setattr(run, "rows_of", None)
+    found = evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
+    assert contents(tmp_path / "report") == whole
+    assert repr(read_rows(tmp_path / "report" / "rows.csv")) == repr(found.rows)  # (NaN is not equal to itself)
+
+
+def test_methods_can_be_added_and_other_settings_are_refused(
+    data: Path, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    first = options(data) | {"networks": []}
+    evaluate(datasets(data), tmp_path / "report", **first)
+    evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
+    later = contents(tmp_path / "report")
+    assert {name: later[name] for name in ("rows.csv", "summary.json")} == {
+        name: whole[name] for name in ("rows.csv", "summary.json")
+    }
+    with pytest.raises(UsageError, match="--resume goes on"):
+        evaluate(datasets(data), tmp_path / "report", **options(data))
+    with pytest.raises(UsageError, match=r"begun with protocol.skip = 3, not 6"):
+        other = options(data) | {"protocol": Protocol(6, 6)}
+        evaluate(datasets(data), tmp_path / "report", resume=True, **other)
+    with pytest.raises(UsageError, match=r"begun with sequences.film"):
+        evaluate(datasets(data)[:1], tmp_path / "report", resume=True, **options(data))
+    save(tmp_path / "firenet.safetensors", "firenet", make("firenet", "tiny"))
+    with pytest.raises(UsageError, match=r"begun with methods.firenet.weights_sha256"):
+        changed = options(data) | {"networks": [tmp_path / "firenet.safetensors"]}
+        evaluate(datasets(data), tmp_path / "report", resume=True, **changed)
+
+
+def test_names_and_folders_that_are_taken_are_refused(data: Path, tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match="holds something else"):
+        evaluate(datasets(data), tmp_path / "taken", **options(data))
+    with pytest.raises(UsageError, match="nothing to score"):
+        evaluate(datasets(data), tmp_path / "report", baselines=())
+    with pytest.raises(UsageError, match="did you mean bridge"):
+        evaluate(datasets(data), tmp_path / "report", baselines=["brigde"])
+    with pytest.raises(DataError, match="no frame could be scored"):
+        evaluate(datasets(data), tmp_path / "report", baselines=["linear"], protocol=Protocol(20, 20))

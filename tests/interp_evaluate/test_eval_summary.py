@@ -1,0 +1,143 @@
+"""What rows come to, and what is shown of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from footage_made import SIZE, pictures, write_film, write_hsergb
+
+from interp.commands.evaluate import evaluate as command
+from interp.evaluate.films import Simulated
+from interp.evaluate.group import Cameras, Group
+from interp.evaluate.row import Row
+from interp.evaluate.rows import NUMBERS, read_rows, write_rows
+from interp.evaluate.scoring import conditions_of, rows_of
+from interp.evaluate.summary import EDGES, binned, summarised
+from interp.evaluate.worst import COUNT, worst_of
+from interp.representation.event_counts import EventCounts
+from vid2ev import DataError, Frame
+from vid2ev.commands import Commands
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.recording.exposures import read_codes
+
+
+def row(sequence: str, group: int, position: int, **known: Any) -> Row:
+    numbers = dict.fromkeys(NUMBERS, math.nan) | known
+    return Row(sequence, "m", group, position, 8, 0, **{"patch_x": 0, "patch_y": 0} | numbers)
+
+
+def test_means_are_of_all_frames_and_of_sequences() -> None:
+    rows = [row("a", 0, k, psnr=value) for k, value in enumerate((20.0, 30.0, 40.0), 1)]
+    rows += [row("b", 0, 1, psnr=10.0), row("b", 0, 2)]
+    found = summarised(rows, ["m"], {"one": ["a"], "two": ["b"]})["m"]
+    assert found["pooled"]["psnr"] == {
+        "mean": 25.0, "std": pytest.approx(np.std([20, 30, 40, 10])), "min": 10.0, "count": 4,
+    }  # fmt: skip
+    assert found["global"]["psnr"]["mean"] == 20.0 and found["global"]["psnr"]["std"] == 10.0  # of 30 and 10
+    assert found["by_set"]["one"]["pooled"]["psnr"]["mean"] == 30.0
+    assert found["by_position"]["1"]["psnr"]["mean"] == 15.0 and found["by_position"]["2"]["psnr"]["count"] == 1
+    assert found["by_sequence_and_position"]["a"]["3"]["psnr"]["mean"] == 40.0
+    assert found["worst"]["psnr"] == {"sequence": "b", "group": 0, "position": 1, "psnr": 10.0}
+    assert found["pooled"]["ssim"]["mean"] is None and found["worst"]["ssim"] is None
+    json.dumps(found, allow_nan=False)
+
+
+def test_bins_hold_each_frame_whose_condition_is_known_once() -> None:
+    rows = [row("a", k, 1, motion_px=value, psnr=30.0) for k, value in enumerate((0, 0.99, 1, 63, 64, 1e6, math.nan))]
+    found = binned(rows, "motion_px", EDGES["motion_px"])
+    assert [(each["from"], each["to"], each["frames"]) for each in found] == [
+        (0, 1, 2), (1, 2, 1), (32, 64, 1), (64, None, 2),
+    ]  # fmt: skip
+
+
+def test_worst_frames_are_of_different_groups() -> None:
+    rows = [row("a", k // 3, 1 + k % 3, patch_psnr=float(k)) for k in range(60)]
+    assert [(each.group, each.position) for each in worst_of(rows)] == [(k, 1) for k in range(COUNT)]
+
+
+def test_rows_come_back_from_the_disk(tmp_path: Path) -> None:
+    rows = [row("a, b", 0, 1, psnr=1 / 3, ssim=1e-300), row("a", 0, 2)]
+    write_rows(tmp_path / "rows.csv", rows)
+    assert repr(read_rows(tmp_path / "rows.csv")) == repr(rows)
+    (tmp_path / "rows.csv").write_text("sequence,method\na,b\n")
+    with pytest.raises(DataError, match="no table of an evaluation"):
+        read_rows(tmp_path / "rows.csv")
+
+
+def moved(px: int) -> Group:
+    draw = np.random.default_rng(0)
+    texture = np.kron(draw.random((20, 40)), np.ones((6, 6))).astype(np.float32)
+    light = [np.repeat(texture[:96, 20 - k : 148 - k, None], 3, axis=2) for k in (0, px // 2, px)]
+    frames = [srgb_codes(Frame(each, 0).light) for each in light]
+    counts = EventCounts.none(1, (96, 128), 4)
+    counts.off_on[0, 0, 0, :, :64] = 3
+    return Group(
+        0, 0, np.stack([frames[0], frames[2]]), (1,), np.stack([frames[1]]), np.array([0, 5_000, 10_000]), counts,
+        Cameras(2_500.0, 4.0, -7.0),
+    )  # fmt: skip
+
+
+def test_conditions_are_what_they_are_called() -> None:
+    found = conditions_of(moved(8))
+    assert found["motion_px"] == pytest.approx(8, abs=0.5)
+    assert found["motion_px_per_s"] == pytest.approx(100 * found["motion_px"])
+    assert found["blur_px"] == pytest.approx(found["motion_px"] / 4)
+    assert (found["events_per_px"], found["disparity_px"], found["offset_us"]) == (1.5, 4.0, -7.0)
+
+
+def test_moving_pixels_and_the_worst_window_are_scored_apart() -> None:
+    group = moved(8)
+    made = group.truth[0].astype(int)
+    made[60:, 100:] += 20
+    (found,) = rows_of("seq", "m", group, [np.clip(made, 0, 255).astype(np.uint8)], conditions_of(group))
+    assert 0 < found.moving < 1 and (found.patch_x, found.patch_y) != (0, 0) and found.patch_psnr < found.psnr_255
+    assert found.contrast > 0.1
+    still = Group(
+        0, 0, np.stack([group.truth[0]] * 2), (1,), group.truth, group.times_us, group.events, Cameras()
+    )  # fmt: skip
+    (found,) = rows_of("seq", "m", still, [group.truth[0]], conditions_of(still))
+    assert found.moving == 0 and math.isnan(found.psnr_moving) and math.isnan(found.blur_px)
+
+
+def run(*arguments: object) -> Result:
+    group = Commands("vid2ev")
+    group.get_command = lambda *_: command  # type: ignore[method-assign]
+    group.list_commands = lambda *_: ["eval"]  # type: ignore[method-assign]
+    return CliRunner().invoke(group, ["eval", *map(str, arguments)])
+
+
+def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_hsergb(tmp_path / "set" / "seq", pictures(18))
+    shown = run("set", "--baseline", "linear", "--baseline", "bridge")
+    assert shown.exit_code == 0, shown.output
+    assert shown.stdout.splitlines()[2].startswith("| linear ") and "set_eval: 28 rows, 1 sequences" in shown.stdout
+    assert "note: seq: 1 frames after the last complete group of 8 are not rebuilt" in shown.stderr
+    summary = json.loads((tmp_path / "set_eval" / "summary.json").read_text())
+    for of in summary["methods"]["linear"]["worst_pictures"]:
+        assert {
+            name: read_codes(tmp_path / "set_eval" / path).shape for name, path in of["files"].items()
+        } == dict.fromkeys(("made", "truth", "before", "after"), (*SIZE[::-1], 3))
+    again = run("set", "--baseline", "linear", "--resume", "--json")
+    assert json.loads(again.stdout)["methods"].keys() == {"linear"}
+    refused = run("set", "--skip", "3", "--baseline", "linear", "--resume")
+    assert refused.exit_code == 2 and "begun with protocol.skip = 7, not 3" in refused.output
+
+
+def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.npz", pictures(9))
+    done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4", "-q")
+    assert done.exit_code == 0 and done.stdout == ""
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["sensor"]["parameters"]["threshold_on"] == 0.4
+    assert list(summary["methods"]) == ["nearest", "linear", "flow", "integration", "both", "bridge"]
+    noisy = Simulated.of("noisy", ["shot_rate_hz=3"]).spec
+    assert (noisy.threshold_on, noisy.shot_rate_hz, noisy.photoreceptor_tau_us) == (0.25, 3.0, 100.0)
+    wrong = run(tmp_path / "film.npz", "-o", tmp_path / "other", "--sensor", "davis")
+    assert wrong.exit_code == 2 and "presets are" in wrong.output
