@@ -76,10 +76,10 @@ def evaluate(
     DATASET is a folder of recordings (of vid2ev, HS-ERGB or BS-ERGB), a video of 240 frames a second or more, a folder
     of such, or scene:NAME.  Of videos frames are dropped, and an event camera is simulated that saw them all.
     """
-    from interp.evaluate.films import Simulated
     from interp.evaluate.protocol import Protocol
     from interp.evaluate.run import BASELINES
     from interp.evaluate.run import evaluate as evaluated
+    from interp.evaluate.simulated import Simulated
     from interp.evaluate.table import notes, table
     from vid2ev.commands.progress import counting
     from vid2ev.sources import OPTIONS

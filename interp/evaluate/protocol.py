@@ -84,7 +84,7 @@ class Protocol:
 
     def coded(self, images: torch.Tensor) -> np.ndarray:
         """Images [N, C, H, W] as codes of 8 bits, uint8 [N, H, W, C]."""
-        codes = images.double().clamp(0, 1) * 255
+        codes = images.float().clamp(0, 1) * 255
         codes = codes.round() if self.rounding == "round" else codes.floor()
         return codes.to(torch.uint8).movedim(1, -1).contiguous().cpu().numpy()
 

@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from interp.evaluate.films import Simulated
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.kept import Kept
 from interp.evaluate.predictions import predictions_in
@@ -24,6 +23,7 @@ from interp.evaluate.row import Row
 from interp.evaluate.rows import ROWS, write_rows
 from interp.evaluate.scoring import conditions_of, rows_of
 from interp.evaluate.sets import Found, footage_of
+from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.worst import WorstPictures
 from vid2ev.errors import DataError, UsageError

@@ -42,13 +42,13 @@ def rows_of(
 
 def scores_of(made: np.ndarray, true: np.ndarray, keys: np.ndarray) -> dict[str, Any]:
     """The scores of a row, by their names, of pictures uint8 [H, W, 3] with key frames [2, H, W, 3]."""
-    squared, found, peak = squared_error(made, true), moments(made, true), range_of(true)
-    moves = moving(true, keys)
-    worst = highest(squared.sum(axis=2))
+    channels, found, peak = true.shape[2], moments(made, true), range_of(true)
+    total = squared_error(made, true) @ np.ones(channels)  # (of whole numbers: exact)
+    moves, worst, squared = moving(true, keys), highest(total), total / channels
     scores: dict[str, Any] = {
         "psnr": psnr(squared, peak), "psnr_255": psnr(squared),
         "psnr_moving": psnr(squared[moves]), "psnr_static": psnr(squared[~moves]), "moving": float(moves.mean()),
-        "patch_psnr": psnr_of_mean(worst.value / true.shape[2]), "patch_x": worst.x, "patch_y": worst.y,
+        "patch_psnr": psnr_of_mean(worst.value / channels), "patch_x": worst.x, "patch_y": worst.y,
     }  # fmt: skip
     if found is None:
         return scores | {"ssim": math.nan, "ssim_255": math.nan, "patch_ssim": math.nan}

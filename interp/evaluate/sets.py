@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from interp.data.layouts import sequences_in
-from interp.evaluate.films import Film, Simulated
+from interp.evaluate.films import Film
 from interp.evaluate.group import Footage
 from interp.evaluate.identity import apart, plain
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
+from interp.evaluate.simulated import Simulated
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import SCENE_PREFIX, is_scene
 

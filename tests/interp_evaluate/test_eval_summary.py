@@ -13,11 +13,11 @@ from click.testing import CliRunner, Result
 from footage_made import SIZE, pictures, write_film, write_hsergb
 
 from interp.commands.evaluate import evaluate as command
-from interp.evaluate.films import Simulated
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.row import Row
 from interp.evaluate.rows import NUMBERS, read_rows, write_rows
 from interp.evaluate.scoring import conditions_of, rows_of
+from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import EDGES, binned, summarised
 from interp.evaluate.worst import COUNT, worst_of
 from interp.representation.event_counts import EventCounts

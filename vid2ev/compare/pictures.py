@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numba import njit
 
 PEAK = 255.0
 HIGHEST_DB = 100.0  # of pictures without an error
@@ -40,23 +41,20 @@ class Worst(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """What SSIM is made of: m_x m_y, m_x^2 + m_y^2, s_xy and s_x^2 + s_y^2, each [H - 10, W - 10] or with channels."""
+    """What SSIM is made of: means under the window of x, y, x^2 + y^2 and x y, each [H - 10, W - 10, C]."""
 
-    product: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
     squares: np.ndarray
-    covariance: np.ndarray
-    variances: np.ndarray
+    product: np.ndarray
 
     def ssim_map(self, peak: float = PEAK, sample: bool = False) -> np.ndarray:
         """SSIM around each pixel, mean over channels, [H - 10, W - 10]; NaN where there is no range."""
-        c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
         taps = (2 * RADIUS_PX + 1) ** 2
-        scale = taps / (taps - 1) if sample else 1.0
-        if not peak > 0:
-            return np.full(self.product.shape[:2], np.nan)
-        found = (2 * self.product + c1) * (2 * scale * self.covariance + c2)
-        found /= (self.squares + c1) * (scale * self.variances + c2)
-        return found if found.ndim == 2 else found.mean(axis=2)
+        found = np.full(self.x.shape[:2], np.nan)
+        if peak > 0:
+            _ssim(self.x, self.y, self.squares, self.product, peak, taps / (taps - 1) if sample else 1.0, found)
+        return found
 
 
 def squared_error(made: np.ndarray, true: np.ndarray) -> np.ndarray:
@@ -68,8 +66,12 @@ def squared_error(made: np.ndarray, true: np.ndarray) -> np.ndarray:
 def moving(true: np.ndarray, keys: np.ndarray) -> np.ndarray:
     """Which pixels [H, W] of a picture move: those more than 10 codes away from any of the key frames around it, in any
     channel; uint8 [H, W, C] and [N, H, W, C]."""
-    away = np.maximum(true, keys) - np.minimum(true, keys)  # (as small numbers: no sign, and none is needed)
-    return np.asarray((away > MOVED).any(axis=(0, 3)))
+    moves = np.zeros(true.shape[:2], np.bool_)
+    for key in keys:
+        away = np.maximum(true, key) - np.minimum(true, key)  # (8 bits: there is no sign, and none is needed)
+        for channel in np.moveaxis(away, -1, 0):
+            moves |= channel > MOVED
+    return moves
 
 
 def psnr(squared: np.ndarray, peak: float = PEAK) -> float:
@@ -88,12 +90,10 @@ def moments(made: np.ndarray, true: np.ndarray) -> Moments | None:
     """The moments of pictures [H, W] or [H, W, C]; None of those smaller than the window."""
     if min(true.shape[:2]) <= 2 * RADIUS_PX:
         return None
-    x, y = made.astype(np.float64), true.astype(np.float64)
-    mean_x, mean_y = _blurred(x), _blurred(y)
-    product, squares = mean_x * mean_y, mean_x * mean_x + mean_y * mean_y
-    # (a sum of variances may come out below 0, by rounding)
-    variances = np.maximum(_blurred(x * x + y * y) - squares, 0)
-    return Moments(product, squares, _blurred(x * y) - product, variances)
+    whole = np.empty((4, *true.shape[:2], true.size // (true.shape[0] * true.shape[1])))
+    x, y = (np.ascontiguousarray(each).reshape(whole.shape[1:]) for each in (made, true))
+    _products(x, y, whole)
+    return Moments(*map(_blurred, whole))
 
 
 def ssim(made: np.ndarray, true: np.ndarray, peak: float = PEAK, sample: bool = False) -> float:
@@ -127,9 +127,36 @@ def lowest(plane: np.ndarray, side: int = WINDOW_PX) -> Worst:
 
 
 def _blurred(plane: np.ndarray) -> np.ndarray:
-    """Means under the window, where it lies within the picture."""
+    """Means [H - 10, W - 10, C] under the window, where it lies within the picture."""
     blurred = cv2.sepFilter2D(plane, cv2.CV_64F, _WINDOW, _WINDOW, borderType=cv2.BORDER_REPLICATE)
-    return blurred[RADIUS_PX:-RADIUS_PX, RADIUS_PX:-RADIUS_PX]
+    return blurred.reshape(plane.shape)[RADIUS_PX:-RADIUS_PX, RADIUS_PX:-RADIUS_PX]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _products(made, true, out):  # type: ignore[no-untyped-def]
+    for i in range(made.shape[0]):
+        for j in range(made.shape[1]):
+            for c in range(made.shape[2]):
+                x, y = np.float64(made[i, j, c]), np.float64(true[i, j, c])
+                out[0, i, j, c], out[1, i, j, c] = x, y
+                out[2, i, j, c], out[3, i, j, c] = x * x + y * y, x * y
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _ssim(mean_x, mean_y, squares, product, peak, scale, out):  # type: ignore[no-untyped-def]
+    c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
+    channels = mean_x.shape[2]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            total = 0.0
+            for c in range(channels):
+                x, y = mean_x[i, j, c], mean_y[i, j, c]
+                # (a sum of variances may come out below 0, by rounding)
+                variances = max(squares[i, j, c] - (x * x + y * y), 0.0)
+                covariance = product[i, j, c] - x * y
+                above = (2 * x * y + c1) * (2 * scale * covariance + c2)
+                total += above / ((x * x + y * y + c1) * (scale * variances + c2))
+            out[i, j] = total / channels
 
 
 def _window() -> np.ndarray:

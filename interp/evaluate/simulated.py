@@ -1,0 +1,96 @@
+"""The event camera that looks at films, and what it and the frame camera see, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from interp.data.chance import chance
+from interp.data.sensor_ranges import SENSORS
+from vid2ev import Dvs, DvsSpec, Events, load_sensor, open_source
+from vid2ev.instants import Instant, instants
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.recipe import Recipe
+from vid2ev.sources import is_scene
+from vid2ev.toml_text import toml_value
+
+SCENE_HZ = 240.0  # of the truth of scenes, unless told otherwise
+DENSER = 4  # instants of a scene's light for each frame of the truth
+
+
+class Seen(NamedTuple):
+    """A frame of a film.
+
+    codes    sRGB, uint8 [H, W, 3]
+    t_us     its time
+    events   since the frame before
+    shot     whether a new shot has begun since then
+    """
+
+    codes: np.ndarray
+    t_us: int
+    events: Events
+    shot: bool
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The event camera that looks at films.
+
+    spec      its parameters
+    name      what they were found by
+    seed      of its noise
+    options   of `open_source`
+    """
+
+    spec: DvsSpec
+    name: str = "clean"
+    seed: int = 0
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, sensor: str | Path, overrides: Sequence[str] = (), seed: int = 0, **options: Any) -> Simulated:
+        """The sensor of a name: `clean` and `noisy` of `interp.data.sensor_ranges`, and those of `load_sensor`.
+
+        Raises UsageError, DataError.
+        """
+        if str(sensor) not in ("clean", "noisy"):
+            return cls(load_sensor(sensor, overrides), str(sensor), seed, options)
+        values = SENSORS[str(sensor)].dvs(chance(0, "sensor")).model_dump()
+        plain = [f"{key}={toml_value(value)}" for key, value in values.items()]
+        return cls(load_sensor("paper", [*plain, *overrides]), str(sensor), seed, options)
+
+    def describe(self) -> dict[str, Any]:
+        """It as JSON."""
+        return {"name": self.name, "seed": self.seed, "parameters": self.spec.model_dump(mode="json")} | self.options
+
+    def edited(self, video: str) -> dict[str, Any]:
+        """The options of `open_source` for a film."""
+        return ({"fps": SCENE_HZ} if is_scene(video) else {}) | self.options
+
+    def seen(self, video: str) -> Generator[Seen]:
+        """The frames of a film, all originals, with the events of the light of all of them and in between: those that
+        `vid2ev convert` writes."""
+        edited = self.edited(video)
+        denser = {"fps": DENSER * edited["fps"]} if is_scene(video) else {}
+        recipe = Recipe.of(video, self.spec, seed=self.seed, **(edited | denser))
+        dvs = recipe.mounts[0].dvs()
+        with closing(instants(recipe)) as light:
+            for frame in open_source(video, colour="rgb", **edited).frames():
+                yield Seen(srgb_codes(frame.light), frame.t_ns // 1000, *_until(frame.t_ns, light, dvs))
+
+
+def _until(t_ns: int, light: Iterator[Instant], dvs: Dvs) -> tuple[Events, bool]:
+    """What an event camera sends up to an instant, and whether a new shot begins before it or there."""
+    sent, shot = [Events.empty()], False
+    for instant in light:
+        sent.append(dvs.see(instant.frames[0]))
+        shot |= instant.cut
+        if instant.t_ns >= t_ns:
+            break
+    return Events.concatenate(sent), shot
