@@ -54,7 +54,9 @@ class CamerasOf:
     @property
     def _offset_us(self) -> float:
         frames, events = self._pair
-        return math.nan if frames is None or events is None else events["clock_offset_us"] - frames["clock_offset_us"]
+        if frames is None or events is None:
+            return math.nan
+        return float(events["clock_offset_us"] - frames["clock_offset_us"])
 
     def _disparity_px(self, t_us: int) -> float:
         frames, _ = self._pair

@@ -75,8 +75,11 @@ def methods_of(
 ) -> list[OfMethod]:
     """Closed forms by their names, and networks by files of weights or folders of runs; in this order.
 
-    Raises UsageError for a name that is none, DataError for a file that holds no network which rebuilds frames.
+    Raises UsageError for a name that is none and a device that is not there, DataError for a file that holds no network
+    which rebuilds frames.
     """
+    if torch.device(device).type == "cuda" and not torch.cuda.is_available():
+        raise UsageError(f"device '{device}': torch sees no GPU here; expected cpu, or a torch that sees one")
     for name in baselines:
         if name not in METHODS:
             raise UsageError(f"baseline '{name}'{nearest(name, METHODS)}: expected some of {', '.join(METHODS)}")

@@ -33,6 +33,7 @@ from vid2ev.recording.manifest import versions
 BASELINES = ("nearest", "linear", "flow", "integration", "both", "bridge")
 SUMMARY = "summary.json"
 Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
+Pages = Callable[[Path, Sequence[Row], Mapping[str, Any]], object]
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ def evaluate(
     resume: bool = False,
     device: str = "cpu",
     report: Report | None = None,
+    pages: Pages | None = None,
 ) -> Evaluation:
     """Score methods on data sets, into a folder.
 
@@ -66,6 +68,7 @@ def evaluate(
     simulated     the event camera that looks at films
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
+    pages         makes a report of the folder, the rows and the summary, once these are written
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
@@ -89,6 +92,8 @@ def evaluate(
             write_rows(folder / ROWS, rows)
             with whole_file(folder / SUMMARY) as file:
                 file.write(f"{json.dumps(summary, indent=1, allow_nan=False)}\n".encode())
+        if pages:
+            pages(folder, rows, summary)
     return Evaluation(rows, summary)
 
 

@@ -20,7 +20,10 @@ from interp.evaluate.run import evaluate
 from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
 from interp.representation.event_counts import count_events
-from vid2ev import DataError, Events, UsageError, events_of, open_source
+from vid2ev import DataError, Events, UsageError, convert, events_of, open_source
+from vid2ev.recording.manifest import read_manifest
+from vid2ev.rig.camera import Camera, Rig
+from vid2ev.scenes.source import SceneSource
 
 
 def test_groups_of_a_recording_are_its_frames_and_events(tmp_path: Path) -> None:
@@ -86,6 +89,30 @@ def test_key_frames_of_an_own_recording_are_those_of_its_frame_camera(own: Path)
     assert groups[0].cameras.exposure_us == pytest.approx(4e6 / 960, abs=2)
     assert groups[0].events.contrast.flatten().tolist() == pytest.approx(sequence.contrast)
     assert f"{begin} frames before the first key frame are not rebuilt" in recording.about()["remarks"]
+
+
+def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.npz", pictures(12))
+    here = Camera(name="cis", kind="cis", sensor="paper", set={"frame_rate_hz": 250.0, "exposure_us": 400.0})
+    there = Camera(name="dvs", kind="dvs", translation_mm=(12.0, 5.0, 0.0), clock_offset_us=500)
+    rig = Rig(cameras=(there, here))
+    convert(tmp_path / "film.npz", tmp_path / "own", rig=rig, depth="plane:2", pictures="png", preview=False)
+    focal_px = read_manifest(tmp_path / "own")["rig"]["cameras"][1]["intrinsics"]["focal_px"][0]
+    for group in Recording(tmp_path / "own", Protocol(3, 3), "own").groups():
+        assert group.cameras == (400.0, pytest.approx(focal_px * 0.013 / 2), 500.0)
+
+
+def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path) -> None:
+    camera = Camera(name="dvs", kind="dvs", translation_mm=(15.0, 0.0, 0.0))
+    still = Camera(name="cis", kind="cis", sensor="paper", set={"frame_rate_hz": 200.0, "exposure_us": 0.0})
+    scene = "scene:close-object,size=32x24"
+    convert(scene, tmp_path / "own", rig=Rig(cameras=(camera, still)), stop=0.03, pictures="png", preview=False)
+    source = open_source(scene)
+    assert isinstance(source, SceneSource)
+    (group,) = Recording(tmp_path / "own", Protocol(3, 3), "own", limit=1).groups()
+    depth_m = source.world.render(500 * int(group.times_us[[0, -1]].sum())).depth
+    expected_px = float((source.world.intrinsics.focal_px[0] * 0.015 / depth_m).mean())
+    assert expected_px > 0.1 and group.cameras.disparity_px == pytest.approx(expected_px, rel=0.1)
 
 
 def test_other_key_frames_than_the_frame_camera_has_are_named(own: Path) -> None:

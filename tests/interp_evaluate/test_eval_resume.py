@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from footage_made import pictures, write_film, write_hsergb
 
 from interp.evaluate import run
@@ -76,7 +77,9 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
 def test_a_finished_evaluation_is_left_as_it_is(
     data: Path, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    evaluate(datasets(data), tmp_path / "report", **options(data))
+    paged: list[Any] = []
+    evaluate(datasets(data), tmp_path / "report", pages=lambda *asked: paged.extend(asked), **options(data))
+    assert paged[0] == tmp_path / "report" and len(paged[1]) == 3 * 27 and "pooled" in paged[2]["methods"]["linear"]
     monkeypatch.setattr(run, "rows_of", None)
     found = evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
     assert contents(tmp_path / "report") == whole
@@ -106,7 +109,9 @@ def test_methods_can_be_added_and_other_settings_are_refused(
         evaluate(datasets(data), tmp_path / "report", resume=True, **changed)
 
 
-def test_names_and_folders_that_are_taken_are_refused(data: Path, tmp_path: Path) -> None:
+def test_names_and_folders_that_are_taken_are_refused(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "notes.txt").write_text("mine")
     with pytest.raises(UsageError, match="holds something else"):
@@ -115,5 +120,8 @@ def test_names_and_folders_that_are_taken_are_refused(data: Path, tmp_path: Path
         evaluate(datasets(data), tmp_path / "report", baselines=())
     with pytest.raises(UsageError, match="did you mean bridge"):
         evaluate(datasets(data), tmp_path / "report", baselines=["brigde"])
+    with pytest.raises(UsageError, match="torch sees no GPU"), monkeypatch.context() as patch:
+        patch.setattr(torch.cuda, "is_available", lambda: False)
+        evaluate(datasets(data), tmp_path / "report", device="cuda")
     with pytest.raises(DataError, match="no frame could be scored"):
         evaluate(datasets(data), tmp_path / "report", baselines=["linear"], protocol=Protocol(20, 20))
