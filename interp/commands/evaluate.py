@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -81,12 +84,17 @@ def evaluate(
     from interp.evaluate.run import evaluate as evaluated
     from interp.evaluate.simulated import Simulated
     from interp.evaluate.table import notes, table
-    from vid2ev.commands.progress import counting
+    from vid2ev.commands.progress import counting, heard
     from vid2ev.sources import OPTIONS
 
     edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}
     folder = Path(output or f"{_name(datasets[0])}_eval")
-    with counting(quiet or as_json, GROUPS) as report:
+    with kept(folder), heard() as check, counting(quiet or as_json, GROUPS) as shown:
+
+        def report(*told: Any) -> None:
+            check()
+            shown(*told)
+
         found = evaluated(
             datasets,
             folder,
@@ -104,6 +112,18 @@ def evaluate(
         click.echo(f"\n{folder}: {len(found.rows)} rows, {len(found.summary['sequences'])} sequences")
     for note in notes(found.summary):
         click.echo(f"note: {note}", err=True)
+
+
+@contextmanager
+def kept(folder: Path) -> Iterator[None]:
+    """Ctrl-C within says that the evaluation can be resumed."""
+    from vid2ev.commands import INTERRUPTED
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        click.echo(f"interrupted; what is done is kept in {folder}, the same command with --resume goes on", err=True)
+        sys.exit(INTERRUPTED)
 
 
 def _name(dataset: str) -> str:

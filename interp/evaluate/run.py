@@ -79,7 +79,7 @@ def evaluate(
     _check(methods)
     found = footage_of(datasets, protocol, simulated, limit)
     job = {
-        "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit,
+        "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit, "device": device,
         "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},
     }  # fmt: skip
     with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:

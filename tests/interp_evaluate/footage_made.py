@@ -48,4 +48,5 @@ def write_predictions(folder: Path, frames: np.ndarray) -> None:
 
 def write_film(path: Path, frames: np.ndarray, fps: float = 250.0) -> None:
     """A film, as an array with a rate."""
+    path.parent.mkdir(exist_ok=True)
     np.savez(path, frames=(frames / 255.0).astype(np.float32), fps=fps)
