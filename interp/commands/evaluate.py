@@ -24,7 +24,7 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 )  # fmt: skip
 @click.option(
     "--baseline", "baselines", multiple=True, metavar="NAME",
-    help="Score a closed form; may be repeated.  [default: nearest, linear, flow, integration, both, bridge]",
+    help="Score a closed form; may be repeated.  [default: nearest, linear, flow, integration, both, bridge, ramps]",
 )  # fmt: skip
 @click.option(
     "--predictions", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
@@ -80,10 +80,10 @@ def evaluate(
     of such, or scene:NAME.  Of videos frames are dropped, and an event camera is simulated that saw them all.
     """
     from interp.evaluate.protocol import Protocol
-    from interp.evaluate.run import BASELINES
     from interp.evaluate.run import evaluate as evaluated
     from interp.evaluate.simulated import Simulated
     from interp.evaluate.table import notes, table
+    from interp.methods import METHODS
     from vid2ev.commands.progress import counting, heard
     from vid2ev.sources import OPTIONS
 
@@ -98,7 +98,7 @@ def evaluate(
         found = evaluated(
             datasets,
             folder,
-            baselines=baselines or BASELINES,
+            baselines=baselines or tuple(METHODS),
             protocol=Protocol(skip, insert or skip, times, rounding),
             simulated=Simulated.of(sensor, overrides, seed, **edits),
             report=report,

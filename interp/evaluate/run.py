@@ -26,11 +26,11 @@ from interp.evaluate.sets import Found, footage_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.worst import WorstPictures
+from interp.methods import METHODS
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.manifest import versions
 
-BASELINES = ("nearest", "linear", "flow", "integration", "both", "bridge")
 SUMMARY = "summary.json"
 Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
 Pages = Callable[[Path, Sequence[Row], Mapping[str, Any]], object]
@@ -49,7 +49,7 @@ def evaluate(
     folder: str | Path,
     *,
     networks: Sequence[str | Path] = (),
-    baselines: Sequence[str] = BASELINES,
+    baselines: Sequence[str] = tuple(METHODS),
     predictions: Sequence[str | Path] = (),
     protocol: Protocol | None = None,
     simulated: Simulated | None = None,

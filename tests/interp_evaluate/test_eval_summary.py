@@ -20,6 +20,7 @@ from interp.evaluate.scoring import conditions_of, rows_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import EDGES, binned, summarised
 from interp.evaluate.worst import COUNT, worst_of
+from interp.methods import METHODS
 from interp.representation.event_counts import EventCounts
 from vid2ev import DataError, Frame
 from vid2ev.commands import Commands
@@ -136,7 +137,7 @@ def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     assert done.exit_code == 0 and done.stdout == ""
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["sensor"]["parameters"]["threshold_on"] == 0.4
-    assert list(summary["methods"]) == ["nearest", "linear", "flow", "integration", "both", "bridge"]
+    assert list(summary["methods"]) == list(METHODS)
     noisy = Simulated.of("noisy", ["shot_rate_hz=3"]).spec
     assert (noisy.threshold_on, noisy.shot_rate_hz, noisy.photoreceptor_tau_us) == (0.25, 3.0, 100.0)
     wrong = run(tmp_path / "film.npz", "-o", tmp_path / "other", "--sensor", "davis")
