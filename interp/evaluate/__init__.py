@@ -1,6 +1,7 @@
 """How good methods are: the field's protocol, and what it leaves out.
 
-    evaluation = evaluate(["recordings/"], "report", networks=["run/weights.safetensors"])
+    found = interp.evaluate.run.evaluate(["recordings/"], "report", networks=["run/weights.safetensors"])
+    found.rows, found.summary        of which a report is made, or of report/rows.csv and report/summary.json
 
 protocol         which frames are rebuilt, when, and how they are compared
 group            what is scored: sequences of groups of frames      recordings, films    where they come from

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from interp.candidates.contrast import with_fitted_contrast
-from interp.data.layouts import Sequence, open_sequence, windows
+from interp.data.layouts import Sequence, windows
 from interp.data.layouts.own import Own
 from interp.data.tensors import as_tensor
 from interp.evaluate.cameras import CamerasOf
@@ -25,15 +23,14 @@ from vid2ev.errors import DataError
 
 
 class Recording:
-    """The recording in a folder.
+    """A sequence on disk.
 
     name    by which it is called
     limit   groups that are scored, from the first on; None for all
-    Raises UsageError for a folder that is none, DataError for one that is damaged.
     """
 
-    def __init__(self, folder: Path, protocol: Protocol, name: str, limit: int | None = None):
-        self.name, self.folder, self._protocol = name, folder, protocol
+    def __init__(self, sequence: Sequence, protocol: Protocol, name: str, limit: int | None = None):
+        self.name, self._sequence, self._protocol = name, sequence, protocol
         self.multiple = multiple = protocol.multiple
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
         self._begin = self._own_keys[0] if self._own_keys else 0
@@ -44,11 +41,7 @@ class Recording:
         if left := len(found.first) - len(self._firsts):
             self._not_scored[f"beyond the limit of {limit}"] = left
         self.expected, self._scored = len(self._firsts), 0
-        self.identity: dict[str, Any] = contents(folder)
-
-    @cached_property
-    def _sequence(self) -> Sequence:
-        return open_sequence(self.folder)
+        self.identity: dict[str, Any] = contents(sequence.folder)
 
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; groups with a file that cannot be read are counted."""

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from interp.data.layouts import sequences_in
+from interp.data.layouts import Sequence as Recorded
+from interp.data.layouts import opened_in
 from interp.evaluate.films import Film
 from interp.evaluate.group import Footage
 from interp.evaluate.identity import apart, plain
@@ -30,7 +31,7 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
 
     Raises UsageError for what is none of these, or where nothing can be used.
     """
-    places, unusable = list[tuple[str, str | Path]](), dict[str, str]()
+    places, unusable = list[tuple[str, str | Recorded]](), dict[str, str]()
     for dataset in dict.fromkeys(datasets):
         found, broken = _places(dataset)
         places += [(dataset, place) for place in found]
@@ -41,7 +42,7 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
         try:
             made = _opened(place, protocol, name, simulated, limit)
         except DataError as error:
-            unusable[str(place)] = str(error)
+            unusable[place if isinstance(place, str) else str(place.folder)] = str(error)
             continue
         footage.append(made)
         sets.setdefault(plain(Path(dataset).name), []).append(name)
@@ -50,26 +51,26 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
     return Found(footage, sets, unusable)
 
 
-def _opened(place: str | Path, protocol: Protocol, name: str, simulated: Simulated, limit: int | None) -> Footage:
-    if isinstance(place, Path):
-        return Recording(place, protocol, name, limit)
-    return Film(place, protocol, name, simulated, limit)
+def _opened(place: str | Recorded, protocol: Protocol, name: str, simulated: Simulated, limit: int | None) -> Footage:
+    if isinstance(place, str):
+        return Film(place, protocol, name, simulated, limit)
+    return Recording(place, protocol, name, limit)
 
 
-def _places(dataset: str) -> tuple[list[str | Path], dict[str, str]]:
-    """Folders of recordings (paths), and films (texts)."""
+def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
+    """Recordings, or films by what they are opened with; and what cannot be used."""
     from vid2ev.commands.batch import sources_in
 
     if is_scene(dataset) or not Path(dataset).is_dir():
         return [dataset], {}
     try:
-        found, unusable = sequences_in(dataset)
+        found, unusable = opened_in(dataset)
     except UsageError:
         return [*sources_in(dataset)], {}
     return [*found], unusable
 
 
-def _called(place: str | Path) -> str:
-    if isinstance(place, Path):
-        return place.resolve().name
+def _called(place: str | Recorded) -> str:
+    if not isinstance(place, str):
+        return place.folder.resolve().name
     return place.removeprefix(SCENE_PREFIX) if is_scene(place) else Path(place).stem

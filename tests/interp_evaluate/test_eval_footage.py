@@ -11,6 +11,7 @@ from footage_made import STEP_US, pictures, write_film, write_hsergb, write_pred
 
 from interp.data.dataset import write_dataset
 from interp.data.dataset_spec import DatasetSpec
+from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
 from interp.evaluate.predictions import predictions_in
@@ -29,7 +30,7 @@ from vid2ev.scenes.source import SceneSource
 def test_groups_of_a_recording_are_its_frames_and_events(tmp_path: Path) -> None:
     frames = pictures(10)
     write_hsergb(tmp_path / "seq", frames)
-    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
     groups = list(recording.groups())
     assert [(group.number, group.first, group.gap_us) for group in groups] == [(0, 0, 4 * STEP_US), (1, 4, 4 * STEP_US)]
     np.testing.assert_array_equal(groups[1].keys, frames[[4, 8]])
@@ -62,7 +63,7 @@ def test_what_cannot_be_scored_is_named_and_counted(tmp_path: Path) -> None:
 
 def test_a_limit_says_what_it_leaves_out(tmp_path: Path) -> None:
     write_hsergb(tmp_path / "seq", pictures(17))
-    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq", limit=1)
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq", limit=1)
     assert [group.number for group in recording.groups()] == [0]
     assert recording.about()["not_scored"] == {"beyond the limit of 1": 3}
 
@@ -79,7 +80,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_key_frames_of_an_own_recording_are_those_of_its_frame_camera(own: Path) -> None:
-    recording, sequence = Recording(own, Protocol(31, 31), "own"), Own(own)
+    recording, sequence = Recording(open_sequence(own), Protocol(31, 31), "own"), Own(own)
     groups = list(recording.groups())
     begin = sequence.key_frames[0]
     assert begin > 0 and [group.first for group in groups] == [begin, begin + 32]
@@ -98,7 +99,7 @@ def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Pa
     rig = Rig(cameras=(there, here))
     convert(tmp_path / "film.npz", tmp_path / "own", rig=rig, depth="plane:2", pictures="png", preview=False)
     focal_px = read_manifest(tmp_path / "own")["rig"]["cameras"][1]["intrinsics"]["focal_px"][0]
-    for group in Recording(tmp_path / "own", Protocol(3, 3), "own").groups():
+    for group in Recording(open_sequence(tmp_path / "own"), Protocol(3, 3), "own").groups():
         assert group.cameras == (400.0, pytest.approx(focal_px * 0.013 / 2), 500.0)
 
 
@@ -109,14 +110,14 @@ def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path) -> None:
     convert(scene, tmp_path / "own", rig=Rig(cameras=(camera, still)), stop=0.03, pictures="png", preview=False)
     source = open_source(scene)
     assert isinstance(source, SceneSource)
-    (group,) = Recording(tmp_path / "own", Protocol(3, 3), "own", limit=1).groups()
+    (group,) = Recording(open_sequence(tmp_path / "own"), Protocol(3, 3), "own", limit=1).groups()
     depth_m = source.world.render(500 * int(group.times_us[[0, -1]].sum())).depth
     expected_px = float((source.world.intrinsics.focal_px[0] * 0.015 / depth_m).mean())
     assert expected_px > 0.1 and group.cameras.disparity_px == pytest.approx(expected_px, rel=0.1)
 
 
 def test_other_key_frames_than_the_frame_camera_has_are_named(own: Path) -> None:
-    remarks = Recording(own, Protocol(15, 15), "own").about()["remarks"]
+    remarks = Recording(open_sequence(own), Protocol(15, 15), "own").about()["remarks"]
     assert any("2 of 8 key frames" not in each and "--skip 31 takes its own" in each for each in remarks)
 
 
@@ -189,7 +190,7 @@ def test_predictions_are_paired_by_position(tmp_path: Path, with_keys: bool) -> 
         write_predictions(tmp_path / "results" / "seq" / method, truth[kept])
     found = predictions_in(tmp_path / "results")
     assert [each.name for each in found] == ["ours", "theirs"]
-    recording = Recording(tmp_path / "seq", Protocol(3, 3), "seq")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
     for group in recording.groups():
         np.testing.assert_array_equal(np.stack(found[0].begin(recording).frames(group)), group.truth)
 

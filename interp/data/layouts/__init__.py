@@ -12,7 +12,7 @@ from interp.data.layouts.own import MANIFEST, Own
 from interp.data.layouts.sequence import Placed, Sequence, Windows, windows
 from vid2ev.errors import DataError, UsageError
 
-__all__ = ["Placed", "Sequence", "Windows", "open_sequence", "sequences_in", "windows"]
+__all__ = ["Placed", "Sequence", "Windows", "open_sequence", "opened_in", "sequences_in", "windows"]
 
 DEEPEST = 5  # folders below the one that is given
 
@@ -33,14 +33,21 @@ def sequences_in(folder: str | Path) -> tuple[list[Path], dict[str, str]]:
 
     Raises UsageError where there are none.
     """
-    found, unusable = list[Path](), dict[str, str]()
+    found, unusable = opened_in(folder)
+    return [sequence.folder for sequence in found], unusable
+
+
+def opened_in(folder: str | Path) -> tuple[list[Sequence], dict[str, str]]:
+    """The sequences in a folder and below it, in order, and the folders that cannot be used, with the reason.
+
+    Raises UsageError where there are none.
+    """
+    found, unusable = list[Sequence](), dict[str, str]()
     for path in _below(Path(folder), DEEPEST):
         try:
-            open_sequence(path)
+            found.append(open_sequence(path))
         except DataError as error:
             unusable[str(path)] = str(error)
-        else:
-            found.append(path)
     if not found and not unusable:
         raise UsageError(f"{folder}: no recordings in it; expected some of vid2ev, HS-ERGB or BS-ERGB")
     return found, unusable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -30,6 +31,7 @@ class Sequence(Protocol):
     """Frames and events on one clock.
 
     name         of its folder
+    folder       where it is
     size         width and height of the frames [px]
     event_size   the same of the event camera
     times_us     when the frames were taken, int64; not always increasing in files of the field
@@ -38,6 +40,7 @@ class Sequence(Protocol):
     """
 
     name: str
+    folder: Path
     size: tuple[int, int]
     event_size: tuple[int, int]
     times_us: np.ndarray
