@@ -1,0 +1,149 @@
+"""What a report says, in its order: the answer, where it holds and breaks, beside the paper, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from interp.evaluate.report.about import About
+from interp.evaluate.report.beside_paper import comparison_table, quality_table
+from interp.evaluate.report.blocks import Block, Cell, Document, Items, Line, Plot, Section, Table, Text
+from interp.evaluate.report.conditions import varying
+from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
+from interp.evaluate.report.mean_plots import condition_plot, position_plot
+from interp.evaluate.report.numbers import PSNR_DIGITS, SCORES, SSIM_DIGITS, number, spread
+from interp.evaluate.report.overview import (
+    by_method,
+    condition_table,
+    full_scale_table,
+    position_table,
+    protocol_table,
+    sequence_table,
+)
+from interp.evaluate.report.worst import WorstFrame, worst_blocks
+from interp.evaluate.row import Row
+from interp.evaluate.tables import pooled, split
+
+TITLE = "How well the frames between were rebuilt"
+FROM_TRUTH = (
+    "The events were simulated from video that passes exactly through the frames that are scored. That is kinder to"
+    " every method that uses events than a real recording is, to those that add them up most of all."
+)
+
+
+def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()) -> Document:
+    """The report of rows.  Evaluations of several gaps get a chapter for each."""
+    opening: list[Block] = [Text(FROM_TRUTH, warning=True)] if about.get("events_from_truth") else []
+    gaps = split(rows, lambda row: row.multiple)
+    opening += [Text(_answer(gaps[multiple])) for multiple in sorted(gaps)]
+    if not rows:
+        opening.append(Text("No frame was scored.", warning=True))
+    sections = [
+        Section(f"{title}, {multiple - 1} frames skipped" if len(gaps) > 1 else title, tuple(blocks))
+        for multiple in sorted(gaps)
+        for title, blocks in _chapter(gaps[multiple]).items()
+    ]
+    if worst:
+        sections.append(Section("The worst frames", tuple(worst_blocks(worst))))
+    sections += _of_the_evaluation(rows, about)
+    return Document(about.get("title", TITLE), tuple(opening), tuple(sections))
+
+
+def _answer(rows: Sequence[Row]) -> str:
+    """The best method and the second, in one sentence."""
+    means = {method: pooled(part, "psnr") for method, part in by_method(rows).items()}
+    ordered = sorted((name for name in means if means[name].count), key=lambda name: -means[name].mean)
+    frames = len({(row.sequence, row.group, row.position) for row in rows})
+    sequences = len({row.sequence for row in rows})
+    said = (
+        f"{_many(frames, 'frame')} of {_many(sequences, 'sequence')}, {rows[0].multiple - 1} skipped between key frames"
+    )
+    if not ordered:
+        return f"{said}; no score is known."
+    best, *others = ordered
+    ssim = pooled(by_method(rows)[best], "ssim")
+    said += f": {best} has {spread(means[best], PSNR_DIGITS)} dB and SSIM {spread(ssim, SSIM_DIGITS)}"
+    return f"{said}, {others[0]} {spread(means[others[0]], PSNR_DIGITS)} dB." if others else f"{said}."
+
+
+def _chapter(rows: Sequence[Row]) -> dict[str, list[Block]]:
+    conditions = varying(rows)
+    chapter: dict[str, list[Block]] = {
+        "All methods": [protocol_table(rows), full_scale_table(rows), *_uneven(rows)],
+        "By sequence": [
+            *_drawn(distribution_plot(rows), "PSNR of the frames of each sequence: middle half, all but 5 % on either"
+                    " side, median."),
+            *(sequence_table(rows, field, name) for field, name in SCORES.items()),
+        ],
+        "Between the key frames": [
+            *_drawn(position_plot(rows), "Mean score at each place in the gap."),
+            *(position_table(rows, field, name) for field, name in SCORES.items()),
+        ],
+        "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
+    }  # fmt: skip
+    for condition, edges in conditions:
+        caption = f"Mean score in bins of {condition.axis} [{condition.unit}]; below, how many frames are in each."
+        if condition.limit is not None:
+            caption += f" The line at {condition.limit:g} is where the paper's network ends."
+        chapter[f"Against {condition.title}"] = [
+            *_drawn(condition_plot(rows, condition, edges), caption),
+            *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
+        ]
+    chapter["Beside the paper"] = [quality_table(rows), comparison_table(rows)]
+    return {title: blocks for title, blocks in chapter.items() if blocks}
+
+
+def _uneven(rows: Sequence[Row]) -> Iterator[Block]:
+    """Means over different frames cannot be compared: then the same over the frames that all methods have."""
+    parts = {
+        method: {(row.sequence, row.group, row.position): row for row in part}
+        for method, part in by_method(rows).items()
+    }
+    common = set.intersection(*map(set, parts.values()))
+    if all(set(part) == common for part in parts.values()):
+        return
+    yield Text(f"Not all methods have scores of all frames; {_many(len(common), 'frame')} have those of all.", True)
+    if common:
+        yield Table(
+            ("method", "PSNR, pooled", "SSIM, pooled"),
+            tuple(_common_line(method, [part[key] for key in sorted(common)]) for method, part in parts.items()),
+            "Over the frames that all methods have",
+        )
+
+
+def _common_line(method: str, rows: Sequence[Row]) -> Line:
+    psnr, ssim = pooled(rows, "psnr"), pooled(rows, "ssim")
+    return Line(method, (Cell(spread(psnr, PSNR_DIGITS)), Cell(spread(ssim, SSIM_DIGITS))))
+
+
+def _drawn(svg: str | None, caption: str) -> list[Block]:
+    return [] if svg is None else [Plot(svg, caption)]
+
+
+def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
+    left_out = dict(about.get("not_scored", {}))
+    unknown = len({(row.sequence, row.method, row.group, row.position) for row in rows if row.psnr != row.psnr})
+    if unknown:
+        left_out["rebuilt, but without a PSNR"] = unknown
+    blocks: list[Block] = []
+    if left_out:
+        lines = tuple(Line(reason, (Cell(f"{count:,}"),)) for reason, count in left_out.items())
+        blocks.append(Table(("reason", "number"), lines))
+    if about.get("remarks"):
+        blocks.append(Items(tuple(about["remarks"])))
+    yield Section("What was not scored", tuple(blocks or [Text("Nothing was left out.")]))
+    for title, facts in (("Settings", about.get("settings")), ("Versions", about.get("versions"))):
+        if facts:
+            lines = tuple(Line(name, (Cell(_value(value)),)) for name, value in facts.items())
+            yield Section(title, (Table(("", ""), lines),))
+
+
+def _value(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_value, value))
+    return str(value)
+
+
+def _many(count: int, name: str) -> str:
+    return f"{number(count, 0)} {name}{'s' * (count != 1)}"

@@ -1,0 +1,91 @@
+"""Mean scores as plots: at each place in the gap, and against a condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from interp.evaluate.report.conditions import Condition
+from interp.evaluate.report.drawing import SOFT, WIDTH_IN, figure, legend, look, styles, svg_of
+from interp.evaluate.report.numbers import SCORES
+from interp.evaluate.report.overview import best_method, by_method
+from interp.evaluate.row import Row
+from interp.evaluate.tables import Bin, binned, by_position
+
+WIDE = 20.0  # a condition's largest value over its smallest edge above 0, from which on its axis is logarithmic
+NUMBERS_SHARE = 0.12  # of a panel's height, at its foot, for how many frames there are
+
+
+def position_plot(rows: Sequence[Row]) -> str | None:
+    """Mean scores at each place in the gap, or None where there is one place only."""
+    if len({row.position for row in rows}) < 2:
+        return None
+    parts, multiple = by_method(rows), rows[0].multiple
+    with look():
+        made, panels = _two_panels()
+        drawn = styles(list(parts), best_method(rows))
+        for field, axes in panels.items():
+            for method, part in parts.items():
+                found = by_position(part, field)
+                axes.plot(list(found), [mean.mean for mean in found.values()], label=method, **drawn[method])
+            axes.set_xlabel(f"place in the gap, of {multiple}")
+            axes.xaxis.get_major_locator().set_params(integer=True)
+        legend(made, panels["psnr"])
+        return svg_of(made, f"position-{multiple}", "Scores at each place in the gap")
+
+
+def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[float]) -> str | None:
+    """Mean scores against a condition, and how many frames they are of; None without any."""
+    parts, multiple = by_method(rows), rows[0].multiple
+    found = {
+        field: {method: binned(part, condition.field, field, edges) for method, part in parts.items()}
+        for field in SCORES
+    }
+    if not any(any(bins.values()) for bins in found.values()):
+        return None
+    with look():
+        made, panels = _two_panels()
+        for field, axes in panels.items():
+            for method, style in styles(list(parts), best_method(rows)).items():
+                bins = found[field][method]
+                axes.plot([one.at for one in bins], [one.score.mean for one in bins], label=method, **style)
+            _scale(axes, edges, condition)
+            _count(axes, max(found[field].values(), key=len))
+        legend(made, panels["psnr"])
+        return svg_of(made, f"{condition.field}-{multiple}", f"Scores against {condition.title}")
+
+
+def _two_panels() -> tuple[Any, dict[str, Any]]:
+    made = figure(WIDTH_IN, 3.1)
+    panels = dict(zip(SCORES, made.subplots(1, 2), strict=True))
+    for field, axes in panels.items():
+        axes.set_title(SCORES[field])
+    return made, panels
+
+
+def _scale(axes: Any, edges: Sequence[float], condition: Condition) -> None:
+    axes.set_xlabel(f"{condition.axis} [{condition.unit}]")
+    positive = [edge for edge in edges if edge > 0]
+    if min(edges) >= 0 and positive and max(edges) / positive[0] >= WIDE:
+        axes.set_xscale("symlog", linthresh=positive[0], linscale=0.5)
+        axes.set_xlim(left=0)
+        marks = [edge for edge in edges if f"{edge:e}"[0] in "015"]
+        axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    left, right = axes.get_xlim()
+    if condition.limit is not None and left < condition.limit < right:
+        axes.axvline(condition.limit, color=SOFT, linewidth=0.8, linestyle=":")
+        axes.annotate(
+            f"paper: {condition.limit:g}", (condition.limit, 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
+            textcoords="offset points", fontsize=7, ha="center", va="bottom", color=SOFT,
+        )  # fmt: skip
+
+
+def _count(axes: Any, bins: Sequence[Bin]) -> None:
+    """How many frames each mean is of, at the foot of the panel."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - NUMBERS_SHARE * (high - low), high)
+    for one in bins:
+        axes.annotate(
+            f"{one.score.count}", (one.at, 0), xycoords=("data", "axes fraction"), xytext=(0, 3), ha="center",
+            textcoords="offset points", fontsize=7, color=SOFT,
+        )  # fmt: skip

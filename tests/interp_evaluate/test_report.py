@@ -1,0 +1,195 @@
+"""The report says what the rows say, in Markdown and in a page that loads nothing and takes names as they are."""
+
+from __future__ import annotations
+
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from scored import METHODS, SEQUENCES, row, scored
+
+from interp.evaluate.published import of_gap
+from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_report
+from interp.evaluate.report.conditions import varying
+from interp.evaluate.report.content import FROM_TRUTH, document
+from interp.evaluate.report.markdown import escaped, markdown
+from interp.evaluate.row import Row
+from vid2ev.errors import DataError
+
+ABOUT: About = {
+    "settings": {"skip": 7, "methods": ["bridge", "flow"]},
+    "not_scored": {"the events end before the last frame": 14},
+    "remarks": ["31 events were beyond the sensor."],
+    "versions": {"vid2ev": "0.1.0"},
+    "events_from_truth": True,
+}
+ROWS = scored(groups=3)
+NASTY = "<script>alert(1)</script>"
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Checked(HTMLParser):
+    """Elements open and close in order; ids are unique; what is loaded is collected, and so is the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.loads: list[str] = []
+        self.links: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.ids += [given["id"] or ""] if "id" in given else []
+        self.loads += [given[name] or "" for name in ("src", "srcset", "data", "xlink:href") if name in given]
+        (self.links if tag in ("a", "use") else self.loads).extend([given["href"] or ""] if "href" in given else [])
+        assert tag != "script" and not any(name.startswith("on") for name in given)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.handle_endtag(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def checked(text: str) -> Checked:
+    page = Checked()
+    page.feed(text)
+    page.close()
+    assert page.open == [] and len(page.ids) == len(set(page.ids))
+    assert all(link.startswith("#") and link[1:] in page.ids for link in page.links)
+    assert all(load.startswith("data:image/png;base64,") for load in page.loads)
+    assert "http" not in text.replace("http-equiv", "") and "@import" not in text
+    assert set(re.findall(r"url\((.)", text)) <= {"#"}
+    return page
+
+
+def written(folder: Path, rows: list[Row], about: About | None = None, **more: object) -> tuple[str, str]:
+    write_report(folder, rows, about or {}, **more)  # type: ignore[arg-type]
+    return tuple((folder / name).read_text(encoding="utf-8") for name in (MARKDOWN, PAGE))  # type: ignore[return-value]
+
+
+def test_a_report_of_everything(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (170, 210, 3)).astype(np.uint8)
+    text, page = written(tmp_path, ROWS, ABOUT, worst=[WorstFrame(ROWS[0], picture, picture[::-1].copy())])
+    seen = checked(page)
+    assert len(seen.loads) == 1, "the worst frame"
+    for said in (*METHODS, *SEQUENCES, FROM_TRUTH, "the events end before the last frame", "31 events", "vid2ev"):
+        assert said in seen.text and said in text
+    assert "PSNR of each frame over time" in page and page.count("<svg") == 3 + len(varying(ROWS))
+    assert sorted(file.name for file in tmp_path.iterdir()) == [PAGE, MARKDOWN]
+
+
+def test_numbers_are_those_of_the_rows(tmp_path: Path) -> None:
+    text, page = written(tmp_path, ROWS)
+    for method in METHODS:
+        scores = np.array([one.psnr for one in ROWS if one.method == method])
+        shown = f"{scores.mean():.2f} ± {scores.std():.2f}"
+        assert shown in text and shown in checked(page).text
+        least = min(one.patch_psnr for one in ROWS if one.method == method)
+        assert f" {least:.2f} " in text.replace("*", "")
+    assert re.search(r"\| rrin_events_light \| 105 \| \*\*[\d.]+ ± [\d.]+\*\*", text), "the best is marked"
+
+
+def test_drawings_are_well_formed_and_take_the_colours_of_the_page(tmp_path: Path) -> None:
+    page = written(tmp_path, ROWS)[1]
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    for drawing in drawings:
+        ElementTree.fromstring(drawing)
+        assert "var(--accent)" in drawing and "var(--ink)" in drawing and "var(--letters)" in drawing
+        colours = set(re.findall(r"(?:fill|stroke): ?(#\w+)", drawing))
+        assert not colours, "colours that are the same by day and by night"
+    style = page[page.index("<style>") : page.index("</style>")]
+    for variable in set(re.findall(r"var\((--\w+)\)", page)):
+        assert f"{variable}:" in style
+
+
+@pytest.mark.parametrize(
+    "name", [NASTY, "a|b `c` *d* [e](f)", "$\\frac{1}{2}$", "街 & <b>", 'x" onload="y', "-->", "__init__"]
+)
+def test_names_mean_themselves(tmp_path: Path, name: str) -> None:
+    rows = [
+        row(sequence=name, method=method, position=p, psnr=30.0 + p, ssim=0.9, t_us=p, motion_px=10.0 * p)
+        for method in (name, "bridge")
+        for p in (1, 2, 3)
+    ]
+    text, page = written(tmp_path, rows, {"title": name, "settings": {name: name}, "not_scored": {name: 1}})
+    seen = checked(page)
+    assert seen.text.count(name) > 10
+    assert "<script" not in page and "<script" not in text and "<b>" not in text
+    widths = {
+        len(re.findall(r"(?<!\\)\|", line)) for line in text.splitlines() if line.startswith(f"| {escaped(name)}")
+    }
+    assert widths and max(widths) < 12
+    for line, following in zip(text.splitlines(), text.splitlines()[1:], strict=False):
+        if line.startswith("|") and following.startswith("|"):
+            assert len(re.findall(r"(?<!\\)\|", line)) == len(re.findall(r"(?<!\\)\|", following))
+
+
+def test_nothing_scored(tmp_path: Path) -> None:
+    text, page = written(tmp_path, [], {"not_scored": {"no events": 3}})
+    assert "No frame was scored." in text and "| no events | 3 |" in text
+    assert "No frame was scored." in checked(page).text and "<svg" not in page
+    assert "Nothing was left out." in written(tmp_path, [])[0]
+
+
+@pytest.mark.parametrize("known", [{}, {"psnr": 30.0, "ssim": 0.9}, {"psnr": math.inf, "ssim": 1.0}])
+def test_a_single_frame(tmp_path: Path, known: dict[str, float]) -> None:
+    text, page = written(tmp_path, [row(**known)])
+    checked(page)
+    assert "1 frame of 1 sequence" in text and "nan" not in text.lower()
+    assert ("–" in text) and ("∞" in text) == math.isinf(known.get("psnr", 0.0))
+
+
+def test_a_column_that_is_not_known_is_not_drawn() -> None:
+    rows = [row(position=p, psnr=30.0, ssim=0.9, motion_px=m, blur_px=2.0) for p, m in ((1, 1.0), (2, 2.0))]
+    assert [condition.field for condition, _ in varying(rows)] == ["motion_px"]
+    assert [s.title for s in document(rows, {}).sections if s.title.startswith("Against")] == [
+        "Against motion between the key frames"
+    ]
+
+
+def test_published_rows_are_of_the_same_gap_and_said_to_be_of_other_data() -> None:
+    for multiple, first in ((8, "HS-ERGB"), (6, "HS-ERGB far"), (16, "GoPro"), (32, None)):
+        said = markdown(document([row(multiple=multiple, psnr=30.0, ssim=0.9)], {}))
+        quoted = of_gap(multiple - 1)
+        assert (quoted[0].data if quoted else None) == first
+        assert said.count("published, other data") == 2 + len(quoted)
+        assert all(f"*{published.psnr}*" in said for published in quoted)
+    assert "*32.207 ± 7.18*" in markdown(document([row(multiple=8, psnr=30.0)], {})), "as it is given"
+
+
+def test_methods_with_other_frames_are_compared_over_those_that_all_have() -> None:
+    rows = [row(method="a", position=p, psnr=20.0 + p, ssim=0.9) for p in (1, 2, 3)]
+    rows += [row(method="b", position=p, psnr=30.0, ssim=0.9) for p in (1, 2)]
+    said = markdown(document(rows, {}))
+    assert "2 frames have those of all" in said and "| a | 21.50 ± 0.50 |" in said
+    assert "have those of all" not in markdown(document(rows[:3], {}))
+
+
+def test_gaps_of_two_lengths_have_chapters_of_their_own(tmp_path: Path) -> None:
+    text, page = written(tmp_path, scored(groups=2) + scored(groups=2, multiple=4))
+    checked(page)
+    assert "## All methods, 3 frames skipped" in text and "## All methods, 7 frames skipped" in text
+
+
+def test_the_same_rows_make_the_same_bytes(tmp_path: Path) -> None:
+    assert written(tmp_path / "a", ROWS, ABOUT) == written(tmp_path / "b", ROWS, ABOUT)
+
+
+def test_a_folder_that_cannot_be_written_is_said_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DataError, match="cannot be written"):
+        write_report(tmp_path / "file", [row()], {})
