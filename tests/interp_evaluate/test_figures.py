@@ -130,6 +130,16 @@ def test_the_worst_patch_is_shown_larger() -> None:
     assert (patches[:, :198] == 100).all() and (patches[:, 198 + GAP_PX : 2 * 198 + GAP_PX] == 180).all()
 
 
+def test_a_map_of_similarity_is_one_column_more() -> None:
+    truth, map_ = plain(100, 120, 160), np.full((120, 160), np.nan)
+    map_[5:-5, 5:-5] = 1.0
+    without, made = worst_patch.panel(truth, truth, (0, 0)), worst_patch.panel(truth, truth, (0, 0), map_)
+    assert made.shape[0] == without.shape[0] and made.shape[1] > without.shape[1] + worst_patch.WIDTH_PX
+    assert (made[:, : without.shape[1]] == without).all()
+    with pytest.raises(UsageError, match="as large as the pictures"):
+        worst_patch.panel(truth, truth, (0, 0), map_[5:-5, 5:-5])
+
+
 def test_a_picture_smaller_than_a_patch_is_its_own() -> None:
     assert worst_patch.panel(plain(10), plain(20), (0, 0), width=64).dtype == np.uint8
 

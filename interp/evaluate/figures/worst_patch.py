@@ -1,4 +1,4 @@
-"""A frame that went wrong: truth, rebuilt, the error, and the worst patch of both, larger (the paper's Fig. 13)."""
+"""A frame that went wrong: truth, rebuilt, maps of the error, the worst patch of each (the paper's Fig. 13)."""
 
 from __future__ import annotations
 
@@ -11,38 +11,54 @@ from interp.evaluate.figures.heat_map import panel as heat_map
 from interp.evaluate.figures.layout import below, beside, cut, framed, resized, titled
 from interp.evaluate.figures.lettering import strip
 from interp.evaluate.figures.png import write_png
+from vid2ev.errors import UsageError
 
 PATCH_PX = 99
 WIDTH_PX = 3 * PATCH_PX  # of each picture
 
 
-def panel(truth: np.ndarray, rebuilt: np.ndarray, corner: tuple[int, int], width: int = WIDTH_PX) -> np.ndarray:
-    """Two pictures and their error, and below it the patch of 99x99 pixels at a corner (left, top); uint8 [H, W, 3].
+def panel(
+    truth: np.ndarray,
+    rebuilt: np.ndarray,
+    corner: tuple[int, int],
+    similarity: np.ndarray | None = None,
+    width: int = WIDTH_PX,
+) -> np.ndarray:
+    """Two pictures and their error, and below them the patch of 99x99 pixels at a corner (left, top); uint8 [H, W, 3].
 
-    Pictures are uint8 [H, W, 3] of one size; each column is so wide.  Where they are smaller than a patch, the patch
-    is as wide or as high as they are.  Raises UsageError.
+    Pictures are uint8 [H, W, 3] of one size; `similarity` is their map of SSIM [H, W], NaN where there is none.  Each
+    column is `width` wide.  Where pictures are smaller than a patch, the patch is as wide or as high as they are.
+    Raises UsageError for sizes that differ, and for a patch outside.
     """
     errors = error_codes(truth, rebuilt)
-    high, wide = truth.shape[:2]
+    high, wide = errors.shape
     box = (*corner, min(PATCH_PX, wide), min(PATCH_PX, high))
-    tall = max(1, round(high * width / wide))
-    pictures = {"truth": truth, "rebuilt": rebuilt}
-    wholes = [_named(name, framed(one, box, width, tall)) for name, one in pictures.items()]
-    tall_patch = max(1, round(box[3] * width / box[2]))
-    patches = [
-        _named(f"{name}, worst patch", resized(cut(one, box), width, tall_patch)) for name, one in pictures.items()
-    ]
-    top = top_of(errors)
-    maps = [
-        _named(name, heat_map(resized(values, width, height), high=top))
-        for name, values, height in (("error", errors, tall), ("error of the patch", cut(errors, box), tall_patch))
-    ]
-    return below([beside([*wholes, maps[0]]), beside([*patches, maps[1]])])
+    maps = [("error", errors, {"high": top_of(errors)})]
+    if similarity is not None:
+        if similarity.shape != errors.shape:
+            raise UsageError(
+                f"SSIM {list(similarity.shape)}: expected a map [{high}, {wide}], as large as the pictures"
+            )
+        maps.append(("SSIM", similarity, {"low": 1.0, "high": 0.0}))
+    tall, tall_patch = max(1, round(high * width / wide)), max(1, round(box[3] * width / box[2]))
+    above, patches = [], []
+    for name, picture in (("truth", truth), ("rebuilt", rebuilt)):
+        above.append(_named(name, framed(picture, box, width, tall)))
+        patches.append(_named(f"{name}, worst patch", resized(cut(picture, box), width, tall_patch)))
+    for name, values, scale in maps:
+        unit = "codes" if name == "error" else ""
+        above.append(_named(name, heat_map(resized(values, width, tall), unit=unit, **scale)))
+        patches.append(
+            _named(f"{name} there", heat_map(resized(cut(values, box), width, tall_patch), unit=unit, **scale))
+        )
+    return below([beside(above), beside(patches)])
 
 
-def write_worst_patch(path: Path, truth: np.ndarray, rebuilt: np.ndarray, corner: tuple[int, int]) -> None:
-    """Write a panel as a PNG file; raises DataError."""
-    write_png(path, panel(truth, rebuilt, corner))
+def write_worst_patch(
+    path: Path, truth: np.ndarray, rebuilt: np.ndarray, corner: tuple[int, int], similarity: np.ndarray | None = None
+) -> None:
+    """Write a panel as a PNG file; raises DataError, and UsageError as `panel`."""
+    write_png(path, panel(truth, rebuilt, corner, similarity))
 
 
 def _named(name: str, picture: np.ndarray) -> np.ndarray:

@@ -52,6 +52,7 @@ def comparison_table(rows: Sequence[Row]) -> Table:
         "In the form of the paper's Table III",
         f"{skipped} frames skipped. Quoted rows are of other recordings and cameras, those of GoPro by a PSNR that may"
         " be another; they say what kind of number to expect, and nothing about which method is better.",
+        words=2,
     )
 
 

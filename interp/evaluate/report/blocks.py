@@ -24,13 +24,17 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """`head` names the column of names and those of cells.  `folded` tables have a plot that says the same."""
+    """`head` names the column of names and those of cells.  `folded` tables have a plot that says the same.
+
+    `words` is how many columns hold words, from the left, and not numbers.
+    """
 
     head: tuple[str, ...]
     lines: tuple[Line, ...]
     title: str = ""
     note: str = ""
     folded: bool = False
+    words: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +73,16 @@ Block = Table | Text | Items | Plot | Picture
 
 @dataclass(frozen=True, slots=True)
 class Section:
+    """What is said under one heading."""
+
     title: str
     blocks: tuple[Block, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Document:
+    """A report: what comes first, and the sections."""
+
     title: str
     opening: tuple[Block, ...]
     sections: tuple[Section, ...]

@@ -134,7 +134,7 @@ def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
     for title, facts in (("Settings", about.get("settings")), ("Versions", about.get("versions"))):
         if facts:
             lines = tuple(Line(name, (Cell(_value(value)),)) for name, value in facts.items())
-            yield Section(title, (Table(("", ""), lines),))
+            yield Section(title, (Table(("", ""), lines, words=2),))
 
 
 def _value(value: object) -> str:

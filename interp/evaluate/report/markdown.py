@@ -41,7 +41,7 @@ def _blocks(blocks: tuple[Block, ...]) -> Iterator[str]:
 def _table(table: Table) -> Iterator[str]:
     if table.title:
         yield f"### {escaped(table.title)}"
-    sides = ["---", *("--:" for _ in table.head[1:])]
+    sides = ["---" if k < table.words else "--:" for k in range(len(table.head))]
     lines = [map(escaped, table.head), sides, *map(_line, table.lines)]
     yield "\n".join(f"| {' | '.join(line)} |" for line in lines)
     if table.note:

@@ -58,17 +58,21 @@ def _written(blocks: tuple[Block, ...]) -> Iterator[str]:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in table.head)
+    head = "".join(f'<th scope="col"{_kind(k < table.words)}>{escape(name)}</th>' for k, name in enumerate(table.head))
     headed = f"<thead><tr>{head}</tr></thead>" if any(table.head) else ""
-    lines = "\n".join(map(_line, table.lines))
+    lines = "\n".join(_line(line, table.words) for line in table.lines)
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     return f'<div class="wide"><table>{headed}<tbody>\n{lines}\n</tbody></table></div>{note}'
 
 
-def _line(line: Line) -> str:
+def _line(line: Line, words: int) -> str:
     cells = "".join(
-        f'<td class="best">{escape(cell.text)}</td>' if cell.best else f"<td>{escape(cell.text)}</td>"
-        for cell in line.cells
+        f"<td{_kind(k < words, cell.best)}>{escape(cell.text)}</td>" for k, cell in enumerate(line.cells, start=1)
     )
     kind = ' class="published"' if line.published else ""
     return f'<tr{kind}><th scope="row">{escape(line.name)}</th>{cells}</tr>'
+
+
+def _kind(words: bool, best: bool = False) -> str:
+    names = ["words"] * words + ["best"] * best
+    return f' class="{" ".join(names)}"' if names else ""

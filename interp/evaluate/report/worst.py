@@ -17,18 +17,20 @@ from interp.evaluate.row import Row
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstFrame:
-    """A frame to be looked at: its row, and truth and rebuilt frame, R'G'B' uint8 [H, W, 3]."""
+    """A frame to be looked at: its row, truth and rebuilt frame, R'G'B' uint8 [H, W, 3], and its map of SSIM [H, W],
+    if it is to be shown, NaN where there is none."""
 
     row: Row
     truth: np.ndarray
     rebuilt: np.ndarray
+    similarity: np.ndarray | None = None
 
 
 def worst_blocks(worst: Sequence[WorstFrame]) -> Iterator[Block]:
     """A picture for each frame."""
     for frame in worst:
         row = frame.row
-        picture = panel(frame.truth, frame.rebuilt, (row.patch_x, row.patch_y))
+        picture = panel(frame.truth, frame.rebuilt, (row.patch_x, row.patch_y), frame.similarity)
         rms = float(np.sqrt((error_codes(frame.truth, frame.rebuilt) ** 2).mean()))
         yield Picture(
             encoded(picture),
