@@ -133,6 +133,11 @@ def binned(rows: Sequence[Row], condition: str, field: str, edges: Sequence[floa
     ]
 
 
+def breaks_at(bins: Sequence[Bin], drop: float) -> Bin | None:
+    """The first bin whose mean is more than `drop` below that of the lowest bin; None if there is none."""
+    return next((one for one in bins if one.score.mean < bins[0].score.mean - drop), None)
+
+
 def _round_up(step: float) -> float:
     """The next 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(step))

@@ -10,6 +10,7 @@ from scored import NAN, row, scored
 
 from interp.evaluate.tables import (
     binned,
+    breaks_at,
     by_position,
     edges_of,
     least,
@@ -69,6 +70,14 @@ def test_bins_by_hand() -> None:
     low, high = binned(HAND, "motion_px", "psnr", [0, 1, 2])
     assert (low.low, low.high, low.at, low.score.mean, low.score.count) == (0, 1, 0.0, 30.0, 1)
     assert (high.low, high.high, high.at, high.score.mean) == (1, 2, 1.5, 27.0)
+
+
+def test_where_scores_break_down() -> None:
+    rows = [row(motion_px=float(at), psnr=psnr) for at, psnr in ((1, 30.0), (2, 31.0), (3, 27.5), (4, 26.5), (5, 20.0))]
+    bins = binned(rows, "motion_px", "psnr", edges_of(values(rows, "motion_px")))
+    found = breaks_at(bins, 3.0)
+    assert found is not None and found.low == 4
+    assert breaks_at(bins, 12.0) is None and breaks_at([], 3.0) is None
 
 
 def test_few_values_are_a_bin_each() -> None:

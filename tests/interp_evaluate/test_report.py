@@ -88,9 +88,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
 
 def test_a_report_of_everything(tmp_path: Path) -> None:
     picture = np.random.default_rng(0).integers(0, 256, (170, 210, 3)).astype(np.uint8)
-    text, page = written(tmp_path, ROWS, ABOUT, worst=[WorstFrame(ROWS[0], picture, picture[::-1].copy())])
+    text, page = written(tmp_path, ROWS, ABOUT, worst=[WorstFrame(ROWS[0], picture, picture[::-1].copy())] * 3)
     seen = checked(page)
-    assert len(seen.loads) == 1, "the worst frame"
+    assert len(seen.loads) == 2, "of the worst frames of a method those that come first"
     for said in (*METHODS, *SEQUENCES, FROM_TRUTH, "the events end before the last frame", "31 events", "vid2ev"):
         assert said in seen.text and said in text
     assert "PSNR of each frame over time" in page and page.count("<svg") == 3 + len(varying(ROWS))
@@ -164,6 +164,15 @@ def test_a_column_that_is_not_known_is_not_drawn() -> None:
     assert [s.title for s in document(rows, {}).sections if s.title.startswith("Against")] == [
         "Against motion between the key frames"
     ]
+
+
+def test_where_methods_break_down_is_said() -> None:
+    rows = [
+        row(method=method, position=p, psnr=30.0 - lost * p, ssim=0.9, motion_px=10.0 * p)
+        for method, lost in (("a", 0.1), ("b", 1.0))
+        for p in (1, 2, 3, 4, 5)
+    ]
+    assert "[px per key frame]: a nowhere, b from 50." in markdown(document(rows, {}))
 
 
 def test_published_rows_are_of_the_same_gap_and_said_to_be_of_other_data() -> None:

@@ -12,6 +12,7 @@ from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
 from interp.evaluate.report.numbers import PSNR_DIGITS, SCORES, SSIM_DIGITS, number, spread
 from interp.evaluate.report.overview import (
+    breaking_points,
     by_method,
     condition_table,
     full_scale_table,
@@ -86,6 +87,7 @@ def _chapter(rows: Sequence[Row]) -> dict[str, list[Block]]:
             caption += f" The line at {condition.limit:g} is where the paper's network ends."
         chapter[f"Against {condition.title}"] = [
             *_drawn(condition_plot(rows, condition, edges), caption),
+            *([Text(breaking_points(rows, condition, edges))] if condition.harder else []),
             *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
         ]
     chapter["Beside the paper"] = [quality_table(rows), comparison_table(rows)]

@@ -8,8 +8,9 @@ from interp.evaluate.report.blocks import Cell, Line, Table
 from interp.evaluate.report.conditions import Condition
 from interp.evaluate.report.numbers import cells, digits_of, marked, number, short, spread
 from interp.evaluate.row import Row
-from interp.evaluate.tables import Bin, Mean, binned, by_position, least, per_sequence, pooled, split
+from interp.evaluate.tables import Bin, Mean, binned, breaks_at, by_position, least, per_sequence, pooled, split
 
+CLEARLY_DB = 3.0  # by which a score has broken down
 PROTOCOL = "Each frame against the range of its own truth, key frames not scored."
 FULL_SCALE = (
     "Against 255. Moving pixels are those whose truth is more than 10 codes away from either key frame."
@@ -111,6 +112,17 @@ def condition_table(rows: Sequence[Row], condition: Condition, edges: Sequence[f
         found = [float("nan") if one is None else one.score.mean for one in here]
         lines.append(Line(_span(some, edges), (Cell(f"{frames:,}"), *cells(found, _shown(field)))))
     return Table((f"{condition.axis} [{condition.unit}]", "frames", *parts), tuple(lines), title, folded=True)
+
+
+def breaking_points(rows: Sequence[Row], condition: Condition, edges: Sequence[float]) -> str:
+    """From where on each method is clearly worse than where the condition is easiest, in one sentence."""
+    said = []
+    for method, part in by_method(rows).items():
+        bins = binned(part, condition.field, "psnr", edges)
+        if bins:
+            found = breaks_at(bins, CLEARLY_DB)
+            said.append(f"{method} {'nowhere' if found is None else f'from {short(found.low)}'}")
+    return f"More than {CLEARLY_DB:g} dB below its own mean in the first bin [{condition.unit}]: {', '.join(said)}."
 
 
 def _span(one: Bin, edges: Sequence[float]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,8 @@ from interp.evaluate.figures.worst_patch import panel
 from interp.evaluate.report.blocks import Block, Picture
 from interp.evaluate.report.numbers import PSNR_DIGITS, SSIM_DIGITS, number
 from interp.evaluate.row import Row
+
+MOST = 2  # frames shown of each method: half a megabyte and more each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,9 +30,13 @@ class WorstFrame:
 
 
 def worst_blocks(worst: Sequence[WorstFrame]) -> Iterator[Block]:
-    """A picture for each frame."""
+    """A picture for each frame, of each method those that come first."""
+    shown = Counter[str]()
     for frame in worst:
         row = frame.row
+        shown[row.method] += 1
+        if shown[row.method] > MOST:
+            continue
         picture = panel(frame.truth, frame.rebuilt, (row.patch_x, row.patch_y), frame.similarity)
         rms = float(np.sqrt((error_codes(frame.truth, frame.rebuilt) ** 2).mean()))
         yield Picture(
