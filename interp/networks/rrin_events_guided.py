@@ -9,7 +9,8 @@ It has U2, U3 and U4 of RRINEvents, and in place of U1, which would have to lear
 `candidates/guided.py` from the target itself; a_k says how far luminance is off there.  Untrained it is (C' + J) / 2.
 On clips x8 that is 1.6 to 2.4 dB above the bridge with a clean sensor and 2.4 to 7 dB with a noisy one.
 
-All networks work at half the resolution (U4 on squares of pixels).  Where no event is near, U4 changes nothing.
+All networks work at half the resolution (U4 on squares of pixels), and where no event is near they change nothing: what
+stands still is the closed form's.  Without that, static pixels of real clips lost 0.5 dB in 800 steps of training.
 """
 
 from __future__ import annotations
@@ -78,27 +79,34 @@ class RrinEventsGuided(FrameFed):
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
         first = guided(pair.frame_0, pair.frame_1, candidate, self.spec.transfer).flows
         at = self.scale.down(first) / self.scale.factor
-        correction = run(self.refine, [at, *seen]) * self.spec.flow_scale
+        open_half = self.scale.down(pair.once[1])[:, None]
+        correction = open_half * run(self.refine, [at, *seen]) * self.spec.flow_scale
         flows = first + self.scale.flow_up(correction)
         warps = warped(pair, flows)
-        of_warps, weights = self._blended(warps, candidate, [at + correction, *seen], times)
+        of_warps, weights = self._blended(warps, candidate, [at + correction, *seen], times, pair.once[1][:, None])
         start = recoloured(candidate, of_warps, self.spec.transfer)
         image = self._corrected(pair, start, of_warps, found)
         return Interpolated(image, None, flows, warps, weights, of_warps)
 
     def _blended(
-        self, warps: torch.Tensor, candidate: torch.Tensor, seen: list[torch.Tensor], times: torch.Tensor
+        self,
+        warps: torch.Tensor,
+        candidate: torch.Tensor,
+        seen: list[torch.Tensor],
+        times: torch.Tensor,
+        gate: torch.Tensor,
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """J, and the weights of both warps."""
         logits = run(self.masks, [*seen, *(self.scale.down(warp) for warp in warps.unbind(2))])
-        visible = F.logsigmoid(self.scale.up(logits))
+        visible = gate * F.logsigmoid(self.scale.up(logits))
         return blend(warps, visible + agreement(warps, candidate, self.spec.transfer), shares_at(times))
 
     def _corrected(self, pair: Pair, start: torch.Tensor, draft: torch.Tensor, found: Risen) -> torch.Tensor:
         """The image, from C' and J."""
         said = run(self.residue, [pair.frame_0, pair.frame_1, draft, start, _as_input(found)])
-        mixed = start + torch.sigmoid(said[:, :, -1:]) * (draft - start)
-        return mixed + pair.once[1][:, None] * said[:, :, :-1]
+        gate = pair.once[1][:, None]
+        way = 0.5 + gate * (torch.sigmoid(said[:, :, -1:]) - 0.5)
+        return start + way * (draft - start) + gate * said[:, :, :-1]
 
 
 def _as_input(found: Risen) -> torch.Tensor:
