@@ -21,16 +21,21 @@ from vid2ev.errors import DataError, UsageError
 WRAPPERS = ("module.", "_orig_mod.")
 
 
-def save(path: Path, name: str, network: nn.Module, about: Mapping[str, str] | None = None) -> None:
-    """Write a network of that name, whole or not at all; `about` goes into the metadata."""
+def save(path: Path, name: str, network: nn.Module, about: Mapping[str, str] | None = None, half: bool = False) -> None:
+    """Write a network of that name, whole or not at all; the same network gives the same bytes.
+
+    about   what else goes into the metadata
+    half    in 16 bits, for half the size
+    """
     from safetensors.torch import save as in_bytes
 
     from vid2ev.recording.disk import whole_file
 
     spec = network.spec.model_dump_json()  # type: ignore[operator, union-attr]
-    tensors = {key: tensor.detach().cpu().contiguous() for key, tensor in network.state_dict().items()}
+    kind = torch.float16 if half else torch.float32
+    tensors = {key: tensor.detach().cpu().to(kind).contiguous() for key, tensor in network.state_dict().items()}
     with whole_file(path) as file:
-        file.write(in_bytes(tensors, {**(about or {}), "network": name, "spec": spec}))
+        file.write(_in_order(in_bytes(tensors, {**(about or {}), "network": name, "spec": spec})))
 
 
 def load(path: Path) -> nn.Module:
@@ -71,6 +76,14 @@ def _read(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
     if name not in NETWORKS or not isinstance(spec, dict):
         raise DataError(f"{path} does not say which network its weights are of; give a file that training has written")
     return name, spec, tensors
+
+
+def _in_order(file: bytes) -> bytes:
+    """The same file with its header in alphabetical order; safetensors writes metadata in any."""
+    length = int.from_bytes(file[:8], "little")
+    header = json.dumps(json.loads(file[8 : 8 + length]), sort_keys=True, separators=(",", ":")).encode()
+    padded = header + b" " * (-len(header) % 8)
+    return len(padded).to_bytes(8, "little") + padded + file[8 + length :]
 
 
 def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:

@@ -15,7 +15,7 @@ Sample = dict[str, torch.Tensor]
 
 def tensors(clip: Clip, settings: ClipSettings) -> Sample:
     """What all samples have of a clip."""
-    counts = torch.from_numpy(np.ascontiguousarray(clip.off_on))
+    counts = torch.from_numpy(np.array(clip.off_on))
     if settings.rigs > 0:
         one = EventCounts(counts[None], torch.ones(1, 2))
         counts = over(one, (clip.truth.shape[1], clip.truth.shape[2])).off_on[0].half()
@@ -28,5 +28,5 @@ def tensors(clip: Clip, settings: ClipSettings) -> Sample:
 
 def as_tensor(frames: np.ndarray) -> torch.Tensor:
     """Frames [N, H, W, 3] as [N, 3, H, W] float32: codes from 0 to 1, light as it is."""
-    values = torch.from_numpy(np.ascontiguousarray(np.moveaxis(frames, -1, 1))).float()
+    values = torch.from_numpy(np.array(np.moveaxis(frames, -1, 1), order="C")).float()
     return values / 255 if frames.dtype == np.uint8 else values

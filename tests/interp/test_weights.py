@@ -24,6 +24,21 @@ def test_networks_come_back_from_the_disk(name: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_the_same_network_gives_the_same_bytes_and_16_bits_take_half_of_them(tmp_path: Path) -> None:
+    network, about = make("firenet"), {str(k): "said" for k in range(8)}
+    for number in range(3):
+        weights.save(tmp_path / f"{number}.safetensors", "firenet", network, about)
+    whole = {(tmp_path / f"{number}.safetensors").read_bytes() for number in range(3)}
+    assert len(whole) == 1
+    weights.save(tmp_path / "half.safetensors", "firenet", network, about, half=True)
+    parameters = sum(each.numel() for each in network.parameters())
+    assert len(whole.pop()) - (tmp_path / "half.safetensors").stat().st_size == pytest.approx(2 * parameters, abs=64)
+    loaded = weights.load(tmp_path / "half.safetensors")
+    for name, tensor in loaded.state_dict().items():
+        assert tensor.dtype == torch.float32
+        torch.testing.assert_close(tensor, network.state_dict()[name], rtol=2**-11, atol=1e-7)
+
+
 def test_options_come_back_too(tmp_path: Path) -> None:
     path = tmp_path / "trained.safetensors"
     options = {"depths": (3, 3, 3, 3), "candidate": "softmax", "colours": 1, "flow_scale": 5.0}

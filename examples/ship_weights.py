@@ -1,0 +1,97 @@
+"""Weights to ship, of a run of `vid2ev train`: 16 bits, and a card that says where they come from.
+
+    python examples/ship_weights.py RUN [REPORT ...]
+
+writes interp/pretrained/NETWORK-SIZE.safetensors and NETWORK-SIZE.md.  REPORT are folders of `vid2ev eval --network
+interp/pretrained/NETWORK-SIZE.safetensors`, for the scores on the card: run this first, then that, then this again; the
+weights are the same bytes each time.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from interp import pretrained, weights
+from interp.evaluate.table import table
+
+
+@click.command()
+@click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("reports", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--machine", default="two cores of a CPU", show_default=True, help="What it was trained on.")
+@click.option("--hours", type=float, required=True, help="How long training took [h].")
+def ship(run: Path, reports: tuple[Path, ...], machine: str, hours: float) -> None:
+    """Weights of RUN, and their card."""
+    said = json.loads((run / "run.json").read_text())
+    job, network = said["job"], weights.load(run / "weights.safetensors")
+    steps = int(_last(run / "validation.csv")["step"])
+    path = Path(pretrained.__file__).with_name(f"{job['network']}-{job['size']}.safetensors")
+    weights.save(path, job["network"], network, {"steps": str(steps), "seed": str(job["recipe"]["seed"])}, half=True)
+    path.with_suffix(".md").write_text(_card(run, job, said["versions"], steps, machine, hours, reports))
+    click.echo(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+
+
+def _card(
+    run: Path,
+    job: dict[str, Any],
+    versions: dict[str, str],
+    steps: int,
+    machine: str,
+    hours: float,
+    reports: tuple[Path, ...],
+) -> str:
+    recipe, clips = job["recipe"], job["clips"]
+    videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
+    lines = [
+        f"# {job['network']}, {job['size']}",
+        "",
+        f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
+        f" seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of {job['samples']['size']} x"
+        f" {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16 bits. Versions: torch"
+        f" {versions['torch']}, lightning {versions['lightning']}.",
+        "",
+        "- **Data**: simulated only, made while training: "
+        f"{clips['scenes']:.0%} rendered scenes ({', '.join(clips['scene_names'])}), {clips['photographs']:.0%}"
+        f" photographs in motion ({', '.join(clips['textures'])}); frames between key frames to rebuild:"
+        f" {', '.join(f'x{k}' for k in clips['multiples'])};"
+        f" thresholds {clips['sensors']['threshold'][0]} to {clips['sensors']['threshold'][1]} nat.",
+        f"- **Validated on, never trained on**: {job['validation']['clips']} clips of scenes and photographs that"
+        f" training does not have, and real ones of {videos or 'no videos'}, each with a clean and a noisy sensor.",
+        "",
+        "## Validation",
+        "",
+        *_validation(run),
+    ]
+    for report in reports:
+        summary = json.loads((report / "summary.json").read_text())
+        lines += ["", f"## {report.name}", "", table(summary)]
+    return "\n".join(lines) + "\n"
+
+
+def _validation(run: Path) -> list[str]:
+    """The scores of the last validation beside those of what needs no training."""
+    others = json.loads((run / "baselines.json").read_text())
+    last = _last(run / "validation.csv")
+    groups = list(next(iter(others.values())))
+    found = {name: {group: (of[group]["psnr"], of[group]["ssim"]) for group in groups} for name, of in others.items()}
+    found["**these weights**"] = {
+        group: (float(last[f"{group}.psnr"]), float(last[f"{group}.ssim"])) for group in groups
+    }
+    lines = [f"| PSNR-255 / SSIM | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
+    for name, of in found.items():
+        lines.append(f"| {name} | {' | '.join(f'{psnr:.2f} / {ssim:.3f}' for psnr, ssim in of.values())} |")
+    return lines
+
+
+def _last(path: Path) -> dict[str, str]:
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))[-1]
+
+
+if __name__ == "__main__":
+    ship()
