@@ -65,6 +65,7 @@ FLOORS = {
 CLIENT_FLOORS = {
     "": 0,
     "precision": 0,
+    "pretrained": 0,
     "light": 1,
     "warp": 1,
     "blend": 1,

@@ -44,11 +44,15 @@ def over(counts: EventCounts, size: tuple[int, int]) -> EventCounts:
     """Counts laid over frames of a size (height, width), edge on edge: for cameras that are not calibrated."""
     if counts.off_on.shape[-2:] == size:
         return counts
+    return carried(counts, places_over(counts, size))
+
+
+def places_over(counts: EventCounts, size: tuple[int, int]) -> torch.Tensor:
+    """Where pixels of frames of a size (height, width) lie on the event camera, edge on edge: [H, W, 2] px (x, y)."""
     height, width = counts.off_on.shape[-2:]
     across = (torch.arange(size[1]) + 0.5) * (width / size[1]) - 0.5
     down = (torch.arange(size[0]) + 0.5) * (height / size[0]) - 0.5
-    places = torch.stack([across.expand(size), down[:, None].expand(size)], -1)
-    return carried(counts, places.to(counts.off_on.device))
+    return torch.stack([across.expand(size), down[:, None].expand(size)], -1).to(counts.off_on.device)
 
 
 def places_of(

@@ -71,6 +71,22 @@ def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int) 
     return film.frames
 
 
+def join_films(path: Path, pieces: Iterable[tuple[Path, int]], rate: Fraction | int) -> None:
+    """One film of several at a rate, without encoding them again: each with the number of its first picture in the
+    whole.  They must have been made by `open_film` with one size, rate and encoder.  Raises OSError."""
+    with av.open(str(path), "w", format="mp4", options=MUXER) as whole:
+        stream: Any = None
+        for piece, first in pieces:
+            with av.open(str(piece)) as part:
+                stream = stream or whole.add_stream_from_template(part.streams.video[0])
+                for packet in part.demux(video=0):
+                    if packet.dts is not None and packet.pts is not None and packet.time_base:
+                        shift = round(first / (rate * packet.time_base))
+                        packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
+                        packet.stream = stream
+                        whole.mux(packet)
+
+
 def open_film(
     path: Path, size: tuple[int, int], rate: Fraction, encoder: dict[str, str], muxer: dict[str, str] | None = None
 ) -> tuple[Any, Any]:

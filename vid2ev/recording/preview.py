@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.pictures.film import MUXER, film_frame, open_film
+from vid2ev.pictures.film import film_frame, join_films, open_film
 from vid2ev.recording.disk import sync
 from vid2ev.recording.panels import COLOURS, count, paint, reduced
 from vid2ev.stream.events import Events
@@ -105,21 +105,8 @@ class Preview:
 
     def join(self, path: Path) -> None:
         """Put the pieces one after the other into one file, without encoding them again."""
-        import av
-
-        if not self._starts:
-            return
-        with av.open(str(path), "w", options=MUXER) as whole:
-            with av.open(str(self._piece(0))) as first:
-                stream = whole.add_stream_from_template(first.streams.video[0])
-            for number, start in enumerate(self._starts):
-                with av.open(str(self._piece(number))) as piece:
-                    for packet in piece.demux(video=0):
-                        if packet.dts is not None and packet.pts is not None and packet.time_base:
-                            shift = int(start / (self.rate * packet.time_base))
-                            packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
-                            packet.stream = stream
-                            whole.mux(packet)
+        if self._starts:
+            join_films(path, ((self._piece(number), first) for number, first in enumerate(self._starts)), self.rate)
 
     def _piece(self, number: int) -> Path:
         return self.pieces / f"preview-{number:05d}.mp4"

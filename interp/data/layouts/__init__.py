@@ -12,7 +12,16 @@ from interp.data.layouts.own import MANIFEST, Own
 from interp.data.layouts.sequence import Placed, Sequence, Windows, windows
 from vid2ev.errors import DataError, UsageError
 
-__all__ = ["Placed", "Sequence", "Windows", "open_sequence", "opened_in", "sequences_in", "windows"]
+__all__ = [
+    "Placed",
+    "Sequence",
+    "Windows",
+    "is_sequence",
+    "open_sequence",
+    "opened_in",
+    "sequences_in",
+    "windows",
+]
 
 DEEPEST = 5  # folders below the one that is given
 
@@ -26,6 +35,11 @@ def open_sequence(folder: str | Path) -> Sequence:
             f"{folder} is no recording; expected one of vid2ev convert, or in the HS-ERGB or BS-ERGB layout"
         )
     return Own(folder) if kind == "own" else Ergb(folder, kind)
+
+
+def is_sequence(folder: str | Path) -> bool:
+    """Whether a path is a folder in one of the layouts, by what is in it."""
+    return _kind(Path(folder)) is not None
 
 
 def sequences_in(folder: str | Path) -> tuple[list[Path], dict[str, str]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from interp.data.layouts.sequence import Placed
-from vid2ev import DataError, read_events
+from vid2ev import CisSpec, DataError, read_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.rig.rig_file import read_rig
@@ -26,7 +26,8 @@ class Own:
 
     keys_folder     the pictures of the slow frame camera
     events_folder   what the event camera wrote
-    Raises DataError for a recording that has no events or no frames in 8 bits.
+    Where there are no pictures of 8 bits (`--cis-out png`), they are made of the codes of the ADC, as those would be.
+    Raises DataError for a recording that has no events or no frames.
     """
 
     def __init__(self, folder: Path):
@@ -35,21 +36,17 @@ class Own:
         frames = sorted((each for each in cameras if each["kind"] == "cis"), key=lambda each: each["rate_hz"])
         events = [each for each in cameras if each["kind"] == "dvs"]
         if not events or not frames:
-            raise DataError(
-                f"{folder}: a recording without events or frames in 8 bits; expected --cis-out png with --frames"
-            )
-        self.keys_folder, self._frames, self.events_folder = (
-            frames[0]["folder"],
-            frames[-1]["folder"],
-            events[0]["folder"],
-        )
-        self.times_us, key_times = (_times_us(each) for each in (self._frames, self.keys_folder))
+            raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
+        self._keys, self._frames = _Pictures(frames[0]), _Pictures(frames[-1])
+        self.keys_folder, self.events_folder = frames[0]["folder"], events[0]["folder"]
+        self.times_us, key_times = self._frames.times_us, self._keys.times_us
         self._key_of = {
             int(k): number
             for number, t in enumerate(key_times)
             if abs(int(self.times_us[k := np.abs(self.times_us - t).argmin()]) - int(t)) <= ROUNDED_US
         }
-        self.size = read_codes(self._frames / "000000.png").shape[1::-1]
+        first = self._frames.codes(0)
+        self.size, self.grey = first.shape[1::-1], first.ndim == 2
         self.event_size = tuple(events[0]["size"])
         self.contrast = events[0]["contrast"]
         self._span_us = events[0]["span_us"]
@@ -71,11 +68,11 @@ class Own:
 
     def frame(self, k: int) -> np.ndarray:
         """Frame k of the fast camera."""
-        return _rgb(self._frames, k)
+        return self._frames.rgb(k)
 
     def key(self, k: int) -> np.ndarray:
         """The frame of the slow camera at that instant, if there is one."""
-        return _rgb(self.keys_folder, self._key_of[k]) if k in self._key_of else self.frame(k)
+        return self._keys.rgb(self._key_of[k]) if k in self._key_of else self.frame(k)
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""
@@ -95,12 +92,12 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
     for path in [folder / MANIFEST, *sorted(folder.glob(f"*/{MANIFEST}"))]:
         said = read_manifest(path)
         sensor = said.get("sensor")
-        if sensor is None or (sensor["kind"] == "cis" and not (path.parent / KINDS["png"] / TIMESTAMPS).exists()):
+        if sensor is None or (sensor["kind"] == "cis" and _pictures_in(path.parent) is None):
             continue
         numbers, begin = sensor["parameters"], said["start_us"]
         facts = {"kind": sensor["kind"], "folder": path.parent, "size": sensor["size"]}
         if sensor["kind"] == "cis":
-            facts |= {"folder": path.parent / KINDS["png"], "rate_hz": numbers["frame_rate_hz"]}
+            facts |= {"folder": _pictures_in(path.parent), "rate_hz": numbers["frame_rate_hz"], "numbers": numbers}
         else:
             facts["contrast"] = (numbers["threshold_off"], numbers["threshold_on"])
             facts["span_us"] = (begin, begin + said["duration_us"])
@@ -108,12 +105,28 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def _times_us(folder: Path) -> np.ndarray:
-    """The middles of the exposures [us]."""
-    opened = np.loadtxt(folder / TIMESTAMPS, dtype=np.int64, ndmin=2)
-    return opened.sum(axis=1) // 2
+class _Pictures:
+    """Pictures of 8 bits of a frame camera."""
+
+    def __init__(self, facts: dict[str, Any]):
+        self._folder: Path = facts["folder"]
+        raw = self._folder.name == KINDS["raw"]
+        self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
+        opened = np.loadtxt(self._folder / TIMESTAMPS, dtype=np.int64, ndmin=2)
+        self.times_us = opened.sum(axis=1) // 2  # the middles of the exposures
+
+    def codes(self, number: int) -> np.ndarray:
+        """Codes uint8, [H, W] or [H, W, 3]."""
+        codes = read_codes(self._folder / f"{number:06d}.png")
+        return codes if self._picture is None else self._picture[codes]
+
+    def rgb(self, number: int) -> np.ndarray:
+        """Red, green, blue [H, W, 3], uint8."""
+        codes = self.codes(number)
+        return codes if codes.ndim == 3 else np.repeat(codes[..., None], 3, axis=2)
 
 
-def _rgb(folder: Path, number: int) -> np.ndarray:
-    codes = read_codes(folder / f"{number:06d}.png")
-    return codes if codes.ndim == 3 else np.repeat(codes[..., None], 3, axis=2)
+def _pictures_in(folder: Path) -> Path | None:
+    """Where a frame camera has its pictures: those of 8 bits, or else the codes of the ADC."""
+    places = (folder / KINDS[kind] for kind in ("png", "raw"))
+    return next((place for place in places if (place / TIMESTAMPS).exists()), None)

@@ -1,0 +1,166 @@
+"""`vid2ev interpolate`: the high-frame-rate video of a recording, or of any video."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from vid2ev.commands import INTERRUPTED
+
+FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elapsed} gone, {remaining} left"
+
+
+@click.command(short_help="Make the high-frame-rate video of a recording or a video.")
+@click.argument("source")
+@click.option(
+    "-x", "multiple", metavar="N", help="So many times the frames: 32, 2.5.  [default: 8, unless there is --fps]"
+)
+@click.option("--fps", metavar="RATE", help="Frames per second of the scene's time: 960, 30000/1001.")
+@click.option(
+    "--method", metavar="NAME", help="nearest, linear, flow, or with events integration, both, bridge."
+    "  [default: a network that comes with vid2ev, if there is one; bridge with events, flow without]",
+)  # fmt: skip
+@click.option("--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS", help="Of `vid2ev train`.")
+@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_x8.mp4 here]")
+@click.option(
+    "--format", type=click.Choice(["mp4", "png", "exr"]),
+    help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
+)  # fmt: skip
+@click.option("--play", metavar="RATE", help="Frames per second of the film: 30 is slow motion.  [default: real time]")
+@click.option("--start", type=float, metavar="S", help="Begin at this second; of recordings after the first frame.")
+@click.option("--stop", type=float, metavar="S", help="End there.")
+@click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture.")
+@click.option("--size", metavar="W|WxH|WxH!", help="Pixels to bring a video to.")
+@click.option("--transfer", default="auto", show_default=True, metavar="CURVE", help="Of a video's codes.")
+@click.option("--source-fps", metavar="RATE", help="Of images without times.")
+@click.option(
+    "--contrast", metavar="C|OFF,ON",
+    help="What an event stands for [nat].  [default: as the recording says, or else what fits the frames]",
+)  # fmt: skip
+@click.option(
+    "--tile", default="auto", show_default=True, metavar="WxH|auto|none",
+    help="Pixels made at a time; auto: all of frames of up to a million, tiles of about as many of larger ones.",
+)  # fmt: skip
+@click.option(
+    "--cuts", type=click.Choice(["hold", "keep"]), default="hold", show_default=True,
+    help="At a cut hold the nearest frame, or interpolate as anywhere.",
+)  # fmt: skip
+@click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
+    help="Where; auto: on a GPU, if there is one.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace what is there.")
+@click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
+@click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
+    """Make the frames of SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or BS-ERGB,
+    a video, or a folder of images.
+
+    Frames of the source stay as they are, and nothing is interpolated across a cut.  Instants are whole microseconds on
+    an exact grid.  A folder has timestamps.txt, so that `vid2ev convert` reads it again.
+    """
+    from interp.interpolate.take import Options
+    from interp.interpolate.whole import interpolate as make
+
+    quiet |= as_json
+    taken = Options(
+        start_s=options.pop("start"),
+        stop_s=options.pop("stop"),
+        crop=options.pop("crop"),
+        size=options.pop("size"),
+        transfer=options.pop("transfer"),
+        source_hz=_number(options.pop("source_fps"), "--source-fps"),
+        contrast=_contrast(options.pop("contrast")),
+    )
+    path = output or _default(source, options)
+    tell = None if quiet else lambda text: click.echo(f"by {text}")
+    with _kept(path), _bar(quiet) as report:
+        made = make(source, path, options=taken, report=report, told=tell, **options)
+    if as_json:
+        click.echo(json.dumps(made, indent=2))
+    elif not quiet:
+        from vid2ev.commands import summary
+
+        click.echo(summary.lines(_facts(path, made)))
+
+
+def _default(source: str, options: dict[str, Any]) -> Path:
+    path = Path(source).absolute()
+    many = f"{options['fps']}fps" if options["fps"] else f"x{options['multiple'] or 8}"
+    name = f"{path.name if path.is_dir() else path.stem}_{many}".replace("/", "_")
+    return Path(name if options["format"] in ("png", "exr") else f"{name}.mp4")
+
+
+def _number(text: str | None, option: str) -> Any:
+    from interp.interpolate.instants import parse_number
+
+    return None if text is None else parse_number(text, option)
+
+
+def _contrast(text: str | None) -> tuple[float, float] | None:
+    from vid2ev.errors import UsageError
+
+    if text is None:
+        return None
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in (1, 2) or not all(0 < value < 10 for value in values):
+        raise UsageError(f"--contrast {text}: expected nats, such as 0.2, or of OFF and ON events, such as 0.2,0.25")
+    return values[0], values[-1]
+
+
+def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
+    (width, height), kind = made["size"], made["format"].partition(" ")[0]
+    film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
+    facts = [("made", f"{path}: {made['frames']:,} frames of {width}x{height} as {kind}{film}")]
+    facts.append(("from", f"{made['key_frames']:,} key frames, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
+    if made["tiles"] != "none":
+        facts.append(("tiles", made["tiles"]))
+    for reason, gaps in made["gaps_s"].items():
+        first = f", the first at {gaps[0][0]:.6g} s"
+        facts.append(("held", f"{len(gaps)} gaps not interpolated as asked, because of {reason}{first}"))
+    run = made["run"]
+    facts.append(("speed", f"{run['frames'] / max(run['seconds'], 1e-9):.3g} frames/s, {run['seconds']:.3g} s"))
+    return [*facts, *(("warning", text) for text in made["remarks"])]
+
+
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """What goes wrong within says so if it can be resumed."""
+    from vid2ev.errors import DataError
+
+    def remedy() -> str:
+        done = path.with_name(f"{path.name}.partial") / "done.jsonl"
+        return "; what is done is kept, the same command with --resume goes on" if done.exists() else ""
+
+    try:
+        yield
+    except DataError as error:
+        raise DataError(f"{error}{remedy()}") from error
+    except KeyboardInterrupt:
+        click.echo(f"interrupted{remedy() or '; nothing is left behind'}", err=True)
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def _bar(quiet: bool) -> Iterator[Callable[[int, int | None], None]]:
+    """A progress bar on a terminal: frames, of how many, how fast, and the time left."""
+    from tqdm import tqdm
+
+    with tqdm(total=None, bar_format=FRAMES, leave=False, disable=quiet or None, unit=" frames") as shown:
+
+        def report(done: int, total: int | None) -> None:
+            if shown.total is None:
+                shown.total, shown.initial, shown.n = total, done, done
+            shown.update(done - shown.n)
+
+        yield report

@@ -1,0 +1,57 @@
+"""Which method interpolates: the one asked for, or else the best that there is for what is there."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from interp import pretrained
+from interp.methods import Method, open_method
+from vid2ev.errors import UsageError
+
+FALLBACK = "flow"  # where a method needs events, and there are none
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A method, why it was chosen, and what it is, for JSON."""
+
+    method: Method
+    why: str
+    about: dict[str, Any]
+
+
+def choice(
+    name: str | None, network: str | Path | None, events: bool, where: str, device: torch.device | str
+) -> Choice:
+    """The method of a name or a file of weights, or without either the default.
+
+    events   whether there are events; `where` is what has them or not, for people
+    Raises UsageError for both at once, and for a method that needs events where there are none.
+    """
+    if name and network:
+        raise UsageError(f"--method {name} and --network {network} each say what interpolates; leave out one of them")
+    why = "as asked"
+    if not (name or network):
+        network = pretrained.default(events)
+        name = None if network else "bridge" if events else FALLBACK
+        seen = "there are events" if events else "there are no events"
+        best = "the network that comes with vid2ev" if network else "the best that needs no training"
+        why = f"{best}, since {seen}"
+    method = open_method(str(network or name), device)
+    if method.needs_events and not events:
+        raise UsageError(f"method '{method.name}' needs events, and {where} has none; choose flow, or leave it out")
+    about: dict[str, Any] = {"method": method.name}
+    if network:
+        about |= {"weights": str(network), "sha256": sha256(Path(network))}
+    return Choice(method, why, about)
+
+
+def sha256(path: Path) -> str:
+    """The digest of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,123 @@
+"""Frames for the instants of a stretch: key frames as they are, what is between them by a method.
+
+    a cut                        the nearer key frame
+    unrelated pictures           the same, unless the method has events to go by
+    events that are not known    `fallback`, which needs none
+
+Events are read gap by gap, so that memory does not grow with the length of a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import ceil
+
+import numpy as np
+import torch
+
+from interp.candidates.contrast import with_fitted_contrast
+from interp.interpolate.instants import Instant
+from interp.interpolate.stretches import CUT, UNRELATED, Stretch
+from interp.interpolate.take import Key, Take
+from interp.interpolate.tiling import Tiling, between
+from interp.methods import Gap, Method
+from interp.representation.carried import over
+from interp.representation.event_counts import USUAL_NATS, EventCounts, count_events
+
+FEWEST, MOST = 32, 128  # sub-intervals in which events are counted
+AT_ONCE = 1 << 28  # values of frames that are made at a time, 4 bytes each
+NO_EVENTS = "events that are not known"
+
+
+@dataclass(frozen=True, slots=True)
+class Filled:
+    """A frame: sRGB codes float32 [H, W, C], not clipped; `key`: it is a key frame, as it came."""
+
+    instant: Instant
+    key: bool
+    codes: np.ndarray = field(repr=False)
+
+
+@dataclass(slots=True)
+class Fill:
+    """Makes the frames of a take's stretches, which come in their order.
+
+    parts   into how many equal parts the grid divides gaps, if it does
+    """
+
+    take: Take
+    method: Method
+    fallback: Method
+    tiling: Tiling
+    parts: int | None
+    device: torch.device | str = "cpu"
+
+    def fill(self, stretch: Stretch) -> tuple[str, Iterator[Filled]]:
+        """Why the method was not asked, empty if it was; and the frames of the stretch, in order of time."""
+        made = [instant for instant in stretch.instants if instant.share]
+        if stretch.second is None or not made:
+            return "", self._held(stretch)
+        blind = stretch.between == UNRELATED and not self.method.needs_events
+        if stretch.between == CUT or blind:
+            return stretch.between, self._held(stretch)
+        gap = self._gap(stretch, stretch.second)
+        if self.method.needs_events and gap.events is None:
+            return NO_EVENTS, self._made(stretch, gap, self.fallback)
+        return "", self._made(stretch, gap, self.method)
+
+    def _made(self, stretch: Stretch, gap: Gap, method: Method) -> Iterator[Filled]:
+        yield from (_as_it_came(instant, stretch.first) for instant in stretch.instants[:1] if not instant.share)
+        instants = [instant for instant in stretch.instants if instant.share]
+        some = len(instants) if method.sequential else max(1, AT_ONCE // gap.frame_0.numel())
+        for first in range(0, len(instants), some):
+            group = instants[first : first + some]
+            times = torch.tensor([float(instant.share) for instant in group], device=self.device)
+            images = between(method, gap, times, self.tiling).movedim(1, -1).cpu().numpy()
+            for instant, image in zip(group, images, strict=True):
+                yield Filled(instant, False, image)
+
+    def _held(self, stretch: Stretch) -> Iterator[Filled]:
+        """The nearer key frames."""
+        for instant in stretch.instants:
+            later = stretch.second is not None and 2 * instant.share > 1
+            nearer = stretch.second if later and stretch.second is not None else stretch.first
+            yield Filled(instant, not instant.share, nearer.codes)
+
+    def _gap(self, stretch: Stretch, second: Key) -> Gap:
+        frames = [_tensor(key).to(self.device) for key in (stretch.first, second)]
+        gap_us = second.t_us - stretch.first.t_us
+        return Gap(frames[0], frames[1], self._counts(stretch.first, second, frames), gap_us)
+
+    def _counts(self, first: Key, second: Key, frames: list[torch.Tensor]) -> EventCounts | None:
+        """What the events between two key frames say; None where they are not needed, or not known."""
+        size = self.take.event_size
+        if not self.method.needs_events or size is None:
+            return None
+        events = self.take.events(first.t_us, second.t_us)
+        if events is None:
+            return None
+        contrast = self.take.contrast
+        counts = count_events(
+            events, size, first.t_us, second.t_us, steps_for(self.parts), contrast or (USUAL_NATS, USUAL_NATS)
+        ).to(self.device)
+        if contrast:
+            return counts
+        height, width = frames[0].shape[-2:]
+        fitted = with_fitted_contrast(frames[0][None], frames[1][None], over(counts, (height, width)))
+        return EventCounts(counts.off_on, fitted.contrast)
+
+
+def steps_for(parts: int | None) -> int:
+    """In how many sub-intervals events are counted, so that frames lie at the ends of some."""
+    if parts is None:
+        return 2 * FEWEST
+    return FEWEST if parts > MOST else parts * ceil(FEWEST / parts)
+
+
+def _as_it_came(instant: Instant, key: Key) -> Filled:
+    return Filled(instant, True, key.codes)
+
+
+def _tensor(key: Key) -> torch.Tensor:
+    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(key.codes, -1, 0)))

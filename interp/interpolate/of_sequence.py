@@ -1,0 +1,98 @@
+"""Recordings of a frame camera and an event camera to interpolate: own ones, HS-ERGB, BS-ERGB."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interp.data.layouts import open_sequence
+from interp.interpolate.take import Key, Options
+from vid2ev import Events
+from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import identity
+
+FINEST = 1001  # denominators of rates
+ROUNDED_US = 2  # that two instants which are the same may be apart in files
+
+
+class OfSequence:
+    """A sequence in a folder.
+
+    Of a recording with two frame cameras, the frames of the slower one are the key frames.
+    Raises UsageError where no frame lies in the part asked for.
+    """
+
+    curve = "srgb"
+    bits = 8
+
+    def __init__(self, folder: Path, options: Options):
+        unfit = {"--crop": options.crop, "--size": options.size, "the rate of frames": options.source_hz}
+        if asked := [name for name, value in unfit.items() if value is not None]:
+            raise UsageError(f"{folder} is a recording, whose frames stay as they are; leave {asked[0]} out")
+        self._sequence = sequence = open_sequence(folder)
+        self.folder, self.name, self.size = folder, sequence.name, sequence.size
+        self.event_size: tuple[int, int] | None = sequence.event_size
+        self.contrast = options.contrast or sequence.contrast
+        self.remarks = sequence.remarks
+        self._numbers = self._part(options)
+        self.rate = rate_of(sequence.times_us[self._numbers])
+        self.channels = 1 if getattr(sequence, "grey", False) else 3
+
+    @property
+    def gaps_expected(self) -> int | None:
+        """Known."""
+        return len(self._numbers) - 1
+
+    def describe(self) -> dict[str, Any]:
+        """Folder and sizes."""
+        about = {"kind": type(self._sequence).__name__.lower(), "path": str(self.folder), "size": list(self.size)}
+        return about | {"event_size": list(self._sequence.event_size), "contrast": self.contrast} | self._identity()
+
+    def keys(self, start: int = 0) -> Iterator[Key]:
+        """See `Take`."""
+        for number in self._numbers[start:]:
+            codes = self._sequence.key(number)[..., : self.channels]
+            yield Key(int(self._sequence.times_us[number]), codes.astype(np.float32) / np.float32(255))
+
+    def events(self, start_us: int, stop_us: int) -> Events | None:
+        """See `Take`."""
+        begin_us, end_us = self._sequence.covered_us
+        if start_us < begin_us - ROUNDED_US or stop_us > end_us + ROUNDED_US:
+            return None
+        if any(since < stop_us and until > start_us for since, until in self._sequence.unknown_us):
+            return None
+        return self._sequence.events(start_us, stop_us).within(self._sequence.event_size)[0]
+
+    def _part(self, options: Options) -> list[int]:
+        """The frames to take, in order of time."""
+        times = self._sequence.times_us
+        numbers = list(getattr(self._sequence, "key_frames", range(len(times))))
+        latest = np.maximum.accumulate(times[numbers])
+        rising = [k for at, k in enumerate(numbers) if at == 0 or times[k] > latest[at - 1]]
+        if left_out := len(numbers) - len(rising):
+            self.remarks.append(f"{left_out} frames left out, whose time is not after that of the frame before")
+        start_us, stop_us = (
+            None if second is None else int(times[rising[0]]) + round(second * 1e6)
+            for second in (options.start_s, options.stop_s)
+        )
+        found = [
+            k for k in rising if (start_us is None or times[k] >= start_us) and (stop_us is None or times[k] <= stop_us)
+        ]
+        if not found:
+            raise UsageError(
+                f"{self.folder}: no frame from {options.start_s} to {options.stop_s} s; choose another part"
+            )
+        return found
+
+    def _identity(self) -> dict[str, Any]:
+        return {"identity": identity(self.folder)}
+
+
+def rate_of(times_us: np.ndarray) -> Fraction:
+    """Frames per second, on average; those of a single frame are anything."""
+    span_us = int(times_us[-1] - times_us[0])
+    return Fraction(10**6 * (len(times_us) - 1), span_us).limit_denominator(FINEST) if span_us else Fraction(30)

@@ -1,0 +1,95 @@
+"""Videos and folders of images to interpolate: frames, and no events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from interp.interpolate.take import Key, Options
+from interp.light import to_codes
+from vid2ev import Events, open_source
+from vid2ev.errors import UsageError
+
+FINEST = 1001  # denominators of rates
+BRIGHT = ("pq", "hlg", "log100", "log316", "linear")  # curves of more light than a film of 8 bits holds
+
+
+class OfSource:
+    """Frames of whatever `vid2ev.open_source` opens."""
+
+    event_size: tuple[int, int] | None = None
+    contrast: tuple[float, float] | None = None
+
+    def __init__(self, path: str, options: Options):
+        if options.contrast:
+            raise UsageError(f"--contrast says what events stand for, and {path} has none; leave it out")
+        self._source = open_source(
+            path,
+            transfer=options.transfer,
+            fps=options.source_hz,
+            colour="rgb",
+            start=options.start_s,
+            stop=options.stop_s,
+            crop=options.crop,
+            size=options.size,
+        )
+        if not self._source.rewindable:
+            raise UsageError(f"{path} can be read once only; save it as a file to interpolate it")
+        self._about = self._source.describe()
+        self.name, self.size = Path(path).stem, self._source.size
+        self.channels = 1 if _is_grey(self._about) else 3
+        self.bits = 8 if self._about.get("bits", 16) <= 8 or self._about.get("type") == "uint8" else 16
+        said = str(self._about.get("transfer", "srgb"))
+        self.curve = "bt709" if said in BRIGHT else said
+        rate = self._about.get("fps") or self._about.get("rate")
+        self.rate = Fraction(rate) if rate else self._mean_rate()
+
+    @property
+    def remarks(self) -> list[str]:
+        """Those of the source."""
+        bright = self._about.get("transfer") in BRIGHT
+        clipped = [f"light above white is kept in EXR only: the transfer curve is {self._about['transfer']}"] * bright
+        return [*self._source.warnings, *clipped]
+
+    @property
+    def gaps_expected(self) -> int | None:
+        """By the header of the file."""
+        count = self._source.frames_expected
+        return None if count is None else max(count - 1, 0)
+
+    def describe(self) -> dict[str, Any]:
+        """What the source says."""
+        return self._about
+
+    def keys(self, start: int = 0) -> Iterator[Key]:
+        """See `Take`."""
+        for frame in self._source.frames(start):
+            light = torch.from_numpy(np.nan_to_num(frame.light, nan=0.0))
+            codes = to_codes(light if self.channels == 3 else light[..., :1], "srgb").numpy()
+            yield Key(round(Fraction(frame.t_ns, 1000)), codes)
+
+    def _mean_rate(self) -> Fraction:
+        gaps, span_s = self.gaps_expected, self._source.duration_expected_s
+        return Fraction(gaps / span_s).limit_denominator(FINEST) if gaps and span_s else Fraction(30)
+
+    def events(self, start_us: int, stop_us: int) -> Events | None:
+        """None."""
+        return None
+
+
+def _is_grey(about: dict[str, Any]) -> bool:
+    if about.get("kind") == "images":
+        from vid2ev.light.picture_files import read_picture
+        from vid2ev.light.recognise import PICTURE_SUFFIXES
+
+        path = Path(about["path"])
+        files = (
+            [file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES] if path.is_dir() else [path]
+        )
+        return all(read_picture(file).pixels.ndim == 2 for file in files[:1])
+    return str(about.get("pixel_format", "")).startswith("gray")

@@ -1,0 +1,85 @@
+"""Frames as pictures: codes of a film, codes or light in files.
+
+png    sRGB codes of 8 bits, or 16 where the source has more than 8; those of key frames are the source's own
+mp4    codes of 8 bits by the source's own curve, so that the film is as bright as the source
+exr    float32, linear light, white at 1.0 and no upper end; needs the package OpenEXR
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from interp.interpolate.fill import Filled
+from interp.interpolate.instants import Grid, Rate, Times, parse_number
+from interp.interpolate.take import Take
+from interp.light import to_light
+from vid2ev.errors import UsageError
+from vid2ev.light.transfer import parse_transfer
+from vid2ev.recording.exposures import write_codes
+
+TABLE = 65535  # entries of the table of a curve, less one
+
+
+class Pictures:
+    """Makes pictures of frames.
+
+    kind    mp4, png or exr
+    bits    8 or 16, of PNG
+    curve   of a film
+    Raises UsageError for EXR without the package.
+    """
+
+    def __init__(self, kind: str, bits: int, curve: str):
+        self.kind, self.bits, self.curve = kind, bits if kind == "png" else 8, curve
+        self._write = None
+        if kind == "exr":
+            from vid2ev.scenes.picture_writing import writer_of
+
+            self._write = writer_of("exr")[0]
+        self._film = _by_curve(curve) if kind == "mp4" and curve != "srgb" else None
+
+    def describe(self) -> str:
+        """For people, and for JSON."""
+        return {"png": f"png of {self.bits} bits", "mp4": f"mp4 by the curve {self.curve}", "exr": "exr"}[self.kind]
+
+    def picture(self, frame: Filled) -> np.ndarray:
+        """What is written of a frame: codes, or light [H, W, 3]."""
+        codes = frame.codes
+        if self.kind == "exr":
+            light = to_light(torch.from_numpy(np.ascontiguousarray(codes)), "srgb").numpy()
+            return light if light.shape[2] == 3 else np.repeat(light, 3, axis=2)
+        codes = np.clip(codes if codes.shape[2] == 3 else codes[..., 0], 0, 1)
+        if self._film is not None:
+            return self._film[np.rint(codes * np.float32(TABLE)).astype(np.uint16)]
+        top = np.float32(2**self.bits - 1)
+        return np.rint(codes * top).astype(np.uint8 if self.bits == 8 else np.uint16)
+
+    def write(self, path: Path, picture: np.ndarray) -> None:
+        """Write a picture; raises OSError."""
+        if self._write is None:
+            write_codes(path, picture)
+        else:
+            self._write(picture, path)
+
+
+def film_rate(take: Take, grid: Grid, play: str | float | Fraction | None) -> Fraction:
+    """Frames per second of a film: as asked, or so that it plays in real time.  Raises UsageError."""
+    if play is not None:
+        rate = parse_number(play, "--play")
+        if not 0 < rate <= 1000:
+            raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
+        return rate
+    if isinstance(grid, Rate):
+        return grid.rate_hz
+    assert isinstance(grid, Times)
+    return grid.multiple * take.rate
+
+
+def _by_curve(curve: str) -> np.ndarray:
+    """The code of 8 bits [uint8] by a curve of each sRGB code of `TABLE`."""
+    light = parse_transfer("srgb").to_light(np.arange(TABLE + 1) / TABLE)
+    return np.rint(255 * np.clip(parse_transfer(curve).to_signal(light), 0, 1)).astype(np.uint8)

@@ -1,0 +1,114 @@
+"""What is interpolated: frames in order of time, and events beside them, one gap after the other.
+
+A new kind is a class that satisfies `Take`, and a line in `open_take`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from vid2ev import Events
+from vid2ev.errors import UsageError
+
+__all__ = ["AS_IT_IS", "Key", "Options", "Take", "open_take"]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A frame as it came: sRGB codes float32 [H, W, C], C 1 or 3, of which 1 is full code; and when [us]."""
+
+    t_us: int
+    codes: np.ndarray = field(repr=False)
+
+
+class Take(Protocol):
+    """Key frames, and events if there are any.
+
+    name         for files
+    size         width and height of the frames [px]
+    channels     1 or 3
+    bits         8 or 16: what holds the codes of its frames as they are
+    curve        the transfer curve of a film of it that looks as it does
+    rate         frames per second, as the file says, or on average
+    gaps_expected  how many gaps there should be; None if there is no telling
+    event_size   width and height of the event camera [px]; None without one
+    contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    remarks      what a person should know, one sentence each; more may come while it is read
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    @property
+    def channels(self) -> int: ...
+    @property
+    def bits(self) -> int: ...
+    @property
+    def curve(self) -> str: ...
+    @property
+    def rate(self) -> Fraction: ...
+    @property
+    def gaps_expected(self) -> int | None: ...
+    @property
+    def event_size(self) -> tuple[int, int] | None: ...
+    @property
+    def contrast(self) -> tuple[float, float] | None: ...
+    @property
+    def remarks(self) -> list[str]: ...
+
+    def describe(self) -> dict[str, Any]:
+        """What it is, for JSON."""
+
+    def keys(self, start: int = 0) -> Iterator[Key]:
+        """The key frames from index `start` on, their times strictly increasing.  Raises DataError."""
+
+    def events(self, start_us: int, stop_us: int) -> Events | None:
+        """The events in (start_us, stop_us], within `event_size`; None where they are not known.  Quick if each begins
+        where the one before ended.  Raises DataError for files that cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How it is read.
+
+    start_s, stop_s   the part to take: on a video's own clock, of a recording after its first frame [s]
+    crop, size, transfer   of videos and images, as `vid2ev.open_source` takes them
+    source_hz   frames per second, where the source has no times
+    contrast    what an OFF and an ON event stand for [nat], in place of what the recording says
+    """
+
+    start_s: float | None = None
+    stop_s: float | None = None
+    crop: str | None = None
+    size: str | None = None
+    transfer: str = "auto"
+    source_hz: Fraction | None = None
+    contrast: tuple[float, float] | None = None
+
+
+AS_IT_IS = Options()
+
+
+def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
+    """A recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, or any video or folder of images.
+
+    Raises UsageError for what is none of these, or options that it cannot have, DataError for what is damaged.
+    """
+    if not Path(path).exists():
+        raise UsageError(f"{path}: no such file or folder; give a recording, a video or a folder of images")
+    from interp.data.layouts import is_sequence
+
+    if is_sequence(path):
+        from interp.interpolate.of_sequence import OfSequence
+
+        return OfSequence(Path(path), options)
+    from interp.interpolate.of_source import OfSource
+
+    return OfSource(str(path), options)

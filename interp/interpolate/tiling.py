@@ -1,0 +1,150 @@
+"""Large frames in tiles that overlap, so that memory is bounded whatever the size of the frames.
+
+    a tile begins at a whole multiple of what its network takes: what it computes lies on the same grid as of the whole
+    frames w(d) = s((d / overlap - 1/4) / (1/2)),  s(u) = u^2 (3 - 2 u), u within 0 ... 1
+
+d [px] is how far a pixel lies within the overlap; the tile that begins there weighs w, the one that ends 1 - w.  The
+outer quarter of each tile's overlap, of which a network sees least around, does not count at all.  Each tile is a gap
+for itself, with its part of the events: what is done once per gap, such as the first flow, is done once per tile.
+
+Frames of up to `WHOLE_PX` pixels are not divided unless asked for, larger ones into tiles of about as many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil
+
+import torch
+
+from interp.methods import Gap, Method
+from interp.representation.carried import carried, places_over
+from interp.representation.event_counts import EventCounts
+from vid2ev.errors import UsageError
+
+WHOLE_PX = 1 << 20
+SIDE = 1024  # px of tiles, unless asked for
+OVERLAP = 128  # px
+LEAST = 64  # px
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A part of the frames [px]: from left and top up to, not including, right and bottom."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def within(self) -> tuple[slice, slice]:
+        """Its rows and columns."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+
+@dataclass(frozen=True, slots=True)
+class Tiling:
+    """How frames of a size are divided.
+
+    across, down   where tiles begin and end on each axis
+    """
+
+    across: tuple[tuple[int, int], ...]
+    down: tuple[tuple[int, int], ...]
+
+    def __len__(self) -> int:
+        return len(self.across) * len(self.down)
+
+    def __iter__(self) -> Iterator[Tile]:
+        return (Tile(left, top, right, bottom) for top, bottom in self.down for left, right in self.across)
+
+    def weights(self, tile: Tile) -> torch.Tensor:
+        """How much each of a tile's pixels counts, [h, w]; those of all tiles add up to 1."""
+        rows = _weights(self.down, (tile.top, tile.bottom))
+        return rows[:, None] * _weights(self.across, (tile.left, tile.right))
+
+    def describe(self) -> str:
+        """For people, and for JSON."""
+        if len(self) == 1:
+            return "none"
+        width, height = (max(stop - start for start, stop in axis) for axis in (self.across, self.down))
+        return f"{len(self)} tiles of {width}x{height}"
+
+
+def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
+    """The tiling of frames of a size (width, height): none, auto, or WxH; tiles begin at whole multiples.
+
+    Raises UsageError for a text that says none of these, or for tiles smaller than `LEAST`.
+    """
+    if text == "none" or (text == "auto" and size[0] * size[1] <= WHOLE_PX):
+        return Tiling(((0, size[0]),), ((0, size[1]),))
+    width, times, height = text.partition("x")
+    if text == "auto":
+        sides = SIDE, SIDE
+    elif times and width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= LEAST:
+        sides = int(width), int(height)
+    else:
+        raise UsageError(f"tile '{text}': expected none, auto, or WIDTHxHEIGHT of at least {LEAST}, such as 512x512")
+    across, down = (_parts(length, side, multiple) for length, side in zip(size, sides, strict=True))
+    return Tiling(across, down)
+
+
+def between(method: Method, gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+    """What `method.between` makes of a gap, tile by tile: [N, C, H, W].
+
+    A method whose images depend on the gaps before is not divided.
+    """
+    if len(tiling) == 1 or method.sequential:
+        return method.between(gap, times)
+    whole = gap.frame_0.new_zeros(len(times), *gap.frame_0.shape)
+    for tile in tiling:
+        made = method.between(part(gap, tile), times)
+        whole[(..., *tile.within)] += made * tiling.weights(tile).to(made)
+    return whole
+
+
+def part(gap: Gap, tile: Tile) -> Gap:
+    """The part of a gap in a tile; events of another resolution are laid over the frames first."""
+    frames = [frame[(..., *tile.within)] for frame in (gap.frame_0, gap.frame_1)]
+    events = None if gap.events is None else _events(gap.events, gap.frame_0.shape[-2:], tile)
+    return replace(gap, frame_0=frames[0], frame_1=frames[1], events=events)
+
+
+def _events(events: EventCounts, size: torch.Size, tile: Tile) -> EventCounts:
+    if events.off_on.shape[-2:] == size:
+        return replace(events, off_on=events.off_on[(..., *tile.within)])
+    return carried(events, places_over(events, (size[0], size[1]))[tile.within])
+
+
+def _parts(length: int, side: int, multiple: int) -> tuple[tuple[int, int], ...]:
+    """Where tiles of about a side begin and end on an axis."""
+    if length <= side:
+        return ((0, length),)
+    overlap = _up(min(OVERLAP, side // 4), multiple)
+    count = ceil((length - overlap) / max(side - overlap, multiple))
+    step = _up(ceil((length - overlap) / count), multiple)
+    starts = range(0, length - overlap, step)
+    return tuple((start, min(start + step + overlap, length)) for start in starts)
+
+
+def _weights(parts: tuple[tuple[int, int], ...], own: tuple[int, int]) -> torch.Tensor:
+    at = parts.index(own)
+    weights = torch.ones(own[1] - own[0])
+    if at > 0:
+        rising = _ramp(parts[at - 1][1] - own[0])
+        weights[: len(rising)] = rising
+    if at + 1 < len(parts):
+        falling = 1 - _ramp(own[1] - parts[at + 1][0])
+        weights[len(weights) - len(falling) :] = falling
+    return weights
+
+
+def _ramp(overlap: int) -> torch.Tensor:
+    u = (2 * ((torch.arange(overlap) + 0.5) / overlap - 0.25)).clamp(0, 1)
+    return u * u * (3 - 2 * u)
+
+
+def _up(value: int, multiple: int) -> int:
+    return -(-value // multiple) * multiple

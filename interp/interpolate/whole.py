@@ -1,0 +1,165 @@
+"""`interpolate`: from a recording or a video to its frames at more instants, in a film or a folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from interp.interpolate.choice import FALLBACK, Choice, choice
+from interp.interpolate.fill import Fill
+from interp.interpolate.instants import Grid, Rate, Times, parse_number
+from interp.interpolate.pictures import Pictures, film_rate
+from interp.interpolate.shelf import Shelf, kind_of, manifest_of
+from interp.interpolate.stretches import stretches
+from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
+from interp.interpolate.tiling import Tiling, parse_tiling
+from interp.methods import open_method
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.manifest import machine, versions
+
+Number = str | float | Fraction
+Report = Callable[[int, int | None], object]  # frames done, of how many
+MULTIPLE = 8
+
+
+def interpolate(
+    source: str | Path,
+    output: str | Path,
+    *,
+    multiple: Number | None = None,
+    fps: Number | None = None,
+    method: str | None = None,
+    network: str | Path | None = None,
+    format: str | None = None,
+    play: Number | None = None,
+    tile: str = "auto",
+    cuts: str = "hold",
+    device: str = "cpu",
+    options: Options = AS_IT_IS,
+    overwrite: bool = False,
+    resume: bool = False,
+    report: Report | None = None,
+    told: Callable[[str], object] | None = None,
+) -> dict[str, Any]:
+    """Make the frames of a recording or a video at more instants; returns the manifest.
+
+    source     a recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, a video, or a folder of images
+    output     a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
+    multiple   so many times the frames, 8 by default; or `fps`, frames per second of the world's time
+    method, network   a name of `interp.methods.METHODS`, or a file of weights; by default what is best for the source
+    format     mp4, png, or exr (linear light); by default as `output` says
+    play       frames per second at which the film plays, for slow motion; by default in real time
+    tile       none, WIDTHxHEIGHT, or auto: large frames in tiles
+    cuts       hold: nothing is interpolated across a cut; keep: cuts are not looked for
+    device     cpu, cuda or auto
+    resume     go on where an interrupted run was, to the same bytes; what is finished is left as it is
+    report     told how many frames are done, of how many
+    told       told in one sentence which method was chosen, and why
+
+    Raises UsageError for requests that cannot be meant, DataError for what cannot be read or written.
+    """
+    output, grid = Path(output), grid_of(multiple, fps)
+    kind = kind_of(output, format)
+    if cuts not in ("hold", "keep"):
+        raise UsageError(f"cuts '{cuts}': expected hold or keep")
+    take, where = open_take(source, options), device_of(device)
+    chosen = choice(method, network, take.event_size is not None, str(source), where)
+    if told:
+        told(f"{chosen.method.name}: {chosen.why}")
+    tiling = parse_tiling(tile, take.size, multiple_of(chosen))
+    rate = film_rate(take, grid, play)
+    pictures = Pictures(kind, take.bits, take.curve)
+    job = {
+        "versions": versions(("torch",)),
+        "source": take.describe(),
+        "part": {"start_s": options.start_s, "stop_s": options.stop_s},
+        "grid": grid.describe(),
+        "interpolation": chosen.about,
+        "tiles": tiling.describe(),
+        "cuts": cuts,
+        "format": pictures.describe(),
+        "film_rate": str(rate) if kind == "mp4" else None,
+    }
+    with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write) as shelf:
+        if shelf.finished:
+            return shelf.finished
+        started, there = time.perf_counter(), shelf.count
+        fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, where)
+        _fill(shelf, take, grid, fill, cuts == "hold", pictures, report)
+        seconds = time.perf_counter() - started
+        run = {"seconds": round(seconds, 3), "frames": shelf.count - there, "device": str(where), "machine": machine()}
+        manifest = shelf.job | _result(shelf, take, tiling) | {"run": run}
+        shelf.publish(manifest)
+    return manifest
+
+
+def grid_of(multiple: Number | None, fps: Number | None) -> Grid:
+    """The grid of a multiple or a rate.  Raises UsageError for both."""
+    if multiple is not None and fps is not None:
+        raise UsageError(f"-x {multiple} and --fps {fps} each say how many frames; leave out one of them")
+    if fps is not None:
+        return Rate(parse_number(fps, "--fps"))
+    return Times(parse_number(MULTIPLE if multiple is None else multiple, "-x"))
+
+
+def device_of(name: str) -> torch.device:
+    """cpu, cuda, or with auto the GPU if there is one.  Raises UsageError for a GPU that is not there."""
+    if name not in ("cpu", "cuda", "auto"):
+        raise UsageError(f"device '{name}': expected cpu, cuda or auto")
+    there = torch.cuda.is_available()
+    if name == "cuda" and not there:
+        raise UsageError("device cuda: no GPU that torch can use here; choose cpu or auto")
+    return torch.device("cuda" if there and name != "cpu" else "cpu")
+
+
+def multiple_of(chosen: Choice) -> int:
+    """Of what tiles must begin at whole multiples."""
+    return int(getattr(getattr(chosen.method, "network", None), "multiple", 2))
+
+
+def _fill(
+    shelf: Shelf, take: Take, grid: Grid, fill: Fill, look: bool, pictures: Pictures, report: Report | None
+) -> None:
+    """Make what is not there yet."""
+    zero_us = shelf.done[0]["key_us"] if shelf.done else None
+    gaps, done = take.gaps_expected, shelf.count
+    total = None if gaps is None else grid.count(gaps, 0) if grid.parts else None
+    if report:
+        report(done, total)
+    for stretch in stretches(take, grid, zero_us, len(shelf.done), look):
+        remark, frames = fill.fill(stretch)
+        times = []
+        with shelf.writing():
+            for frame in frames:
+                shelf.put(frame.instant.number, pictures.picture(frame))
+                times.append(frame.instant.t_us)
+                done += 1
+                if report:
+                    report(done, total)
+            shelf.stretch({"key_us": stretch.first.t_us, "t_us": times, "remark": remark})
+    if not shelf.count:
+        raise DataError(f"{take.name} holds no frame; give another part of it")
+
+
+def _result(shelf: Shelf, take: Take, tiling: Tiling) -> dict[str, Any]:
+    """What the manifest says of what was made."""
+    named: dict[str, list[list[float]]] = {}
+    for line, after in zip(shelf.done, [*shelf.done[1:], None], strict=True):
+        if line["remark"]:
+            assert after is not None
+            named.setdefault(line["remark"], []).append([line["key_us"] / 1e6, after["key_us"] / 1e6])
+    return {
+        "frames": shelf.count,
+        "key_frames": len(shelf.done),
+        "size": list(take.size),
+        "start_us": shelf.done[0]["key_us"],
+        "stop_us": shelf.done[-1]["key_us"],
+        "gaps_s": named,
+        "remarks": list(take.remarks),
+        "manifest": str(manifest_of(shelf.output, shelf.kind)),
+    }

@@ -1,0 +1,189 @@
+"""What `interpolate` makes: key frames as they came, held cuts, gaps without events, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_takes import SIZE, STEP_US, images, moving, recording, texture, times_of
+
+from interp.commands.interpolate import interpolate as command
+from interp.interpolate.whole import interpolate
+from vid2ev import open_source
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.exposures import read_codes, write_codes
+
+
+def made(folder: Path) -> list[np.ndarray]:
+    return [read_codes(path) for path in sorted(folder.glob("*.png"))]
+
+
+@pytest.mark.parametrize(("multiple", "every"), [(2, 2), (7, 7), ("2.5", 5)])
+@pytest.mark.parametrize("kind", ["images", "recording"])
+def test_key_frames_are_there_bit_for_bit(tmp_path: Path, multiple: object, every: int, kind: str) -> None:
+    frames = moving(5)
+    source = images(tmp_path / "in", frames) if kind == "images" else recording(tmp_path / "in", frames)
+    told = interpolate(source, tmp_path / "out", multiple=multiple, method="linear")
+    keys = range(0, 5, 1 if every != 5 else 2)
+    out, times = made(tmp_path / "out"), times_of(tmp_path / "out")
+    assert told["frames"] == len(out) == len(times)
+    for k in keys:
+        np.testing.assert_array_equal(out[int(k * float(str(multiple)))], frames[k])
+        assert times[int(k * float(str(multiple)))] == STEP_US * k
+
+
+def test_frames_of_16_bits_and_grey_ones_stay_what_they_are(tmp_path: Path) -> None:
+    deep = [(np.random.default_rng(k).integers(0, 65536, (32, 40, 3))).astype(np.uint16) for k in range(2)]
+    interpolate(images(tmp_path / "deep", deep), tmp_path / "out16", multiple=2, method="linear", cuts="keep")
+    grey = [frame[..., 0] for frame in moving(2)]
+    interpolate(images(tmp_path / "grey", grey), tmp_path / "out8", multiple=2, method="linear")
+    for frames, folder in ((deep, "out16"), (grey, "out8")):
+        out = made(tmp_path / folder)
+        for found, frame in zip(out[::2], frames, strict=True):
+            np.testing.assert_array_equal(found, frame)
+        middle = (frames[0].astype(float) + frames[1]) / 2
+        assert np.abs(out[1] - middle).max() <= 0.51 and out[1].dtype == frames[0].dtype
+
+
+@pytest.mark.parametrize("method", ["nearest", "linear", "flow", "integration", "both", "bridge"])
+def test_where_nothing_happens_all_frames_are_the_key_frame(tmp_path: Path, method: str) -> None:
+    frame = texture()[:, : SIZE[0]]
+    source = recording(tmp_path / "in", [frame] * 3)
+    for path in (source / "events_aligned").iterdir():  # (all events beside the frames: they say when it was recorded)
+        columns = dict(np.load(path))
+        np.savez(path, **(columns | {"x": columns["x"] + np.float32(SIZE[0] + 0.5)}))
+    told = interpolate(source, tmp_path / "out", multiple=4, method=method)
+    assert not told["gaps_s"]
+    for found in made(tmp_path / "out"):
+        np.testing.assert_array_equal(found, frame)
+
+
+def test_nothing_is_interpolated_across_a_cut(tmp_path: Path) -> None:
+    frames = [*moving(4, seed=1), *moving(4, seed=2)]
+    for name, source in (
+        ("images", images(tmp_path / "a", frames)),
+        ("recording", recording(tmp_path / "b", frames)),
+    ):
+        told = interpolate(source, tmp_path / f"{name}_out", multiple=4)
+        assert told["gaps_s"] == {"a cut": [[3 * STEP_US / 1e6, 4 * STEP_US / 1e6]]}
+        out = made(tmp_path / f"{name}_out")
+        for number in (12, 13, 14):
+            np.testing.assert_array_equal(out[number], frames[3])
+        for number in (15, 16):
+            np.testing.assert_array_equal(out[number], frames[4])
+    told = interpolate(tmp_path / "a", tmp_path / "keep", multiple=4, method="linear", cuts="keep")
+    assert not told["gaps_s"] and not np.array_equal(made(tmp_path / "keep")[13], frames[3])
+
+
+def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
+    source = recording(tmp_path / "in", moving(5), until=2)
+    told = interpolate(source, tmp_path / "out", multiple=2)
+    assert told["interpolation"]["method"] == "bridge"
+    seconds = [STEP_US * k / 1e6 for k in range(5)]
+    assert told["gaps_s"] == {"events that are not known": [[seconds[2], seconds[3]], [seconds[3], seconds[4]]]}
+    flow = interpolate(source, tmp_path / "flow", multiple=2, method="flow")
+    assert not flow["gaps_s"]
+    np.testing.assert_array_equal(made(tmp_path / "out")[5], made(tmp_path / "flow")[5])
+
+
+def test_a_part_begins_and_ends_at_frames(tmp_path: Path) -> None:
+    from interp.interpolate.take import Options
+
+    frames = moving(6)
+    for name, source in (("a", images(tmp_path / "a", frames)), ("b", recording(tmp_path / "b", frames))):
+        options = Options(start_s=STEP_US / 1e6, stop_s=3.5 * STEP_US / 1e6)
+        told = interpolate(source, tmp_path / f"{name}_out", multiple=2, method="linear", options=options)
+        assert told["key_frames"] == 3 and told["start_us"] == STEP_US and told["stop_us"] == 3 * STEP_US
+        np.testing.assert_array_equal(made(tmp_path / f"{name}_out")[0], frames[1])
+
+
+def test_a_folder_of_frames_is_a_source_again(tmp_path: Path) -> None:
+    interpolate(images(tmp_path / "in", moving(3), step_us=120), tmp_path / "out", multiple=4)
+    times = [frame.t_ns for frame in open_source(tmp_path / "out").frames()]
+    assert times == [30_000 * k for k in range(9)]  # (microseconds, though their spacing looks like milliseconds)
+
+
+def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
+    frames = moving(4)
+    source = images(tmp_path / "in", frames)
+    told = interpolate(source, tmp_path / "film.mp4", multiple=2)
+    assert json.loads((tmp_path / "film.json").read_text())["frames"] == told["frames"] == 7
+    film = open_source(tmp_path / "film.mp4", transfer="srgb")
+    seen = [frame.light for frame in film.frames()]
+    assert len(seen) == 7 and film.size == SIZE
+    truth = [frame.light for frame in open_source(source).frames()]
+    for key, light in zip(seen[::2], truth, strict=True):
+        assert np.abs(key - light).mean() < 0.02  # (the film has lost a little)
+    truth = [frame.light for frame in open_source(source, colour="rgb").frames()]
+    pytest.importorskip("OpenEXR")
+    interpolate(source, tmp_path / "light", multiple=2, format="exr")
+    again = [frame.light for frame in open_source(tmp_path / "light", colour="rgb").frames()]
+    for key, light in zip(again[::2], truth, strict=True):
+        np.testing.assert_allclose(key, light, rtol=1e-5, atol=1e-6)
+
+
+def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
+    from interp import pretrained
+
+    said: list[str] = []
+    interpolate(images(tmp_path / "a", moving(2)), tmp_path / "out", multiple=1, told=said.append)
+    interpolate(recording(tmp_path / "b", moving(2)), tmp_path / "out2", multiple=1, told=said.append)
+    for events, sentence, name in ((False, said[0], "flow"), (True, said[1], "bridge")):
+        weights = pretrained.default(events)
+        assert sentence.startswith(weights.stem if weights else name) and "since there are" in sentence
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (["nowhere"], 2, "no such file"),
+        (["a", "-x", "many"], 2, "expected a number"),
+        (["a", "-x", "2", "--fps", "60"], 2, "leave out one"),
+        (["a", "--method", "bridge"], 2, "needs events"),
+        (["a", "--method", "brige"], 2, "did you mean bridge"),
+        (["a", "--contrast", "0.2"], 2, "has none"),
+        (["b", "--contrast", "much"], 2, "expected nats"),
+        (["b", "--size", "32"], 2, "leave --size out"),
+        (["a", "--tile", "8x8"], 2, "expected none, auto"),
+        (["a", "-o", "out.avi"], 2, "cannot be made"),
+        (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),
+        (["a", "-o", "a"], 2, "exists"),
+        (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
+        (["b", "--start", "9"], 2, "choose another part"),
+        (["bad"], 1, "without times|pictures and"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    images(tmp_path / "a", moving(2))
+    recording(tmp_path / "b", moving(2))
+    recording(tmp_path / "bad", moving(2))
+    (tmp_path / "bad" / "images_corrected" / "timestamp.txt").write_text("")
+    (tmp_path / "weights.safetensors").write_bytes(b"nothing")
+    before = sorted(tmp_path.rglob("*"))
+    result = CliRunner().invoke(command, arguments)
+    assert isinstance(result.exception, (UsageError, DataError))
+    assert result.exception.exit_code == code
+    message = str(result.exception)
+    import re
+
+    assert re.search(sentence, message) and "\n" not in message and message.count(". ") == 0
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    images(tmp_path / "a", moving(3))
+    result = CliRunner().invoke(command, ["a", "-x", "2", "--method", "linear"])
+    assert result.exit_code == 0, result.output
+    assert "a_x2.mp4: 5 frames of 64x48 as mp4" in result.output
+    again = CliRunner().invoke(command, ["a", "-x", "2", "--method", "linear", "--resume", "--json"])
+    assert json.loads(again.output)["frames"] == 5
+    write_codes(tmp_path / "a" / "000001.png", moving(3)[0])
+    other = CliRunner().invoke(command, ["a", "-x", "3", "--method", "linear", "-o", "a_x2.mp4", "--resume"])
+    assert isinstance(other.exception, UsageError) and "--overwrite starts again" in str(other.exception)
