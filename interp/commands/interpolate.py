@@ -28,6 +28,10 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     "  [default: a network that comes with vid2ev, if there is one; bridge with events, flow without]",
 )  # fmt: skip
 @click.option("--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS", help="Of `vid2ev train`.")
+@click.option(
+    "--hdr", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
+    help="Of `vid2ev train --network hdr`: gives all frames, key frames too, the range that events show.",
+)  # fmt: skip
 @click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_x8.mp4 here]")
 @click.option(
     "--format", type=click.Choice(["mp4", "png", "exr"]),

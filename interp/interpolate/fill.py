@@ -12,12 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import ceil
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import torch
 
 from interp.candidates.contrast import with_fitted_contrast
 from interp.interpolate.instants import Instant
+from interp.interpolate.memory import as_arrays, nested
 from interp.interpolate.stretches import CUT, UNRELATED, Stretch
 from interp.interpolate.take import Key, Take
 from interp.interpolate.tiling import Tiling, between
@@ -30,20 +32,47 @@ AT_ONCE = 1 << 28  # values of frames that are made at a time, 4 bytes each
 NO_EVENTS = "events that are not known"
 
 
+@runtime_checkable
+class Remembering(Protocol):
+    """A method whose images depend on the gaps before, by its states alone: nested tuples of tensors."""
+
+    states: Any
+
+
 @dataclass(frozen=True, slots=True)
 class Filled:
-    """A frame: sRGB codes float32 [H, W, C], not clipped; `key`: it is a key frame, as it came."""
+    """A frame: sRGB codes float32 [H, W, C], not clipped.
+
+    key    whether it is a key frame, as it came
+    shot   how many cuts there were before it
+    """
 
     instant: Instant
     key: bool
+    shot: int
     codes: np.ndarray = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """The frames of a stretch, in order of time, to be taken once.
+
+    remark   why the method was not asked; empty if it was
+    events   what the events of the stretch say, where anybody asks for them and they are known
+    """
+
+    frames: Iterator[Filled]
+    remark: str = ""
+    events: EventCounts | None = None
 
 
 @dataclass(slots=True)
 class Fill:
     """Makes the frames of a take's stretches, which come in their order.
 
-    parts   into how many equal parts the grid divides gaps, if it does
+    parts    into how many equal parts the grid divides gaps, if it does
+    events   whether somebody else needs the events, too
+    shot     how many cuts there were
     """
 
     take: Take
@@ -52,37 +81,50 @@ class Fill:
     tiling: Tiling
     parts: int | None
     device: torch.device | str = "cpu"
+    events: bool = False
+    shot: int = 0
 
-    def fill(self, stretch: Stretch) -> tuple[str, Iterator[Filled]]:
-        """Why the method was not asked, empty if it was; and the frames of the stretch, in order of time."""
-        made = [instant for instant in stretch.instants if instant.share]
-        if stretch.second is None or not made:
-            return "", self._held(stretch)
-        blind = stretch.between == UNRELATED and not self.method.needs_events
-        if stretch.between == CUT or blind:
-            return stretch.between, self._held(stretch)
+    def fill(self, stretch: Stretch) -> Work:
+        """The frames of a stretch."""
+        shot = self.shot
+        self.shot += stretch.between == CUT
+        asked = any(instant.share for instant in stretch.instants)
+        if stretch.between == CUT or (stretch.between == UNRELATED and not self.method.needs_events):
+            return Work(self._held(stretch, shot), stretch.between * asked)
+        if stretch.second is None or not (asked or self.events):
+            return Work(self._held(stretch, shot))
         gap = self._gap(stretch, stretch.second)
-        if self.method.needs_events and gap.events is None:
-            return NO_EVENTS, self._made(stretch, gap, self.fallback)
-        return "", self._made(stretch, gap, self.method)
+        if asked and self.method.needs_events and gap.events is None:
+            return Work(self._made(stretch, gap, self.fallback, shot), NO_EVENTS)
+        return Work(self._made(stretch, gap, self.method, shot), events=gap.events)
 
-    def _made(self, stretch: Stretch, gap: Gap, method: Method) -> Iterator[Filled]:
-        yield from (_as_it_came(instant, stretch.first) for instant in stretch.instants[:1] if not instant.share)
+    def memory(self) -> dict[str, np.ndarray]:
+        """What the method has to remember of the stretches so far."""
+        return as_arrays((self.method.states,)) if isinstance(self.method, Remembering) else {}
+
+    def remember(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take that up."""
+        if arrays and isinstance(self.method, Remembering):
+            (self.method.states,) = nested(arrays, self.device)
+
+    def _made(self, stretch: Stretch, gap: Gap, method: Method, shot: int) -> Iterator[Filled]:
         instants = [instant for instant in stretch.instants if instant.share]
-        some = len(instants) if method.sequential else max(1, AT_ONCE // gap.frame_0.numel())
+        if len(instants) < len(stretch.instants):
+            yield Filled(stretch.instants[0], True, shot, stretch.first.codes)
+        some = max(1, len(instants) if method.sequential else AT_ONCE // gap.frame_0.numel())
         for first in range(0, len(instants), some):
             group = instants[first : first + some]
             times = torch.tensor([float(instant.share) for instant in group], device=self.device)
             images = between(method, gap, times, self.tiling).movedim(1, -1).cpu().numpy()
             for instant, image in zip(group, images, strict=True):
-                yield Filled(instant, False, image)
+                yield Filled(instant, False, shot, image)
 
-    def _held(self, stretch: Stretch) -> Iterator[Filled]:
+    def _held(self, stretch: Stretch, shot: int) -> Iterator[Filled]:
         """The nearer key frames."""
         for instant in stretch.instants:
             later = stretch.second is not None and 2 * instant.share > 1
             nearer = stretch.second if later and stretch.second is not None else stretch.first
-            yield Filled(instant, not instant.share, nearer.codes)
+            yield Filled(instant, not instant.share, shot + (later and stretch.between == CUT), nearer.codes)
 
     def _gap(self, stretch: Stretch, second: Key) -> Gap:
         frames = [_tensor(key).to(self.device) for key in (stretch.first, second)]
@@ -92,7 +134,7 @@ class Fill:
     def _counts(self, first: Key, second: Key, frames: list[torch.Tensor]) -> EventCounts | None:
         """What the events between two key frames say; None where they are not needed, or not known."""
         size = self.take.event_size
-        if not self.method.needs_events or size is None:
+        if not (self.method.needs_events or self.events) or size is None:
             return None
         events = self.take.events(first.t_us, second.t_us)
         if events is None:
@@ -113,10 +155,6 @@ def steps_for(parts: int | None) -> int:
     if parts is None:
         return 2 * FEWEST
     return FEWEST if parts > MOST else parts * ceil(FEWEST / parts)
-
-
-def _as_it_came(instant: Instant, key: Key) -> Filled:
-    return Filled(instant, True, key.codes)
 
 
 def _tensor(key: Key) -> torch.Tensor:

@@ -108,7 +108,7 @@ class Shelf:
     def stretch(self, line: Mapping[str, Any], memory: Mapping[str, np.ndarray] | None = None) -> None:
         """All frames of a stretch are there: `t_us` of the line has their times."""
         sync(self._frames)
-        if memory is not None:
+        if memory:
             with whole_file(self.partial / f"memory-{len(self.done) + 1}.npz") as file:
                 np.savez(file, allow_pickle=False, **memory)
         with open(self.partial / "done.jsonl", "a", encoding="utf-8") as lines:

@@ -8,9 +8,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
-from interp.interpolate.choice import FALLBACK, Choice, choice
+from interp.interpolate.after import After
+from interp.interpolate.choice import FALLBACK, Choice, choice, sha256
 from interp.interpolate.fill import Fill
 from interp.interpolate.instants import Grid, Rate, Times, parse_number
 from interp.interpolate.pictures import Pictures, film_rate
@@ -35,6 +37,7 @@ def interpolate(
     fps: Number | None = None,
     method: str | None = None,
     network: str | Path | None = None,
+    hdr: str | Path | None = None,
     format: str | None = None,
     play: Number | None = None,
     tile: str = "auto",
@@ -52,6 +55,7 @@ def interpolate(
     output     a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
     multiple   so many times the frames, 8 by default; or `fps`, frames per second of the world's time
     method, network   a name of `interp.methods.METHODS`, or a file of weights; by default what is best for the source
+    hdr        weights of HDR post-processing, which changes all frames, key frames too
     format     mp4, png, or exr (linear light); by default as `output` says
     play       frames per second at which the film plays, for slow motion; by default in real time
     tile       none, WIDTHxHEIGHT, or auto: large frames in tiles
@@ -71,6 +75,7 @@ def interpolate(
     chosen = choice(method, network, take.event_size is not None, str(source), where)
     if told:
         told(f"{chosen.method.name}: {chosen.why}")
+    after = After(Path(hdr), take.event_size is not None, where) if hdr else None
     tiling = parse_tiling(tile, take.size, multiple_of(chosen))
     rate = film_rate(take, grid, play)
     pictures = Pictures(kind, take.bits, take.curve)
@@ -80,6 +85,7 @@ def interpolate(
         "part": {"start_s": options.start_s, "stop_s": options.stop_s},
         "grid": grid.describe(),
         "interpolation": chosen.about,
+        "hdr": {"weights": str(hdr), "sha256": sha256(Path(hdr))} if hdr else None,
         "tiles": tiling.describe(),
         "cuts": cuts,
         "format": pictures.describe(),
@@ -90,7 +96,7 @@ def interpolate(
             return shelf.finished
         started, there = time.perf_counter(), shelf.count
         fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, where)
-        _fill(shelf, take, grid, fill, cuts == "hold", pictures, report)
+        _fill(shelf, fill, after, grid, cuts == "hold", pictures, report)
         seconds = time.perf_counter() - started
         run = {"seconds": round(seconds, 3), "frames": shelf.count - there, "device": str(where), "machine": machine()}
         manifest = shelf.job | _result(shelf, take, tiling) | {"run": run}
@@ -123,27 +129,43 @@ def multiple_of(chosen: Choice) -> int:
 
 
 def _fill(
-    shelf: Shelf, take: Take, grid: Grid, fill: Fill, look: bool, pictures: Pictures, report: Report | None
+    shelf: Shelf,
+    fill: Fill,
+    after: After | None,
+    grid: Grid,
+    look: bool,
+    pictures: Pictures,
+    report: Report | None,
 ) -> None:
     """Make what is not there yet."""
-    zero_us = shelf.done[0]["key_us"] if shelf.done else None
+    take, zero_us = fill.take, shelf.done[0]["key_us"] if shelf.done else None
+    fill.shot = shelf.done[-1]["shot"] if shelf.done else 0
+    fill.events = after is not None and after.needs_events
+    keepers: dict[str, Fill | After] = {"fill": fill} | ({"after": after} if after else {})
+    for name, keeper in keepers.items():
+        keeper.remember(_of(name, shelf.memory()))
     gaps, done = take.gaps_expected, shelf.count
-    total = None if gaps is None else grid.count(gaps, 0) if grid.parts else None
+    total = grid.count(gaps, 0) if gaps is not None and grid.parts else None
     if report:
         report(done, total)
     for stretch in stretches(take, grid, zero_us, len(shelf.done), look):
-        remark, frames = fill.fill(stretch)
-        times = []
+        work, times = fill.fill(stretch), []
         with shelf.writing():
-            for frame in frames:
+            for frame in after.frames(work) if after else work.frames:
                 shelf.put(frame.instant.number, pictures.picture(frame))
                 times.append(frame.instant.t_us)
                 done += 1
                 if report:
                     report(done, total)
-            shelf.stretch({"key_us": stretch.first.t_us, "t_us": times, "remark": remark})
+            memory = {f"{name}.{key}": array for name, each in keepers.items() for key, array in each.memory().items()}
+            line = {"key_us": stretch.first.t_us, "t_us": times, "remark": work.remark, "shot": fill.shot}
+            shelf.stretch(line, memory)
     if not shelf.count:
         raise DataError(f"{take.name} holds no frame; give another part of it")
+
+
+def _of(name: str, memory: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {key.removeprefix(f"{name}."): array for key, array in memory.items() if key.startswith(f"{name}.")}
 
 
 def _result(shelf: Shelf, take: Take, tiling: Tiling) -> dict[str, Any]:

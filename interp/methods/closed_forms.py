@@ -16,6 +16,7 @@ from interp.methods.gap import Gap
 from interp.representation.carried import over
 from vid2ev.errors import UsageError
 
+AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
 Law = Callable[[Gap, torch.Tensor], torch.Tensor]
 
 
@@ -71,6 +72,8 @@ def of_events(way: Way) -> Law:
         assert gap.events is not None
         height, width = gap.frame_0.shape[-2:]
         events = over(gap.events, (height, width))
-        return bridge(gap.frame_0[None], gap.frame_1[None], events, times[None], method=way)[0]
+        some = max(1, AT_ONCE_PX // (height * width))
+        frames = gap.frame_0[None], gap.frame_1[None]
+        return torch.cat([bridge(*frames, events, part[None], method=way)[0] for part in times.split(some)])
 
     return law

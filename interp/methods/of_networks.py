@@ -15,6 +15,8 @@ from interp.networks.frame_fed import FrameFed
 from interp.weights import load
 from vid2ev.errors import DataError, UsageError
 
+AT_ONCE_PX = 1 << 21  # pixels of images that a network makes at a time: some 200 bytes each of the smallest networks
+
 
 @dataclass(frozen=True, slots=True)
 class OfFrames:
@@ -34,7 +36,9 @@ class OfFrames:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
         events = gap.events if self.needs_events else None
-        return self.network(gap.frame_0[None], gap.frame_1[None], times, events).images[0]
+        pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], events)
+        some = max(1, AT_ONCE_PX // gap.frame_0[0].numel())
+        return torch.cat([self.network.at(pair, part).images[0] for part in times.split(some)])
 
 
 @dataclass(slots=True)

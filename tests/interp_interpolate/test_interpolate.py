@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from small_takes import SIZE, STEP_US, images, moving, recording, texture, times
 
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate.whole import interpolate
+from interp.networks import make
+from interp.weights import save
 from vid2ev import open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import read_codes, write_codes
@@ -152,6 +155,10 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
         (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),
         (["a", "-o", "a"], 2, "exists"),
         (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
+        (["a", "--network", "hdr.safetensors"], 1, "rebuilds no frames"),
+        (["a", "--network", "events.safetensors"], 2, "needs events"),
+        (["a", "--hdr", "hdr.safetensors"], 2, "leave it out"),
+        (["b", "--hdr", "events.safetensors"], 1, "network hdr"),
         (["b", "--start", "9"], 2, "choose another part"),
         (["bad"], 1, "without times|pictures and"),
     ],
@@ -165,13 +172,13 @@ def test_what_is_wrong_is_said_in_one_sentence(
     recording(tmp_path / "bad", moving(2))
     (tmp_path / "bad" / "images_corrected" / "timestamp.txt").write_text("")
     (tmp_path / "weights.safetensors").write_bytes(b"nothing")
+    for name, network in (("hdr", "hdr"), ("events", "rrin_events_light")):
+        save(tmp_path / f"{name}.safetensors", network, make(network))
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(command, arguments)
     assert isinstance(result.exception, (UsageError, DataError))
     assert result.exception.exit_code == code
     message = str(result.exception)
-    import re
-
     assert re.search(sentence, message) and "\n" not in message and message.count(". ") == 0
     assert sorted(tmp_path.rglob("*")) == before
 

@@ -1,0 +1,176 @@
+"""A run that is killed goes on to the same bytes, and nothing is there before all is."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from small_takes import images, moving, recording
+
+from interp.interpolate import shelf
+from interp.interpolate.whole import interpolate
+from interp.networks import make
+from interp.weights import save
+from vid2ev.errors import UsageError
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+
+RUN = """
+import os, signal, sys
+import torch
+torch.set_num_threads(1)
+from interp.interpolate import shelf
+from interp.interpolate.whole import interpolate
+
+shelf.PIECE = 8
+last = int(sys.argv[3])
+
+def report(done, total):
+    if done == last:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+interpolate(sys.argv[1], sys.argv[2], multiple=3, report=report)
+"""
+
+
+def killed(source: Path, output: Path, at: int) -> None:
+    done = subprocess.run([sys.executable, "-c", RUN, source, output, str(at)], capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "manifest.json"}
+
+
+def decoded(film: Path) -> list[np.ndarray]:
+    with av.open(str(film)) as container:
+        return [frame.to_ndarray() for frame in container.decode(video=0)]
+
+
+@pytest.mark.parametrize("at", [1, 3, 11])
+def test_a_folder_goes_on_to_the_same_bytes(tmp_path: Path, at: int) -> None:
+    source = recording(tmp_path / "in", moving(6))
+    interpolate(source, tmp_path / "once", multiple=3)
+    killed(source, tmp_path / "twice", at)
+    assert not (tmp_path / "twice").exists() and (tmp_path / "twice.partial").exists()
+    if at > 3:
+        with pytest.raises(UsageError, match="--resume continues it"):
+            interpolate(source, tmp_path / "twice", multiple=3)
+        with pytest.raises(UsageError, match="begun with grid"):
+            interpolate(source, tmp_path / "twice", multiple=4, resume=True)
+    counted: list[int] = []
+    interpolate(source, tmp_path / "twice", multiple=3, resume=True, report=lambda done, _: counted.append(done))
+    assert counted[0] == at // 3 * 3 - (3 if at % 3 == 0 else 0)  # (a stretch of three frames is done with its line)
+    assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
+    assert not (tmp_path / "twice.partial").exists()
+
+
+def test_a_film_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shelf, "PIECE", 8)
+    source = recording(tmp_path / "in", moving(9))
+    interpolate(source, tmp_path / "once.mp4", multiple=3)
+    killed(source, tmp_path / "twice.mp4", 20)
+    partial = tmp_path / "twice.mp4.partial"
+    assert len(list((partial / "pieces").iterdir())) == 2  # of nine frames each, which are no longer there as PNG
+    assert not (tmp_path / "twice.mp4").exists()
+    interpolate(source, tmp_path / "twice.mp4", multiple=3, resume=True)
+    assert (tmp_path / "once.mp4").read_bytes() == (tmp_path / "twice.mp4").read_bytes()
+    assert len(decoded(tmp_path / "twice.mp4")) == 25
+    assert not partial.exists()
+
+
+def test_what_was_cut_off_in_writing_does_not_count(tmp_path: Path) -> None:
+    source = recording(tmp_path / "in", moving(6))
+    interpolate(source, tmp_path / "once", multiple=3)
+    killed(source, tmp_path / "twice", 11)
+    partial = tmp_path / "twice.partial"
+    with open(partial / "done.jsonl", "a") as journal:
+        journal.write('{"key_us": 1, "t_us": [')
+    (partial / "frames" / "new.png").write_bytes(b"half a picture")
+    interpolate(source, tmp_path / "twice", multiple=3, resume=True)
+    assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
+
+
+@pytest.mark.parametrize("name", ["out", "out.mp4"])
+def test_killed_while_it_is_put_in_place_it_is_there_or_goes_on(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = recording(tmp_path / "in", moving(3))
+    interpolate(source, tmp_path / f"once{Path(name).suffix}", multiple=2)
+
+    class Killed(Exception):
+        pass
+
+    def kill(*_: object) -> None:
+        raise Killed
+
+    for moment in ("before", "after"):
+        with monkeypatch.context() as patched:
+            if moment == "before":
+                patched.setattr(os, "replace", kill)
+                patched.setattr(Path, "rename", kill)
+            else:
+                patched.setattr(shelf.shutil, "rmtree", lambda *_, **__: None)
+            if moment == "before":
+                patched.setattr(shelf, "join_films", kill)
+                with pytest.raises(Killed):
+                    interpolate(source, tmp_path / name, multiple=2)
+                assert not (tmp_path / name).exists()
+            else:
+                interpolate(source, tmp_path / name, multiple=2, resume=True)
+                assert (tmp_path / f"{name}.partial").exists()
+        told = interpolate(source, tmp_path / name, multiple=2, resume=True)
+        assert told["frames"] == 5
+    once = tmp_path / f"once{Path(name).suffix}"
+    if name == "out":
+        assert bytes_of(once) == bytes_of(tmp_path / name)
+    else:
+        assert once.read_bytes() == (tmp_path / name).read_bytes()
+
+
+class Stopped(Exception):
+    pass
+
+
+def stopped_at(last: int) -> Any:
+    def report(done: int, _: int | None) -> None:
+        if done == last:
+            raise Stopped
+
+    return report
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "settings"),
+    [("network", "firenet", {}), ("hdr", "hdr", {}), ("hdr", "hdr", {"second": "frames"})],
+)
+@pytest.mark.parametrize("at", [5, 11])
+def test_what_remembers_goes_on_with_what_it_knew(
+    tmp_path: Path, option: str, name: str, settings: dict[str, Any], at: int
+) -> None:
+    save(tmp_path / "some.safetensors", name, make(name, **settings))
+    source = recording(tmp_path / "in", [*moving(3, seed=1), *moving(3, seed=2)])
+    given: dict[str, Any] = {"multiple": "2.5", option: tmp_path / "some.safetensors"}
+    interpolate(source, tmp_path / "once", **given)
+    with pytest.raises(Stopped):
+        interpolate(source, tmp_path / "twice", report=stopped_at(at), **given)
+    interpolate(source, tmp_path / "twice", resume=True, **given)
+    assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
+
+
+def test_after_a_cut_nothing_is_remembered(tmp_path: Path) -> None:
+    save(tmp_path / "hdr.safetensors", "hdr", make("hdr", second="frames"))
+    first, second = moving(4, seed=1), moving(4, seed=2)
+    given: dict[str, Any] = {"multiple": 2, "hdr": tmp_path / "hdr.safetensors", "method": "linear"}
+    told = interpolate(images(tmp_path / "both", [*first, *second]), tmp_path / "all", **given)
+    assert list(told["gaps_s"]) == ["a cut"]
+    interpolate(images(tmp_path / "one", second), tmp_path / "rest", **given)
+    alone = [(tmp_path / "rest" / f"{k:06d}.png").read_bytes() for k in range(7)]
+    assert [(tmp_path / "all" / f"{k + 8:06d}.png").read_bytes() for k in range(7)] == alone

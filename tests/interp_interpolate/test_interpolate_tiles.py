@@ -1,0 +1,111 @@
+"""Frames made tile by tile are those made at once, but where a network sees beyond its tile."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from interp.interpolate.tiling import LEAST, Tiling, between, parse_tiling, part
+from interp.methods import Gap, open_method
+from interp.methods.of_networks import OfFrames
+from interp.networks import make
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
+from vid2ev.errors import UsageError
+
+SIZE = (272, 208)  # width, height
+TIMES = torch.tensor([0.25, 0.5, 0.75])
+
+
+def gap(event_size: tuple[int, int] = SIZE) -> Gap:
+    coarse = torch.rand(2, 3, 26, 34)
+    frames = torch.nn.functional.interpolate(coarse, SIZE[::-1], mode="bilinear", align_corners=False)
+    counts = torch.poisson(torch.full((1, 2, 8, *event_size[::-1]), 0.05))
+    return Gap(frames[0], frames[1], EventCounts(counts, torch.tensor([[0.15, 0.2]])), 33_333)
+
+
+@pytest.mark.parametrize("multiple", [2, 16, 32])
+@pytest.mark.parametrize("size", [(272, 208), (1920, 1080), (641, 97), (65, 300)])
+@pytest.mark.parametrize("tile", ["64x64", "128x96", "auto", "none"])
+def test_tiles_cover_all_and_their_weights_add_up(size: tuple[int, int], tile: str, multiple: int) -> None:
+    tiling = parse_tiling(tile, size, multiple)
+    total = torch.zeros(size[::-1])
+    for each in tiling:
+        assert each.left % multiple == 0 and each.top % multiple == 0
+        weights = tiling.weights(each)
+        assert weights.shape == (each.bottom - each.top, each.right - each.left)
+        assert float(weights.min()) >= 0 and float(weights.max()) <= 1
+        total[each.within] += weights
+    torch.testing.assert_close(total, torch.ones_like(total))
+
+
+def test_small_frames_are_not_divided_and_large_ones_into_tiles_that_fit() -> None:
+    assert len(parse_tiling("auto", (1280, 800), 32)) == 1
+    for size in ((1920, 1080), (3840, 2160), (1025, 4000)):
+        tiling = parse_tiling("auto", size, 32)
+        assert len(tiling) > 1
+        assert max((each.right - each.left) * (each.bottom - each.top) for each in tiling) <= 1024 * 1024
+    with pytest.raises(UsageError, match=f"at least {LEAST}"):
+        parse_tiling("32x32", (100, 100), 2)
+
+
+@pytest.mark.parametrize("event_size", [SIZE, (136, 104), (90, 70), (544, 416)])
+def test_events_go_with_their_tile(event_size: tuple[int, int]) -> None:
+    whole = gap(event_size)
+    assert whole.events is not None
+    laid = over(whole.events, SIZE[::-1]).off_on
+    for tile in parse_tiling("96x96", SIZE, 32):
+        cut = part(whole, tile)
+        assert cut.events is not None
+        torch.testing.assert_close(cut.events.off_on, laid[(..., *tile.within)])
+        torch.testing.assert_close(cut.frame_1, whole.frame_1[(..., *tile.within)])
+
+
+@pytest.mark.parametrize("method", ["nearest", "linear", "bridge"])
+def test_what_looks_at_a_pixel_alone_is_the_same_in_tiles(method: str) -> None:
+    opened, whole = open_method(method), gap((136, 104))
+    tiled = between(opened, whole, TIMES, parse_tiling("96x96", SIZE, 2))
+    torch.testing.assert_close(tiled, opened.between(whole, TIMES), atol=1e-5, rtol=0)
+
+
+def test_a_network_in_tiles_makes_the_same_but_at_their_borders() -> None:
+    # Two levels see about 40 px around; the outer quarter of the overlap counts nothing.
+    network = make("rrin_events_light", depths=(2, 2, 2, 2), zero_heads=False).eval()
+    method, whole = OfFrames("light", network, needs_events=True), gap()
+    tiling = parse_tiling("192x160", SIZE, network.multiple)
+    assert len(tiling) == 4
+    tiled, at_once = between(method, whole, TIMES, tiling), method.between(whole, TIMES)
+    assert float((at_once - whole.frame_0).abs().max()) > 0.05
+    away = torch.ones(SIZE[::-1], dtype=torch.bool)
+    for tile in tiling:
+        for edge in (tile.left, tile.right):
+            if 0 < edge < SIZE[0]:
+                away[:, max(0, edge - 40) : edge + 40] = False
+        for edge in (tile.top, tile.bottom):
+            if 0 < edge < SIZE[1]:
+                away[max(0, edge - 40) : edge + 40] = False
+    assert float(away.float().mean()) > 0.1
+    torch.testing.assert_close(tiled[..., away], at_once[..., away], atol=1e-5, rtol=0)
+    assert float((tiled - at_once).abs().max()) < 1 / 255
+
+
+def test_a_method_that_remembers_is_not_divided() -> None:
+    class Remembers:
+        name, needs_events, sequential, seen = "remembers", False, True, 0
+
+        def begin(self) -> Remembers:
+            return self
+
+        def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+            self.seen += 1
+            return gap.frame_0.expand(len(times), -1, -1, -1)
+
+    method = Remembers()
+    between(method, gap(), TIMES, parse_tiling("96x96", SIZE, 2))
+    assert method.seen == 1
+
+
+def test_a_tiling_says_what_it_is() -> None:
+    assert parse_tiling("none", SIZE, 32).describe() == "none"
+    assert parse_tiling("128x128", SIZE, 32).describe() == "6 tiles of 128x128"
+    assert isinstance(parse_tiling("128x128", SIZE, 32), Tiling)
