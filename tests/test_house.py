@@ -81,7 +81,8 @@ CLIENT_FLOORS = {
     "evaluate": 7,
     "interpolate": 7,
     "train": 7,
-    "commands": 8,
+    "reconstruct": 8,
+    "commands": 9,
 }
 PACKAGES = {"vid2ev": FLOORS, "interp": CLIENT_FLOORS}
 

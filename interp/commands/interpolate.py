@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import click
 
-from vid2ev.commands import INTERRUPTED
+from interp.commands.making import bar, contrast_of, kept
 
 FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elapsed} gone, {remaining} left"
 
@@ -81,11 +78,11 @@ def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **
         size=options.pop("size"),
         transfer=options.pop("transfer"),
         source_hz=_number(options.pop("source_fps"), "--source-fps"),
-        contrast=_contrast(options.pop("contrast")),
+        contrast=contrast_of(options.pop("contrast")),
     )
     path = output or _default(source, options)
     tell = None if quiet else lambda text: click.echo(f"by {text}")
-    with _kept(path), _bar(quiet) as report:
+    with kept(path), bar(quiet, FRAMES, " frames") as report:
         made = make(source, path, options=taken, report=report, told=tell, **options)
     if as_json:
         click.echo(json.dumps(made, indent=2))
@@ -108,20 +105,6 @@ def _number(text: str | None, option: str) -> Any:
     return None if text is None else parse_number(text, option)
 
 
-def _contrast(text: str | None) -> tuple[float, float] | None:
-    from vid2ev.errors import UsageError
-
-    if text is None:
-        return None
-    try:
-        values = [float(word) for word in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) not in (1, 2) or not all(0 < value < 10 for value in values):
-        raise UsageError(f"--contrast {text}: expected nats, such as 0.2, or of OFF and ON events, such as 0.2,0.25")
-    return values[0], values[-1]
-
-
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
     film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
@@ -135,36 +118,3 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     run = made["run"]
     facts.append(("speed", f"{run['frames'] / max(run['seconds'], 1e-9):.3g} frames/s, {run['seconds']:.3g} s"))
     return [*facts, *(("warning", text) for text in made["remarks"])]
-
-
-@contextmanager
-def _kept(path: Path) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed."""
-    from vid2ev.errors import DataError
-
-    def remedy() -> str:
-        done = path.with_name(f"{path.name}.partial") / "done.jsonl"
-        return "; what is done is kept, the same command with --resume goes on" if done.exists() else ""
-
-    try:
-        yield
-    except DataError as error:
-        raise DataError(f"{error}{remedy()}") from error
-    except KeyboardInterrupt:
-        click.echo(f"interrupted{remedy() or '; nothing is left behind'}", err=True)
-        sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Callable[[int, int | None], None]]:
-    """A progress bar on a terminal: frames, of how many, how fast, and the time left."""
-    from tqdm import tqdm
-
-    with tqdm(total=None, bar_format=FRAMES, leave=False, disable=quiet or None, unit=" frames") as shown:
-
-        def report(done: int, total: int | None) -> None:
-            if shown.total is None:
-                shown.total, shown.initial, shown.n = total, done, done
-            shown.update(done - shown.n)
-
-        yield report

@@ -51,6 +51,16 @@ def choice(
     return Choice(method, why, about)
 
 
+def device_of(name: str) -> torch.device:
+    """cpu, cuda, or with auto the GPU if there is one.  Raises UsageError for a GPU that is not there."""
+    if name not in ("cpu", "cuda", "auto"):
+        raise UsageError(f"device '{name}': expected cpu, cuda or auto")
+    there = torch.cuda.is_available()
+    if name == "cuda" and not there:
+        raise UsageError("device cuda: no GPU that torch can use here; choose cpu or auto")
+    return torch.device("cuda" if there and name != "cpu" else "cpu")
+
+
 def sha256(path: Path) -> str:
     """The digest of a file."""
     with open(path, "rb") as file:

@@ -18,6 +18,7 @@ from typing import Protocol
 
 from vid2ev.errors import UsageError
 
+Number = str | float | Fraction
 SAME_US = 1
 FASTEST_HZ = 100_000
 MOST = 10_000
@@ -144,7 +145,7 @@ class Rate:
         return Instant(number, _rounded(exact), (exact - start_us) / (stop_us - start_us))
 
 
-def parse_number(text: str | float | Fraction, option: str) -> Fraction:
+def parse_number(text: Number, option: str) -> Fraction:
     """A number as people write it: 32, 2.5, 30000/1001.  Raises UsageError."""
     try:
         return Fraction(str(text).strip())

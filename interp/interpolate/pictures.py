@@ -14,10 +14,11 @@ import numpy as np
 import torch
 
 from interp.interpolate.fill import Filled
-from interp.interpolate.instants import Grid, Rate, Times, parse_number
+from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.take import Take
 from interp.light import to_light
 from vid2ev.errors import UsageError
+from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import write_codes
 
@@ -58,6 +59,12 @@ class Pictures:
         top = np.float32(2**self.bits - 1)
         return np.rint(codes * top).astype(np.uint8 if self.bits == 8 else np.uint16)
 
+    def of_light(self, light: np.ndarray) -> np.ndarray:
+        """The same of light [H, W]."""
+        if self.kind == "exr":
+            return np.repeat(light[..., None], 3, axis=2)
+        return srgb_codes(light)
+
     def write(self, path: Path, picture: np.ndarray) -> None:
         """Write a picture; raises OSError."""
         if self._write is None:
@@ -66,13 +73,20 @@ class Pictures:
             self._write(picture, path)
 
 
-def film_rate(take: Take, grid: Grid, play: str | float | Fraction | None) -> Fraction:
+def checked_play(play: Number | None) -> Fraction | None:
+    """Frames per second of a film, if they are asked for.  Raises UsageError."""
+    if play is None:
+        return None
+    rate = parse_number(play, "--play")
+    if not 0 < rate <= 1000:
+        raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
+    return rate
+
+
+def film_rate(take: Take, grid: Grid, play: Number | None) -> Fraction:
     """Frames per second of a film: as asked, or so that it plays in real time.  Raises UsageError."""
-    if play is not None:
-        rate = parse_number(play, "--play")
-        if not 0 < rate <= 1000:
-            raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
-        return rate
+    if asked := checked_play(play):
+        return asked
     if isinstance(grid, Rate):
         return grid.rate_hz
     assert isinstance(grid, Times)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from interp.interpolate.after import After
-from interp.interpolate.choice import FALLBACK, Choice, choice, sha256
+from interp.interpolate.choice import FALLBACK, Choice, choice, device_of, sha256
 from interp.interpolate.fill import Fill
-from interp.interpolate.instants import Grid, Rate, Times, parse_number
+from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.pictures import Pictures, film_rate
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.interpolate.stretches import stretches
@@ -24,7 +22,6 @@ from interp.methods import open_method
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, versions
 
-Number = str | float | Fraction
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8
 
@@ -111,16 +108,6 @@ def grid_of(multiple: Number | None, fps: Number | None) -> Grid:
     if fps is not None:
         return Rate(parse_number(fps, "--fps"))
     return Times(parse_number(MULTIPLE if multiple is None else multiple, "-x"))
-
-
-def device_of(name: str) -> torch.device:
-    """cpu, cuda, or with auto the GPU if there is one.  Raises UsageError for a GPU that is not there."""
-    if name not in ("cpu", "cuda", "auto"):
-        raise UsageError(f"device '{name}': expected cpu, cuda or auto")
-    there = torch.cuda.is_available()
-    if name == "cuda" and not there:
-        raise UsageError("device cuda: no GPU that torch can use here; choose cpu or auto")
-    return torch.device("cuda" if there and name != "cpu" else "cpu")
 
 
 def multiple_of(chosen: Choice) -> int:

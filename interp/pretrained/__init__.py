@@ -13,15 +13,19 @@ PREFERRED: dict[bool, tuple[str, ...]] = {
     True: ("rrin_events_light-small", "rrin_events_light-tiny"),
     False: ("rrin-small", "rrin-tiny"),
 }
+OF_EVENTS = ("e2vid-small", "e2vid-tiny", "firenet-paper", "firenet-small", "firenet-tiny")
 
 
 def default(events: bool) -> Path | None:
     """The weights to interpolate with, with events or of frames alone; None if there are none."""
-    paths = (HERE / f"{name}.safetensors" for name in PREFERRED[events])
+    return _first(PREFERRED[events])
+
+
+def of_events() -> Path | None:
+    """The weights to make pictures of events alone with; None if there are none."""
+    return _first(OF_EVENTS)
+
+
+def _first(names: tuple[str, ...]) -> Path | None:
+    paths = (HERE / f"{name}.safetensors" for name in names)
     return next((path for path in paths if path.exists()), None)
-
-
-def named(name: str) -> Path | None:
-    """The weights of a name, such as firenet-tiny; None if there are none."""
-    path = HERE / f"{name}.safetensors"
-    return path if path.exists() else None

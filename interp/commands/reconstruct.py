@@ -1,0 +1,86 @@
+"""`vid2ev reconstruct`: pictures of what an event camera saw, from its events alone."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from interp.commands.making import bar, contrast_of, kept
+
+EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elapsed} gone, {remaining} left"
+
+
+@click.command(short_help="Make pictures from the events of any event file alone.")
+@click.argument("events")
+@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_seen.mp4 here]")
+@click.option(
+    "--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
+    help="Of `vid2ev train --network e2vid` or firenet.  [default: a network that comes with vid2ev, if there is one; a"
+    " high-pass filter]",
+)  # fmt: skip
+@click.option(
+    "--cutoff", "cutoff_hz", type=float, metavar="HZ",
+    help="A high-pass filter in place of a network: what changes more slowly fades to grey.  [default: 1]",
+)  # fmt: skip
+@click.option("--fps", metavar="RATE", help="Pictures per second of the scene's time.  [default: 30]")
+@click.option("--events-per-frame", type=int, metavar="N", help="A picture after each N events, instead.")
+@click.option(
+    "--format", type=click.Choice(["mp4", "png", "exr"]),
+    help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
+)  # fmt: skip
+@click.option("--play", metavar="RATE", help="Pictures per second of the film.  [default: real time; 30 with N events]")
+@click.option("--start", "start_s", type=float, metavar="S", help="Begin S seconds after the beginning.")
+@click.option("--stop", "stop_s", type=float, metavar="S", help="End S seconds after the beginning.")
+@click.option(
+    "--contrast", metavar="C|OFF,ON", help="What an event stands for [nat].  [default: as the recording says, or 0.15]"
+)
+@click.option(
+    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
+    help="Where; auto: on a GPU, if there is one.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace what is there.")
+@click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
+@click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def reconstruct(
+    events: str, output: Path | None, contrast: str | None, as_json: bool, quiet: bool, **options: Any
+) -> None:
+    """Make pictures of what the event camera of EVENTS saw: any event file, or a recording's folder.
+
+    EVENTS is read in blocks, however long it is.  How bright a scene is cannot be seen from events: pictures show what
+    changed.
+    """
+    from interp.reconstruct.whole import reconstruct as make
+
+    quiet |= as_json
+    path = output or _default(events, options["format"])
+    tell = None if quiet else lambda text: click.echo(f"by {text}")
+    with kept(path), bar(quiet, EVENTS, " events") as report:
+        made = make(events, path, contrast=contrast_of(contrast), report=report, told=tell, **options)
+    if as_json:
+        click.echo(json.dumps(made, indent=2))
+    elif not quiet:
+        from vid2ev.commands import summary
+
+        click.echo(summary.lines(_facts(path, made)))
+
+
+def _default(events: str, kind: str | None) -> Path:
+    path = Path(events).absolute()
+    name = f"{path.name if path.is_dir() else path.stem}_seen"
+    return Path(name if kind in ("png", "exr") else f"{name}.mp4")
+
+
+def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
+    (width, height), kind, run = made["size"], made["format"].partition(" ")[0], made["run"]
+    film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
+    span_s, seconds = (made["stop_us"] - made["start_us"]) / 1e6, max(run["seconds"], 1e-9)
+    return [
+        ("made", f"{path}: {made['frames']:,} pictures of {width}x{height} as {kind}{film}"),
+        ("from", f"{made['events']:,} events, {span_s:.6g} s"),
+        ("speed", f"{run['frames'] / seconds:.3g} pictures/s, {run['seconds']:.3g} s"),
+    ]

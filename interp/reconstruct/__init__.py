@@ -1,0 +1,4 @@
+"""Pictures from events alone: `reconstruct(events, output)`.
+
+events -> slices (by time, or so many events) -> a filter or a network, which remembers -> pictures
+"""

@@ -1,0 +1,56 @@
+"""Pictures from events alone by a network: E2VID, FireNet.  A slice of events is a voxel grid, with exact times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from interp.interpolate.memory import as_arrays, nested
+from interp.light import to_light
+from interp.networks.event_fed import EventFed, States
+from interp.representation.event_counts import as_voxels
+from interp.weights import load
+from vid2ev import Events
+from vid2ev.errors import DataError
+from vid2ev.views.voxel import Voxel
+
+
+class OfNetwork:
+    """The network of a file for a sensor of a size (width, height).
+
+    contrast   what an OFF and an ON event stand for [nat]
+    Raises DataError for a file that holds none which takes events alone.
+    """
+
+    def __init__(
+        self, path: Path, size: tuple[int, int], contrast: tuple[float, float], device: torch.device | str = "cpu"
+    ):
+        network = load(path).to(device)
+        if not isinstance(network, EventFed):
+            raise DataError(f"{path} holds a network that takes frames; give weights of e2vid or firenet")
+        self.name, self.network, self.device = path.stem, network, device
+        off, on = contrast
+        self._worth = torch.tensor([-off, on], dtype=torch.float32)[:, None, None, None]
+        self._voxel = Voxel(size, int(network.spec.bins), polarity=True)  # type: ignore[arg-type, union-attr]
+        self._states: States = ()
+
+    def add(self, events: Events, start_us: int, stop_us: int) -> None:
+        """Events of a slice, in order of time."""
+        self._voxel.add(events, start_us, stop_us)
+
+    @torch.inference_mode()
+    def picture(self, stop_us: int) -> np.ndarray:
+        """Light [H, W] float32 at the end of the slice."""
+        nats = (torch.from_numpy(self._voxel.take(stop_us)) * self._worth).sum(0)
+        image, self._states = self.network(as_voxels(nats)[None].to(self.device), self._states)
+        return to_light(image[0, 0].float().clamp(0, 1), "srgb").cpu().numpy()
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """All that it knows between two slices."""
+        return as_arrays((self._states,))
+
+    def remember(self, memory: dict[str, np.ndarray]) -> None:
+        """Take that up."""
+        (self._states,) = nested(memory, self.device)

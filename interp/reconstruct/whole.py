@@ -1,0 +1,229 @@
+"""`reconstruct`: from an event file to pictures of what the camera saw, in a film or a folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from interp import pretrained
+from interp.interpolate.choice import device_of, sha256
+from interp.interpolate.instants import Number, parse_number
+from interp.interpolate.pictures import Pictures, checked_play
+from interp.interpolate.shelf import Shelf, kind_of, manifest_of
+from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
+from interp.reconstruct.of_network import OfNetwork
+from interp.representation.event_counts import USUAL_NATS
+from vid2ev import Events
+from vid2ev.errors import UsageError
+from vid2ev.formats import open_events
+from vid2ev.formats.event_file import Recording
+from vid2ev.recording.manifest import identity, machine, read_manifest, versions
+from vid2ev.views.slices import Count, Duration, Slicing
+from vid2ev.views.window import beginning_us, window
+
+Report = Callable[[int, int | None], object]  # events taken in, of how many
+FPS = 30
+AT_ONCE = 16  # pictures between two instants from which it can go on
+
+
+class Reconstructor(Protocol):
+    """What makes pictures of events, slice after slice."""
+
+    @property
+    def name(self) -> str: ...
+
+    def add(self, events: Events, start_us: int, stop_us: int) -> None:
+        """Events of a slice, in order of time."""
+
+    def picture(self, stop_us: int) -> np.ndarray:
+        """Light [H, W] float32 at the end of the slice."""
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """All that it knows between two slices."""
+
+    def remember(self, memory: dict[str, np.ndarray]) -> None:
+        """Take that up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A slice that is taken in: its end, and how many events there were so far."""
+
+    stop_us: int
+    events: int
+
+
+def reconstruct(
+    events: str | Path,
+    output: str | Path,
+    *,
+    network: str | Path | None = None,
+    cutoff_hz: float | None = None,
+    fps: Number | None = None,
+    events_per_frame: int | None = None,
+    format: str | None = None,
+    play: Number | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    contrast: tuple[float, float] | None = None,
+    device: str = "cpu",
+    overwrite: bool = False,
+    resume: bool = False,
+    report: Report | None = None,
+    told: Callable[[str], object] | None = None,
+) -> dict[str, Any]:
+    """Make pictures of what an event camera saw, from its events alone; returns the manifest.
+
+    events      any event file that vid2ev reads, or the folder of an event camera's recording
+    output      a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
+    network     weights of E2VID or FireNet; by default those that come with vid2ev, if any do, or else a high-pass
+                filter, which `cutoff_hz` asks for, too (`high_pass.py`)
+    fps         pictures per second, 30 by default; or `events_per_frame`
+    play        pictures per second of the film; by default in real time, or 30 where pictures are of so many events
+    start_s, stop_s   the part to take [s after the beginning]; nothing is known of what was before
+    contrast    what an OFF and an ON event stand for [nat]; by default what the recording says, or else 0.15
+    resume      go on where an interrupted run was, to the same bytes
+    report      told how many events were taken in, of how many
+
+    All of the file is read in blocks; memory depends on the sensor's size alone, and with `events_per_frame` on that.
+    Raises UsageError for requests that cannot be meant, DataError for what cannot be read or written.
+    """
+    output, path = Path(output), Path(events)
+    kind, slicing = kind_of(output, format), _slicing(fps, events_per_frame)
+    recording, size = _window(path, start_s, stop_s)
+    nats = contrast or _contrast(path)
+    where = device_of(device)
+    made_by, why, about = _choice(network, cutoff_hz, size, nats, where)
+    if told:
+        told(f"{made_by.name}: {why}")
+    rate = checked_play(play) or (Fraction(FPS) if isinstance(slicing, Count) else 10**6 / slicing.us)
+    pictures = Pictures(kind, 8, "srgb")
+    job = {
+        "versions": versions(("torch",)),
+        "source": {"path": str(path), "size": list(size), "identity": identity(path), "contrast": list(nats)},
+        "part": {"start_s": start_s, "stop_s": stop_s},
+        "pictures": str(slicing),
+        "reconstruction": about,
+        "format": pictures.describe(),
+        "film_rate": str(rate) if kind == "mp4" else None,
+    }
+    with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write) as shelf:
+        if shelf.finished:
+            return shelf.finished
+        started, there = time.perf_counter(), shelf.count
+        _make(shelf, made_by, recording, slicing, pictures, report)
+        seconds = time.perf_counter() - started
+        manifest = shelf.job | {
+            "frames": shelf.count,
+            "events": recording.count,
+            "size": list(size),
+            "start_us": recording.start_us,
+            "stop_us": shelf.done[-1]["t_us"][-1],
+            "remarks": [],
+            "manifest": str(manifest_of(output, kind)),
+            "run": {"seconds": round(seconds, 3), "frames": shelf.count - there, "machine": machine()},
+        }
+        shelf.publish(manifest)
+    return manifest
+
+
+def slices(made_by: Reconstructor, recording: Recording, slicing: Slicing, skip: int = 0) -> Iterator[Seen]:
+    """Take in a recording, slice by slice; the first `skip` slices are only counted."""
+    number, count = 0, 0
+    for piece in slicing.pieces(recording):
+        count += len(piece.events)
+        if number >= skip:
+            made_by.add(piece.events, piece.start_us, piece.stop_us)
+        if piece.last:
+            number += 1
+            if number > skip:
+                yield Seen(piece.stop_us, count)
+
+
+def _make(
+    shelf: Shelf,
+    made_by: Reconstructor,
+    recording: Recording,
+    slicing: Slicing,
+    pictures: Pictures,
+    report: Report | None,
+) -> None:
+    """Make what is not there yet."""
+    if shelf.done:
+        made_by.remember(shelf.memory())
+    times: list[int] = []
+    number = shelf.count
+    for seen in slices(made_by, recording, slicing, skip=shelf.count):
+        light = made_by.picture(seen.stop_us)
+        with shelf.writing():
+            shelf.put(number, pictures.of_light(light))
+            times.append(seen.stop_us)
+            number += 1
+            if len(times) == AT_ONCE:
+                shelf.stretch({"t_us": times}, made_by.memory())
+                times = []
+        if report:
+            report(seen.events, recording.count)
+    if times:
+        with shelf.writing():
+            shelf.stretch({"t_us": times}, made_by.memory())
+
+
+def _slicing(fps: Number | None, events_per_frame: int | None) -> Duration | Count:
+    if events_per_frame is not None:
+        if fps is not None:
+            raise UsageError(f"--fps {fps} and --events-per-frame {events_per_frame}: leave out one of them")
+        if events_per_frame < 1:
+            raise UsageError(f"--events-per-frame {events_per_frame}: expected at least 1, such as 20000")
+        return Count(events_per_frame)
+    rate = parse_number(FPS if fps is None else fps, "--fps")
+    if not 0 < rate <= 10**5:
+        raise UsageError(f"--fps {fps}: expected more than 0 and at most 100000 pictures per second")
+    return Duration(10**6 / rate)
+
+
+def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[Recording, tuple[int, int]]:
+    """The part of the file, and the size of its sensor."""
+    if start_s is not None and stop_s is not None and stop_s <= start_s:
+        raise UsageError(f"--stop {stop_s:g} is not after --start {start_s:g}; choose a later one")
+    file = open_events(path)
+    zero_us = beginning_us(file)
+    start_us, stop_us = (None if second is None else zero_us + round(second * 1e6) for second in (start_s, stop_s))
+    recording = window(file, zero_us if start_us is None else start_us, stop_us)
+    if not recording.count:
+        raise UsageError(f"{path}: no events from {start_s or 0:g} s on; choose another part")
+    return recording, recording.size
+
+
+def _contrast(path: Path) -> tuple[float, float]:
+    """Thresholds of the sensor, where the recording says so."""
+    manifest = path / "manifest.json" if path.is_dir() else path.with_name("manifest.json")
+    if manifest.exists() and (sensor := read_manifest(manifest).get("sensor")):
+        numbers = sensor["parameters"]
+        if "threshold_on" in numbers:
+            return numbers["threshold_off"], numbers["threshold_on"]
+    return USUAL_NATS, USUAL_NATS
+
+
+def _choice(
+    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], nats: tuple[float, float], device: Any
+) -> tuple[Reconstructor, str, dict[str, Any]]:
+    """What makes the pictures, why, and what it is, for JSON."""
+    if network and cutoff_hz is not None:
+        raise UsageError(f"--network {network} and --cutoff {cutoff_hz:g}: leave out one of them")
+    asked = network or cutoff_hz is not None
+    if not asked:
+        network = pretrained.of_events()
+    if network:
+        why = "as asked" if asked else "the network that comes with vid2ev"
+        about = {"network": str(network), "sha256": sha256(Path(network))}
+        return OfNetwork(Path(network), size, nats, device), why, about
+    why = "as asked" if asked else "the best that needs no training"
+    cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz
+    return HighPass(size, nats, cutoff), why, {"filter": "high-pass", "cutoff_hz": cutoff}

@@ -1,0 +1,217 @@
+"""Pictures from events alone: what is known of them, however the events come."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from click.testing import CliRunner
+
+from interp import pretrained
+from interp.commands.reconstruct import reconstruct as command
+from interp.interpolate.shelf import PIECE
+from interp.networks import make
+from interp.reconstruct.high_pass import GREY, HighPass
+from interp.reconstruct.of_network import OfNetwork
+from interp.reconstruct.whole import AT_ONCE, reconstruct
+from interp.representation.exact_voxels import exact_voxels
+from interp.weights import save
+from vid2ev import Events, open_source
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import format_named
+from vid2ev.formats.event_file import Recording
+from vid2ev.recording.exposures import read_codes
+
+SIZE = (40, 24)
+
+
+def events_at(t: list[int], p: list[int], x: int = 3, y: int = 5) -> Events:
+    here = np.zeros(len(t), np.uint16)
+    return Events(np.array(t, np.int64), here + x, here + y, np.array(p, np.uint8))
+
+
+def drawn(count: int = 5000, us: int = 1_000_000, seed: int = 0) -> Events:
+    draw = np.random.default_rng(seed)
+    t = np.sort(draw.integers(0, us, count)).astype(np.int64)
+    x, y = (draw.integers(0, side, count).astype(np.uint16) for side in SIZE)
+    return Events(t, x, y, draw.integers(0, 2, count).astype(np.uint8))
+
+
+def written(path: Path, events: Events, us: int = 1_000_000, format: str = "npz") -> Path:
+    kind = format_named(format)
+    assert kind.write is not None
+    kind.write(path, Recording(SIZE, 0, us, len(events), lambda: iter([events])))
+    return path
+
+
+def test_a_pixel_is_the_log_of_its_light_high_pass_filtered() -> None:
+    seen = HighPass(SIZE, (0.3, 0.2), cutoff_hz=2.0)
+    times, signs = [10_000, 30_000, 200_000], [1, 1, 0]
+    seen.add(events_at(times, signs), 0, 200_000)
+    for at_us in (200_000, 450_000):
+        law = sum(
+            (0.2 if p else -0.3) * math.exp(-2 * math.pi * 2.0 * (at_us - t) * 1e-6)
+            for t, p in zip(times, signs, strict=True)
+        )
+        picture = seen.picture(at_us)
+        assert picture[5, 3] == pytest.approx(GREY * math.exp(law), rel=1e-6)
+        others = np.delete(picture.reshape(-1), 5 * SIZE[0] + 3)
+        np.testing.assert_allclose(others, GREY, rtol=1e-6)
+
+
+def test_a_filter_that_forgets_nothing_gives_light_back_to_a_threshold() -> None:
+    seen = HighPass(SIZE, (0.1, 0.1), cutoff_hz=0)
+    seen.add(events_at(list(range(1, 8)), [1] * 7), 0, 10)
+    seen.add(events_at(list(range(11, 14)), [0] * 3), 10, 20)
+    assert seen.picture(10**9)[5, 3] == pytest.approx(GREY * math.exp(0.4), rel=1e-6)
+
+
+def test_pictures_do_not_depend_on_how_often_one_looks() -> None:
+    events, often, once = drawn(), HighPass(SIZE, (0.2, 0.2)), HighPass(SIZE, (0.2, 0.2))
+    for k in range(20):
+        part = events.select((events.t > 50_000 * k - (k == 0)) & (events.t <= 50_000 * (k + 1)))
+        often.add(part, 50_000 * k, 50_000 * (k + 1))
+        often.picture(50_000 * (k + 1))
+    once.add(events, 0, 1_000_000)
+    np.testing.assert_array_equal(often.picture(1_000_000), once.picture(1_000_000))
+
+
+@pytest.mark.parametrize("name", ["firenet", "e2vid"])
+def test_a_network_sees_voxels_with_exact_times_and_remembers(tmp_path: Path, name: str) -> None:
+    network = make(name).eval()
+    save(tmp_path / "some.safetensors", name, network)
+    events, states = drawn(), ()
+    seen = OfNetwork(tmp_path / "some.safetensors", SIZE, (0.2, 0.25))
+    for k in range(3):
+        start, stop = 100_000 * k, 100_000 * (k + 1)
+        inside = events.select((events.t > start) & (events.t <= stop))
+        voxels = exact_voxels(inside, SIZE, start, stop, network.spec.bins, (0.2, 0.25))
+        with torch.inference_mode():
+            image, states = network(voxels[None], states)
+        half = len(inside) // 2
+        seen.add(inside.stretch(0, half), start, stop)  # (however they come)
+        seen.add(inside.stretch(half, len(inside)), start, stop)
+        from interp.light import to_light
+
+        expected = to_light(image[0, 0].clamp(0, 1), "srgb").numpy()
+        np.testing.assert_allclose(seen.picture(stop), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("format", ["npz", "hdf5", "evt3", "aedat4"])
+def test_any_event_file_gives_the_same_pictures(tmp_path: Path, format: str) -> None:
+    first = reconstruct(written(tmp_path / "a.npz", drawn()), tmp_path / "one", cutoff_hz=1, fps=25)
+    path = written(tmp_path / f"b{format_named(format).suffix}", drawn(), format=format)
+    other = reconstruct(path, tmp_path / "other", cutoff_hz=1, fps=25)
+    assert first["frames"] == other["frames"] == 25 and first["events"] == other["events"] == 5000
+    for k in (0, 12, 24):
+        one, two = (read_codes(tmp_path / name / f"{k:06d}.png") for name in ("one", "other"))
+        np.testing.assert_array_equal(one, two)
+
+
+def test_pictures_come_by_time_or_by_events(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.npz", drawn())
+    made = reconstruct(path, tmp_path / "time", cutoff_hz=1, fps="1000/33")
+    times = [frame.t_ns // 1000 for frame in open_source(tmp_path / "time").frames()]
+    assert times == [33_000 * k for k in range(1, made["frames"] + 1)]
+    made = reconstruct(path, tmp_path / "count", cutoff_hz=1, events_per_frame=1000)
+    times = [frame.t_ns // 1000 for frame in open_source(tmp_path / "count").frames()]
+    assert made["frames"] == 5 and times == [int(drawn().t[1000 * k - 1]) for k in range(1, 6)]
+    part = reconstruct(path, tmp_path / "part", cutoff_hz=1, fps=10, start_s=0.2, stop_s=0.5)
+    assert part["frames"] == 3 and part["start_us"] == 200_000
+
+
+RUN = """
+import os, signal, sys
+import torch
+torch.set_num_threads(1)
+from interp.reconstruct.whole import reconstruct
+
+seen = 0
+
+def report(*_):
+    global seen
+    seen += 1
+    if seen == int(sys.argv[4]):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+reconstruct(sys.argv[1], sys.argv[2], network=sys.argv[3] or None, fps=40, report=report)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+@pytest.mark.parametrize("network", ["", "firenet"])
+@pytest.mark.parametrize("at", [AT_ONCE + 2, 2 * AT_ONCE])
+def test_killed_it_goes_on_to_the_same_bytes(tmp_path: Path, network: str, at: int) -> None:
+    weights = tmp_path / "some.safetensors" if network else None
+    if weights:
+        save(weights, network, make(network))
+    given: dict[str, Any] = {"fps": 40, "network": weights}
+    path = written(tmp_path / "a.npz", drawn())
+    reconstruct(path, tmp_path / "once", **given)
+    arguments = [str(path), str(tmp_path / "twice"), str(weights or ""), str(at)]
+    done = subprocess.run([sys.executable, "-c", RUN, *arguments], capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert not (tmp_path / "twice").exists()
+    told = reconstruct(path, tmp_path / "twice", resume=True, **given)
+    assert told["frames"] == 40 and told["run"]["frames"] < 40
+    for file in os.listdir(tmp_path / "once"):
+        if file != "manifest.json":
+            assert (tmp_path / "once" / file).read_bytes() == (tmp_path / "twice" / file).read_bytes()
+
+
+def test_a_film_has_all_pictures(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.npz", drawn())
+    made = reconstruct(path, tmp_path / "a.mp4", cutoff_hz=1, fps=2 * PIECE)
+    film = open_source(tmp_path / "a.mp4")
+    assert made["frames"] == 2 * PIECE == len(list(film.frames())) and film.size == SIZE
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (["nowhere.h5"], 2, "no such file"),
+        (["text.txt"], 1, "no event file"),
+        (["a.npz", "--fps", "0"], 2, "expected more than 0"),
+        (["a.npz", "--fps", "10", "--events-per-frame", "9"], 2, "leave out one"),
+        (["a.npz", "--events-per-frame", "0"], 2, "at least 1"),
+        (["a.npz", "--cutoff", "-1"], 2, "0 to 10000"),
+        (["a.npz", "--network", "rrin.safetensors"], 1, "takes frames"),
+        (["a.npz", "--network", "rrin.safetensors", "--cutoff", "1"], 2, "leave out one"),
+        (["a.npz", "--start", "5"], 2, "no events"),
+        (["a.npz", "--start", "0.5", "--stop", "0.2"], 2, "not after"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "a.npz", drawn(100))
+    (tmp_path / "text.txt").write_text("nothing here\n")
+    save(tmp_path / "rrin.safetensors", "rrin", make("rrin"))
+    before = sorted(tmp_path.rglob("*"))
+    result = CliRunner().invoke(command, arguments)
+    assert isinstance(result.exception, (UsageError, DataError)), result.output
+    assert result.exception.exit_code == code
+    assert sentence in str(result.exception) and "\n" not in str(result.exception)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "a.npz", drawn())
+    result = CliRunner().invoke(command, ["a.npz"])
+    assert result.exit_code == 0, result.output
+    by = pretrained.of_events()
+    assert f"by {by.stem if by else 'high-pass'}: " in result.output
+    assert "a_seen.mp4: 30 pictures of 40x24 as mp4, 30 per second" in result.output
+    again = CliRunner().invoke(command, ["a.npz", "--resume", "--json"])
+    assert json.loads(again.output)["events"] == 5000
