@@ -35,6 +35,10 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
 )  # fmt: skip
 @click.option("--play", metavar="RATE", help="Frames per second of the film: 30 is slow motion.  [default: real time]")
+@click.option(
+    "--events", type=click.Path(exists=True, path_type=Path), metavar="EVENTS",
+    help="Event file to a video, images or a single frame, on their clock; laid over the frames edge on edge.",
+)  # fmt: skip
 @click.option("--start", type=float, metavar="S", help="Begin at this second; of recordings after the first frame.")
 @click.option("--stop", type=float, metavar="S", help="End there.")
 @click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture.")
@@ -62,7 +66,8 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
     """Make the frames of SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or BS-ERGB,
-    a video, or a folder of images.
+    an event file with frames, a video, or a folder of images; also a single frame with its events (--events, or
+    NAME.mat beside NAME.png).
 
     Frames of the source stay as they are, and nothing is interpolated across a cut.  Instants are whole microseconds on
     an exact grid.  A folder has timestamps.txt, so that `vid2ev convert` reads it again.
@@ -79,6 +84,7 @@ def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **
         transfer=options.pop("transfer"),
         source_hz=_number(options.pop("source_fps"), "--source-fps"),
         contrast=contrast_of(options.pop("contrast")),
+        events=options.pop("events"),
     )
     path = output or _default(source, options)
     tell = None if quiet else lambda text: click.echo(f"by {text}")

@@ -11,6 +11,7 @@ import torch
 
 from interp import pretrained
 from interp.methods import Method, open_method
+from interp.methods.one_frame import WAYS, OneFrame
 from vid2ev.errors import UsageError
 
 FALLBACK = "flow"  # where a method needs events, and there are none
@@ -49,6 +50,15 @@ def choice(
     if network:
         about |= {"weights": str(network), "sha256": sha256(Path(network))}
     return Choice(method, why, about)
+
+
+def choice_of_one(name: str | None, network: str | Path | None, where: str) -> Choice:
+    """The method for a single frame.  Raises UsageError for one that takes two."""
+    asked = name or network
+    if asked is not None and name not in WAYS:
+        raise UsageError(f"method '{asked}' takes two frames, and {where} is a single one; choose {' or '.join(WAYS)}")
+    method = OneFrame(name or WAYS[0])  # type: ignore[arg-type]
+    return Choice(method, "as asked" if asked else "what a single frame and its events allow", {"method": method.name})
 
 
 def device_of(name: str) -> torch.device:

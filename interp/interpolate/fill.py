@@ -88,7 +88,7 @@ class Fill:
         """The frames of a stretch."""
         shot = self.shot
         self.shot += stretch.between == CUT
-        asked = any(instant.share for instant in stretch.instants)
+        asked = any(instant.share or not stretch.first.known for instant in stretch.instants)
         if stretch.between == CUT or (stretch.between == UNRELATED and not self.method.needs_events):
             return Work(self._held(stretch, shot), stretch.between * asked)
         if stretch.second is None or not (asked or self.events):
@@ -108,7 +108,7 @@ class Fill:
             (self.method.states,) = nested(arrays, self.device)
 
     def _made(self, stretch: Stretch, gap: Gap, method: Method, shot: int) -> Iterator[Filled]:
-        instants = [instant for instant in stretch.instants if instant.share]
+        instants = [instant for instant in stretch.instants if instant.share or not stretch.first.known]
         if len(instants) < len(stretch.instants):
             yield Filled(stretch.instants[0], True, shot, stretch.first.codes)
         some = max(1, len(instants) if method.sequential else AT_ONCE // gap.frame_0.numel())

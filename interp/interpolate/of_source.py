@@ -25,8 +25,8 @@ class OfSource:
     event_size: tuple[int, int] | None = None
     contrast: tuple[float, float] | None = None
 
-    def __init__(self, path: str, options: Options):
-        if options.contrast:
+    def __init__(self, path: str, options: Options, has_events: bool = False):
+        if options.contrast and not has_events:
             raise UsageError(f"--contrast says what events stand for, and {path} has none; leave it out")
         self._source = open_source(
             path,
@@ -45,6 +45,8 @@ class OfSource:
         self.channels = 1 if _is_grey(self._about) else 3
         self.bits = 8 if self._about.get("bits", 16) <= 8 or self._about.get("type") == "uint8" else 16
         said = str(self._about.get("transfer", "srgb"))
+        whole = said == "srgb" and "edits" not in self._about
+        self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
         self.curve = "bt709" if said in BRIGHT else said
         rate = self._about.get("fps") or self._about.get("rate")
         self.rate = Fraction(rate) if rate else self._mean_rate()
@@ -71,6 +73,8 @@ class OfSource:
         for frame in self._source.frames(start):
             light = torch.from_numpy(np.nan_to_num(frame.light, nan=0.0))
             codes = to_codes(light if self.channels == 3 else light[..., :1], "srgb").numpy()
+            if self._top:
+                codes = np.rint(codes * self._top) / self._top
             yield Key(round(Fraction(frame.t_ns, 1000)), codes)
 
     def _mean_rate(self) -> Fraction:

@@ -21,10 +21,14 @@ __all__ = ["AS_IT_IS", "Key", "Options", "Take", "open_take"]
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A frame as it came: sRGB codes float32 [H, W, C], C 1 or 3, of which 1 is full code; and when [us]."""
+    """A frame as it came: sRGB codes float32 [H, W, C], C 1 or 3, of which 1 is full code; and when [us].
+
+    known   whether it shows what was there at that instant; otherwise that is to be made, too
+    """
 
     t_us: int
     codes: np.ndarray = field(repr=False)
+    known: bool = True
 
 
 class Take(Protocol):
@@ -82,6 +86,7 @@ class Options:
     crop, size, transfer   of videos and images, as `vid2ev.open_source` takes them
     source_hz   frames per second, where the source has no times
     contrast    what an OFF and an ON event stand for [nat], in place of what the recording says
+    events      file of the events, where the frames are in another one
     """
 
     start_s: float | None = None
@@ -91,24 +96,38 @@ class Options:
     transfer: str = "auto"
     source_hz: Fraction | None = None
     contrast: tuple[float, float] | None = None
+    events: Path | None = None
 
 
 AS_IT_IS = Options()
 
 
 def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
-    """A recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, or any video or folder of images.
+    """A recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, an event file with frames, any video or folder
+    of images, with events or without, or a single frame with events.
 
     Raises UsageError for what is none of these, or options that it cannot have, DataError for what is damaged.
     """
     if not Path(path).exists():
         raise UsageError(f"{path}: no such file or folder; give a recording, a video or a folder of images")
     from interp.data.layouts import is_sequence
-
-    if is_sequence(path):
-        from interp.interpolate.of_sequence import OfSequence
-
-        return OfSequence(Path(path), options)
+    from interp.interpolate.of_events import FramesBesideEvents, OfEventFile
+    from interp.interpolate.of_sequence import OfSequence
     from interp.interpolate.of_source import OfSource
+    from interp.interpolate.of_still import OfStill, is_mat, picture_beside
+    from vid2ev.formats import recognise as recognise_events
+    from vid2ev.light.recognise import recognise
 
-    return OfSource(str(path), options)
+    path = Path(path)
+    has_both = is_sequence(path) or is_mat(path) or (path.is_file() and recognise_events(path) is not None)
+    if has_both and options.events:
+        raise UsageError(f"{path} has events of its own; leave --events {options.events} out")
+    if is_sequence(path):
+        return OfSequence(path, options)
+    if is_mat(path):
+        return OfStill(picture_beside(path), path, options)
+    if has_both:
+        return OfEventFile(path, options)
+    if options.events and path.is_file() and recognise(path) == "picture":
+        return OfStill(path, options.events, options)
+    return FramesBesideEvents(str(path), options, options.events) if options.events else OfSource(str(path), options)

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from interp.interpolate.after import After
-from interp.interpolate.choice import FALLBACK, Choice, choice, device_of, sha256
+from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of, sha256
 from interp.interpolate.fill import Fill
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
+from interp.interpolate.of_still import OfStill
 from interp.interpolate.pictures import Pictures, film_rate
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.interpolate.stretches import stretches
@@ -48,7 +49,8 @@ def interpolate(
 ) -> dict[str, Any]:
     """Make the frames of a recording or a video at more instants; returns the manifest.
 
-    source     a recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, a video, or a folder of images
+    source     a recording of `vid2ev convert`, in the HS-ERGB or BS-ERGB layout, an event file with frames, a video or
+               a folder of images, with the events of `options.events` or without; or a single frame with events
     output     a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
     multiple   so many times the frames, 8 by default; or `fps`, frames per second of the world's time
     method, network   a name of `interp.methods.METHODS`, or a file of weights; by default what is best for the source
@@ -69,7 +71,10 @@ def interpolate(
     if cuts not in ("hold", "keep"):
         raise UsageError(f"cuts '{cuts}': expected hold or keep")
     take, where = open_take(source, options), device_of(device)
-    chosen = choice(method, network, take.event_size is not None, str(source), where)
+    if isinstance(take, OfStill):
+        chosen = choice_of_one(method, network, str(source))
+    else:
+        chosen = choice(method, network, take.event_size is not None, str(source), where)
     if told:
         told(f"{chosen.method.name}: {chosen.why}")
     after = After(Path(hdr), take.event_size is not None, where) if hdr else None

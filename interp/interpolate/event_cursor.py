@@ -1,0 +1,47 @@
+"""The events of any event file, stretch after stretch, in memory that does not grow with its length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from vid2ev import Events
+from vid2ev.formats import open_events, survey
+from vid2ev.formats.event_file import EventFile
+
+
+class EventCursor:
+    """Reads forwards; what lies before the last stretch is read again from the beginning.
+
+    size          width and height of the sensor [px]
+    covered_us    from the first event to the last, or as the file says
+    Raises UsageError for a path where nothing is, DataError for what is no event file.
+    """
+
+    def __init__(self, path: Path):
+        self.file: EventFile = open_events(path)
+        self._recording = survey(self.file)
+        self.size = self._recording.size
+        self.count = self._recording.count
+        begin_us = self._recording.start_us
+        self.covered_us = begin_us, begin_us + self._recording.duration_us
+        self._blocks: Iterator[Events] = iter(())
+        self._held, self._from_us = Events.empty(), None if self.count else begin_us
+
+    def between(self, start_us: int, stop_us: int) -> Events:
+        """The events in (start_us, stop_us]."""
+        if self._from_us is None or start_us < self._from_us:
+            self._blocks, self._held = self._recording.blocks(), Events.empty()
+        parts = []
+        while True:
+            inside = (self._held.t > start_us) & (self._held.t <= stop_us)
+            parts.append(self._held.select(inside))
+            if len(self._held) and self._held.t[-1] > stop_us:
+                break
+            following = next(self._blocks, None)
+            if following is None:
+                self._held = Events.empty()
+                break
+            self._held = following
+        self._from_us = stop_us
+        return Events.concatenate(parts)

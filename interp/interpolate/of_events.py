@@ -1,0 +1,112 @@
+"""Frames and events that come from a file each, or from one file that has both, as cameras with frames write it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interp.interpolate.event_cursor import EventCursor
+from interp.interpolate.of_source import OfSource
+from interp.interpolate.take import Key, Options
+from vid2ev import Events
+from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import identity
+
+MOMENT = 4  # of a gap, before the first event and after the last: there need not be one at every instant
+
+
+class FramesBesideEvents(OfSource):
+    """A video or a folder of images, and the events of a file; both on one clock, edge on edge."""
+
+    def __init__(self, path: str, options: Options, events: Path):
+        super().__init__(path, options, has_events=True)
+        self._cursor, self._events_path = EventCursor(events), events
+        self.event_size, self.contrast = self._cursor.size, options.contrast
+
+    def describe(self) -> dict[str, Any]:
+        """What source and event file are."""
+        about = {"path": str(self._events_path), "size": list(self._cursor.size), "contrast": self.contrast}
+        return super().describe() | {"events": about | {"identity": identity(self._events_path)}}
+
+    def events(self, start_us: int, stop_us: int) -> Events | None:
+        """See `Take`."""
+        return _within(self._cursor, start_us, stop_us)
+
+
+class OfEventFile:
+    """An event file with frames, such as AEDAT4 or a bag of ROS.
+
+    Raises UsageError where it has no frames, or none in the part asked for.
+    """
+
+    curve = "srgb"
+    bits = 8
+
+    def __init__(self, path: Path, options: Options):
+        unfit = {"--crop": options.crop, "--size": options.size, "the rate of frames": options.source_hz}
+        if asked := [name for name, value in unfit.items() if value is not None]:
+            raise UsageError(f"{path} is a recording, whose frames stay as they are; leave {asked[0]} out")
+        self._cursor, self._path = EventCursor(path), path
+        if not self._cursor.file.has_frames:
+            raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")
+        self._part: tuple[int, int] | None = None
+        times, first = list[int](), None
+        for picture in self._cursor.file.frames():
+            first = picture if first is None else first
+            if not times or picture.t_us > times[-1]:
+                times.append(picture.t_us)
+        begin_us = times[0] if times else 0
+        start_us = begin_us if options.start_s is None else begin_us + round(options.start_s * 1e6)
+        stop_us = times[-1] if times and options.stop_s is None else begin_us + round((options.stop_s or 0) * 1e6)
+        inside = [t_us for t_us in times if start_us <= t_us <= stop_us]
+        if first is None or not inside:
+            raise UsageError(f"{path}: no frame in the part asked for; choose another")
+        self._first_us, self._last_us, self.gaps_expected = inside[0], inside[-1], len(inside) - 1
+        self.name, self.size = path.stem, (first.pixels.shape[1], first.pixels.shape[0])
+        self.channels = 1 if first.pixels.ndim == 2 else 3
+        self.event_size, self.contrast = self._cursor.size, options.contrast
+        span_us = self._last_us - self._first_us
+        self.rate = Fraction(10**6 * self.gaps_expected, span_us).limit_denominator(1001) if span_us else Fraction(30)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Those of the file."""
+        return self._cursor.file.warnings
+
+    def describe(self) -> dict[str, Any]:
+        """Path and sizes."""
+        about = {"kind": "events with frames", "path": str(self._path), "size": list(self.size)}
+        return about | {
+            "event_size": list(self.event_size),
+            "contrast": self.contrast,
+            "identity": identity(self._path),
+        }
+
+    def keys(self, start: int = 0) -> Iterator[Key]:
+        """See `Take`."""
+        last_us = self._first_us - 1
+        number = 0
+        for picture in self._cursor.file.frames():
+            if not last_us < picture.t_us <= self._last_us:
+                continue
+            last_us, number = picture.t_us, number + 1
+            if number > start:
+                pixels = picture.pixels if picture.pixels.ndim == 3 else picture.pixels[..., None]
+                yield Key(picture.t_us, pixels.astype(np.float32) / np.float32(255))
+
+    def events(self, start_us: int, stop_us: int) -> Events | None:
+        """See `Take`."""
+        return _within(self._cursor, start_us, stop_us)
+
+
+def _within(cursor: EventCursor, start_us: int, stop_us: int) -> Events | None:
+    """The events of a gap; None if that is not within what the file holds."""
+    begin_us, end_us = cursor.covered_us
+    moment_us = (stop_us - start_us) // MOMENT
+    if start_us < begin_us - moment_us or stop_us > end_us + moment_us:
+        return None
+    return cursor.between(start_us, stop_us)

@@ -1,0 +1,73 @@
+"""Frames from a single frame and the events around it: what one frame and an event camera know of a scene.
+
+    deblur        the frame is the mean of the light over all of the gap, as a long exposure is:
+                  I(t) = B exp(E(0 -> t)) / mean_u exp(E(0 -> u))        u over the gap, in `steps` of the counts
+    integration   the frame is the light at the middle of the gap:      I(t) = B exp(E(1/2 -> t))
+
+E is the change of log light that the events stand for; colours are those of the frame.  There is no second frame that
+would hold the drift, so noise of events and a contrast that is not quite right stay in the picture; and where light
+goes below the sensor's black or above white, B is wrong.
+
+Source: L. Pan et al., "Bringing a blurry frame alive at high frame-rate with an event camera", CVPR 2019, eq. 7 (the
+event-based double integral).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import torch
+
+from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, coloured, ratios_of
+from interp.light import luminance, to_codes, to_light
+from interp.methods.gap import Gap
+from interp.precision import in_full_precision
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
+from vid2ev.errors import UsageError
+
+WAYS = ("deblur", "integration")
+
+
+@dataclass(frozen=True, slots=True)
+class OneFrame:
+    """A method that looks at a gap's first frame alone."""
+
+    name: Literal["deblur", "integration"]
+    needs_events: bool = True
+    sequential: bool = False
+
+    def begin(self) -> Self:
+        """Itself."""
+        return self
+
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`.  Raises UsageError without events."""
+        if gap.events is None:
+            raise UsageError(f"method '{self.name}' integrates events, and there are none; give some with --events")
+        height, width = gap.frame_0.shape[-2:]
+        return _integrated(gap.frame_0, over(gap.events, (height, width)), times, self.name == "deblur")
+
+
+@in_full_precision
+def _integrated(frame: torch.Tensor, events: EventCounts, times: torch.Tensor, blurred: bool) -> torch.Tensor:
+    """Codes [N, C, H, W] of a frame [C, H, W] at times [N]."""
+    light = to_light(frame, "srgb")
+    logs = torch.log(luminance(light) + DARK)
+    if blurred:
+        middles = (torch.arange(events.steps, device=times.device) + 0.5) / events.steps
+        start = sum(torch.exp(_risen(events, u[None])) for u in middles) / events.steps
+        logs = logs - torch.log(torch.as_tensor(start))
+    else:
+        logs = logs - _risen(events, times.new_full((1,), 0.5))
+    images = []
+    for t in times:
+        level = (logs + _risen(events, t[None])).clamp(DARKEST, max(BRIGHTEST, float(logs.max())))
+        images.append(to_codes(coloured((torch.exp(level) - DARK).clamp(min=0), ratios_of(light)), "srgb"))
+    return torch.stack(images)
+
+
+def _risen(events: EventCounts, until: torch.Tensor) -> torch.Tensor:
+    """The change of log light [1, H, W] from the beginning to a time [1]."""
+    return events.change(torch.zeros_like(until)[None], until[None])[0]

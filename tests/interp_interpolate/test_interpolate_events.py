@@ -1,0 +1,195 @@
+"""Frames and events from files of their own, from one file that has both, and a single frame with its events."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from scipy.io import savemat
+from small_takes import SIZE, STEP_US, images, moving
+
+from interp.interpolate.event_cursor import EventCursor
+from interp.interpolate.take import Options, open_take
+from interp.interpolate.whole import interpolate
+from interp.methods.gap import Gap
+from interp.methods.one_frame import OneFrame
+from interp.representation.event_counts import EventCounts
+from vid2ev import Events, convert, read_events
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import format_named
+from vid2ev.formats.event_file import Picture, Recording
+from vid2ev.recording.exposures import read_codes, write_codes
+
+
+def drawn(count: int = 3000, us: int = 3 * STEP_US) -> Events:
+    draw = np.random.default_rng(0)
+    t = np.sort(draw.integers(0, us + 1, count)).astype(np.int64)
+    x, y = (draw.integers(0, side, count).astype(np.uint16) for side in SIZE)
+    return Events(t, x, y, draw.integers(0, 2, count).astype(np.uint8))
+
+
+def written(path: Path, events: Events, format: str = "npz", frames: Any = None) -> Path:
+    kind = format_named(format)
+    assert kind.write is not None
+    blocks = [events.stretch(k, min(k + 100, len(events))) for k in range(0, len(events), 100)]
+    kind.write(path, Recording(SIZE, 0, int(events.t[-1]), len(events), lambda: iter(blocks), frames=frames))
+    return path
+
+
+def same(one: Events, other: Events) -> None:
+    for name in "txyp":
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+@pytest.mark.parametrize("format", ["npz", "hdf5", "csv"])
+def test_a_cursor_gives_each_event_once_and_goes_back_if_it_has_to(tmp_path: Path, format: str) -> None:
+    events = drawn()
+    cursor = EventCursor(written(tmp_path / f"a{format_named(format).suffix}", events, format))
+    edges = [-1, 10, 10, 5000, 5001, 60_000, 10**6]
+    parts = [cursor.between(*edges[k : k + 2]) for k in range(len(edges) - 1)]
+    same(Events.concatenate(parts), events)
+    for start, stop in ((70_000, 80_000), (20, 30_000), (30_000, 30_001), (0, 10**6)):
+        same(cursor.between(start, stop), events.select((events.t > start) & (events.t <= stop)))
+
+
+def test_a_cursor_holds_no_more_than_a_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cursor = EventCursor(written(tmp_path / "a.npz", drawn(20_000)))
+    taken: list[int] = []
+
+    def blocks() -> Any:
+        for part in read_events(tmp_path / "a.npz", block=100):
+            taken.append(len(part))
+            yield part
+
+    monkeypatch.setattr(cursor, "_recording", type("R", (), {"blocks": staticmethod(blocks)}))
+    for k in range(10):
+        cursor.between(1000 * k, 1000 * (k + 1))
+    assert sum(taken) <= 100 * (20_000 * 10_000 // (3 * STEP_US) // 100 + 2)
+
+
+def test_events_in_a_file_of_their_own_are_those_of_a_recording(tmp_path: Path) -> None:
+    source, events = images(tmp_path / "in", moving(4)), written(tmp_path / "a.npz", drawn())
+    frames = [Picture(STEP_US * k, frame) for k, frame in enumerate(moving(4))]
+    both = written(tmp_path / "both.aedat4", drawn(), "aedat4", lambda: iter(frames))
+    options = Options(events=events, contrast=(0.2, 0.2))
+    told = interpolate(source, tmp_path / "one", multiple=3, options=options)
+    assert told["interpolation"]["method"] == "bridge" and not told["gaps_s"]
+    interpolate(both, tmp_path / "other", multiple=3, options=Options(contrast=(0.2, 0.2)))
+    for k in range(10):
+        one, other = (read_codes(tmp_path / name / f"{k:06d}.png") for name in ("one", "other"))
+        np.testing.assert_array_equal(one, other)
+        if k % 3 == 0:
+            np.testing.assert_array_equal(one, moving(4)[k // 3])
+    part = interpolate(both, tmp_path / "part", multiple=1, options=Options(start_s=0.03, stop_s=0.07))
+    assert part["key_frames"] == 2 and part["start_us"] == STEP_US
+
+
+def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tmp_path: Path) -> None:
+    source = images(tmp_path / "in", moving(7))
+    for kind in ("png", "raw"):
+        convert(
+            source, tmp_path / kind, frame_camera=True, cis="ideal", pictures=[kind], preview=False,
+            overrides=["cis.frame_rate_hz=15"], threads=1,
+        )  # fmt: skip
+        told = interpolate(tmp_path / kind, tmp_path / f"{kind}_out", multiple=2)
+        assert told["interpolation"]["method"] == "bridge" and told["source"]["contrast"]
+    for file in (tmp_path / "png_out").glob("*.png"):
+        assert file.read_bytes() == (tmp_path / "raw_out" / file.name).read_bytes()
+    frames = sorted((tmp_path / "png").rglob("frames/*.png"))
+    for k, frame in enumerate(frames):
+        found = read_codes(tmp_path / "png_out" / f"{2 * k:06d}.png")
+        np.testing.assert_array_equal(found, read_codes(frame))
+
+
+def still_and_events() -> tuple[np.ndarray, Events, np.ndarray]:
+    """Light [32, H, W] whose logs go in steps of 0.2, the events of the steps, and its mean."""
+    draw = np.random.default_rng(0)
+    steps = draw.integers(-1, 2, (32, *SIZE[::-1])) * (draw.random((32, *SIZE[::-1])) < 0.1)
+    steps[0] = 0
+    light = 0.2 * np.exp(0.2 * np.cumsum(steps, 0)) - 1e-3
+    k, y, x = np.nonzero(steps)
+    t = 1000 * k + 1
+    order = np.argsort(t, kind="stable")
+    p = (steps[k, y, x] > 0).astype(np.uint8)
+    return light, Events(t[order], x[order].astype(np.uint16), y[order].astype(np.uint16), p[order]), light.mean(0)
+
+
+def test_a_blurred_frame_and_its_events_give_back_the_light_of_each_instant() -> None:
+    light, events, mean = still_and_events()
+    from interp.light import to_codes, to_light
+    from interp.representation.event_counts import count_events
+
+    frame = to_codes(torch.from_numpy(mean[None].astype(np.float32)), "srgb")
+    counts = count_events(events, SIZE, 0, 32_000, 32, (0.2, 0.2))
+    times = torch.tensor([1.5, 10.5, 31.5]) / 32
+    found = to_light(OneFrame("deblur").between(Gap(frame, frame, counts, 32_000), times), "srgb")
+    # (counts say in which thirty-second of the exposure an event came: half of its step has been made in the middle)
+    for image, k in zip(found, (1, 10, 31), strict=True):
+        quiet = light[k] == light[k - 1]
+        assert np.abs(np.log((image[0].numpy() + 1e-3) / (light[k] + 1e-3)))[quiet].max() < 0.03
+    sharp = OneFrame("integration").between(Gap(frame, frame, counts, 32_000), torch.tensor([0.5]))
+    torch.testing.assert_close(sharp[0], frame, atol=1e-5, rtol=0)
+    none = EventCounts.none(1, SIZE[::-1])
+    for name in ("deblur", "integration"):
+        same_frame = OneFrame(name).between(Gap(frame, frame, none, 32_000), times)
+        torch.testing.assert_close(same_frame, frame.expand(3, -1, -1, -1), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("kind", ["mat", "npz"])
+def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path, kind: str) -> None:
+    _, events, mean = still_and_events()
+    write_codes(tmp_path / "a.png", np.rint(255 * mean / mean.max()).astype(np.uint8))
+    if kind == "mat":
+        table = np.stack([events.t, events.x, events.y, events.p], 1).astype(np.int64)
+        savemat(tmp_path / "a.mat", {"events": table})
+        source, options = tmp_path / "a.mat", Options()
+    else:
+        source, options = tmp_path / "a.png", Options(events=written(tmp_path / "e.npz", events))
+    told = interpolate(source, tmp_path / "out", multiple=6, options=options)
+    assert told["interpolation"] == {"method": "deblur"} and told["frames"] == 6
+    assert any("single frame" in remark for remark in told["remarks"])
+    assert read_codes(tmp_path / "out" / "000003.png").shape == SIZE[::-1]
+    with pytest.raises(UsageError, match="takes two frames"):
+        interpolate(source, tmp_path / "flow", method="flow", options=options)
+    assert not (tmp_path / "flow").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "error", "sentence"),
+    [
+        ("alone.mat", {}, UsageError, "no picture beside it"),
+        ("broken.mat", {}, DataError, "cannot be read as a MATLAB file"),
+        ("other.mat", {}, DataError, "expected a table"),
+        ("negative.mat", {}, DataError, "in this order"),
+        ("events.npz", {}, UsageError, "holds no frames"),
+        ("events.npz", {"events": Path("events.npz")}, UsageError, "events of its own"),
+        ("still.png", {"events": Path("nothing.npz")}, UsageError, "no such file"),
+    ],
+)
+def test_what_is_no_take_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, options: dict[str, Any], error: Any, sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    picture = np.zeros(SIZE[::-1], np.uint8)
+    for stem in ("broken", "other", "negative", "still"):
+        write_codes(tmp_path / f"{stem}.png", picture)
+    savemat(tmp_path / "alone.mat", {"events": np.ones((5, 4))})
+    savemat(tmp_path / "other.mat", {"light": np.ones((5, 3))})
+    savemat(tmp_path / "negative.mat", {"events": -np.ones((5, 4))})
+    (tmp_path / "broken.mat").write_bytes((tmp_path / "alone.mat").read_bytes()[:150])
+    written(tmp_path / "events.npz", drawn(100))
+    with pytest.raises(error, match=sentence) as found:
+        open_take(name, Options(**options))
+    assert "\n" not in str(found.value)
+
+
+def test_a_manifest_says_all_that_decided_the_frames(tmp_path: Path) -> None:
+    source, events = images(tmp_path / "in", moving(3)), written(tmp_path / "a.npz", drawn())
+    interpolate(source, tmp_path / "out", multiple=2, options=Options(events=events))
+    said = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert said["grid"] == {"multiple": "2"} and said["source"]["events"]["identity"]["sha256"]
+    assert said["key_frames"] == 3 and said["frames"] == 5 and "torch" in said["versions"]
