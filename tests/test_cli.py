@@ -189,7 +189,6 @@ def test_a_command_that_is_not() -> None:
         [],
         ["--subframes", "0"],
         ["--subframes", "many"],
-        ["--upsample", "magic"],
         ["--threads", "0"],
         ["--max-subframes", "0"],
         ["--fps", "0"],
@@ -203,6 +202,12 @@ def test_a_command_that_is_not() -> None:
 def test_options_that_cannot_be_meant(arguments: list[str]) -> None:
     result = vid2ev("convert", *([CLIP] if arguments else []), *arguments)
     assert result.exit_code == 2 and "Error: " in result.stderr and left() == set()
+
+
+@pytest.mark.parametrize("source", [CLIP, "scene:spinning-shapes"])
+def test_an_upsampling_that_nobody_has(source: str) -> None:
+    result = vid2ev("convert", source, "--upsample", "magic")
+    assert result.exit_code == 2 and "expected one of none, linear, flow" in result.stderr and left() == set()
 
 
 @pytest.mark.parametrize(

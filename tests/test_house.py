@@ -79,6 +79,7 @@ CLIENT_FLOORS = {
     "data": 5,
     "methods": 6,
     "evaluate": 7,
+    "upsampler": 7,
     "interpolate": 7,
     "train": 7,
     "reconstruct": 8,

@@ -42,7 +42,7 @@ class Recipe:
     rig            where they stand
     mounts         the cameras
     depth          how far the scene is, in a text; None where no camera needs to know, and of scenes
-    upsample       how light is made between frames: none, linear or flow
+    upsample       how light is made between frames: none, linear, flow, or what other packages add
     subframes      intervals that a source interval becomes: "auto" (by motion and contrast), or a number
     max_subframes  the most that "auto" may take
     seed           of the sensors that have none of their own, 0 ... 2**64 - 1
@@ -109,7 +109,9 @@ class Recipe:
         maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
         options = {key: rest.pop(key) for key in OPTIONS if key in rest} | {"seen_through": maps}
         source = open_source(video, colour="rgb" if coloured else "luminance", **options)
-        rest |= {"upsample": "none"} if source.dense else {}
+        if source.dense:
+            make_upsampler(rest.get("upsample", "flow"))  # (which is refused though it is not needed)
+            rest |= {"upsample": "none"}
         scene = scene_of(source)
         resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None)
         mounts = mounts_of(resolved, sensors, seed, alone)
@@ -203,6 +205,7 @@ class Recipe:
         path = Path(self.video)
         known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
         upsampling = {"method": self.upsample, "subframes": self.subframes, "max_subframes": self.max_subframes}
+        upsampling |= getattr(self.upsampler(), "about", {})
         truth = {"truth": asdict(self.truth)} if self.truth else {}
         return {
             "versions": versions(),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from interp import pretrained
 from interp.methods import Method, open_method
 from interp.methods.one_frame import WAYS, OneFrame
 from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import sha256
 
 FALLBACK = "flow"  # where a method needs events, and there are none
 
@@ -69,9 +69,3 @@ def device_of(name: str) -> torch.device:
     if name == "cuda" and not there:
         raise UsageError("device cuda: no GPU that torch can use here; choose cpu or auto")
     return torch.device("cuda" if there and name != "cpu" else "cpu")
-
-
-def sha256(path: Path) -> str:
-    """The digest of a file."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from interp.interpolate.after import After
-from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of, sha256
+from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of
 from interp.interpolate.fill import Fill
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_still import OfStill
@@ -21,7 +21,7 @@ from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.interpolate.tiling import Tiling, parse_tiling
 from interp.methods import open_method
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.manifest import machine, versions
+from vid2ev.recording.manifest import machine, sha256, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8

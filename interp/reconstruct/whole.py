@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from interp import pretrained
-from interp.interpolate.choice import device_of, sha256
+from interp.interpolate.choice import device_of
 from interp.interpolate.instants import Number, parse_number
 from interp.interpolate.pictures import Pictures, checked_play
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
@@ -23,7 +23,7 @@ from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.formats import open_events
 from vid2ev.formats.event_file import Recording
-from vid2ev.recording.manifest import identity, machine, read_manifest, versions
+from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
 from vid2ev.views.slices import Count, Duration, Slicing
 from vid2ev.views.window import beginning_us, window
 

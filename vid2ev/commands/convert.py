@@ -63,8 +63,9 @@ class Auto(click.ParamType):
     "--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames.  [default: paper]"
 )
 @click.option(
-    "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
-    help="Light between the frames: a straight line, the same in steps, or carried along the estimated motion.",
+    "--upsample", default="flow", show_default=True, metavar="none|linear|flow|net",
+    help="Light between the frames: a straight line, the same in steps, carried along the estimated motion, or by a"
+    " network (net:WEIGHTS).",
 )  # fmt: skip
 @click.option(
     "--subframes",

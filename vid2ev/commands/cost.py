@@ -23,7 +23,7 @@ from vid2ev.commands.source_options import camera_options, source_options
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="How often to time each setting.")
 @camera_options
 @click.option(
-    "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
+    "--upsample", default="flow", show_default=True, metavar="none|linear|flow|net",
     help="Light between the frames: this in all settings.",
 )  # fmt: skip
 @click.option("--subframes", type=Auto("auto", 1, "subframes"), default="auto", help="Steps: this in all settings.")

@@ -14,7 +14,7 @@ from vid2ev.commands.source_options import camera_options, source_options
 @click.argument("source")
 @camera_options
 @click.option(
-    "--upsample", type=click.Choice(["none", "linear", "flow"]), default="flow", show_default=True,
+    "--upsample", default="flow", show_default=True, metavar="none|linear|flow|net",
     help="Light between the frames: what is measured is what the sensor would see.",
 )  # fmt: skip
 @click.option("--max-subframes", type=click.IntRange(1), default=64, show_default=True, help="As for convert.")

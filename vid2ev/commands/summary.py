@@ -25,7 +25,8 @@ def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:
         "linear": f"in a straight line from frame to frame, {_parts(upsampling, 'in one part')}",
         "flow": f"along the motion between the frames, {_parts(upsampling, 'in parts as needed, at most {}')}",
     }
-    facts = [("source", source_text(recipe["source"])), ("light", light[upsampling["method"]])]
+    others = f"by {upsampling['method']} between the frames, {_parts(upsampling, 'in parts as needed, at most {}')}"
+    facts = [("source", source_text(recipe["source"])), ("light", light.get(upsampling["method"], others))]
     if "cameras" in recipe:
         cameras = recipe["cameras"].items()
         return [

@@ -1,6 +1,7 @@
 """Denser in time: frames of light between the frames of the source.
 
-A new method is a class that satisfies `Upsampler`, in a module of its own, and a line in `make_upsampler`.
+A new method is a class that satisfies `Upsampler`, in a module of its own, and a line in `make_upsampler`; other
+packages can add theirs (`registered.py`).
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from typing import Literal, Protocol
 from vid2ev.errors import UsageError
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.upload import Upload
+from vid2ev.upsample.registered import other, others
 
-__all__ = ["METHODS", "Interval", "Upsampler", "make_upsampler"]
+__all__ = ["METHODS", "Interval", "Subframes", "Upsampler", "make_upsampler"]
 
 METHODS = ("none", "linear", "flow")
 Subframes = int | Literal["auto"]
@@ -56,6 +58,7 @@ def make_upsampler(
     none     the frames of the source and nothing else
     linear   cross-fades in linear light; "auto" adds nothing, because a sensor takes light to go straight anyway
     flow     light carried along the motion between the frames (dense optical flow)
+    others   those of other packages, such as `net` of interp, a trained network; after a colon comes what they take
 
     subframes      steps per interval, or "auto": what motion and contrast call for (`subframes.py`), one if still
     max_subframes  the most that "auto" may take
@@ -64,12 +67,16 @@ def make_upsampler(
 
     Raises UsageError for an unknown method or a number that cannot be meant.
     """
-    if method not in METHODS:
-        raise UsageError(f"upsampling '{method}': expected one of {', '.join(METHODS)}")
+    found = None if method in METHODS else other(method)
+    if method not in METHODS and found is None:
+        raise UsageError(f"upsampling '{method}': expected one of {', '.join([*METHODS, *others()])}")
     if subframes != "auto" and subframes < 1:
         raise UsageError(f"subframes {subframes}: expected a whole number of at least 1, or auto")
     if max_subframes < 1 or not threshold > 0:
         raise UsageError(f"max_subframes {max_subframes}, threshold {threshold}: expected at least 1, and more than 0")
+    if found is not None:
+        make, rest = found
+        return make(rest, subframes, max_subframes, threshold)  # type: ignore[no-any-return]
     if method == "none":
         from vid2ev.upsample.none import NoUpsampling
 

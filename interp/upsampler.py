@@ -1,0 +1,94 @@
+"""`vid2ev convert --upsample net`: light between frames by a network of frames alone.
+
+How many steps an interval takes is decided as for optical flow, by its motion; where nothing moves there are none.
+Codes of the network are sRGB, and light above white goes on, as far as the network lets it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from interp import pretrained
+from interp.light import to_codes, to_light
+from interp.methods.of_networks import AT_ONCE_PX, OfFrames, of_weights
+from vid2ev import Frame
+from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import sha256
+from vid2ev.stream.upload import as_array
+from vid2ev.upsample import Interval, Subframes, make_upsampler
+from vid2ev.upsample.subframes import instants, steps_for
+
+
+class NetUpsampling:
+    """Frames in between by a network; see `vid2ev.upsample.Upsampler`.
+
+    weights        of a network of frames alone
+    subframes      steps per interval, or "auto"
+    max_subframes  the most that "auto" takes
+    threshold      contrast threshold [nat]: motion is measured where log light changes by half of it or more
+    Raises UsageError for a network that needs events, DataError for a file that holds none of frames.
+    """
+
+    def __init__(self, weights: Path, subframes: Subframes, max_subframes: int, threshold: float):
+        method = of_weights(weights)
+        if not isinstance(method, OfFrames) or method.needs_events:
+            raise UsageError(f"upsampling 'net:{weights}': the network needs events; give one of frames alone")
+        self._network = method.network
+        self.subframes, self.max_subframes = subframes, max_subframes
+        self._motion = make_upsampler("flow", subframes, max_subframes, threshold)
+        self.about = {"weights": weights.name, "sha256": sha256(weights)}
+
+    def between(self, a: Frame, b: Frame) -> Interval:
+        """The frames after a up to and including b."""
+        found = self._motion.between(a, b)
+        shift_px = found.shift_px or 0.0
+        if self.subframes == "auto":
+            steps = min(steps_for(shift_px, (b.t_ns - a.t_ns) * 1e-9), self.max_subframes)
+        else:
+            steps = self.subframes
+        times_ns = instants(a.t_ns, b.t_ns, steps)
+        if not times_ns:
+            return Interval(iter([b]), found.limited, found.shift_px)
+        return Interval(self._made(a, b, times_ns), found.limited, found.shift_px)
+
+    def _made(self, a: Frame, b: Frame, times_ns: list[int]) -> Iterator[Frame]:
+        shares = torch.tensor([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns])
+        with torch.inference_mode():
+            pair = self._network.prepare(_codes(a), _codes(b))
+        some = max(1, AT_ONCE_PX // int(np.prod(a.light.shape[:2])))
+        for first in range(0, len(times_ns), some):
+            with torch.inference_mode():
+                images = self._network.at(pair, shares[first : first + some]).images[0]
+            for t_ns, image in zip(times_ns[first : first + some], images, strict=True):
+                yield Frame(_light(image, a.light.ndim), t_ns, original=False)
+        yield b
+
+
+def make(weights: str | None, subframes: Subframes, max_subframes: int, threshold: float) -> NetUpsampling:
+    """The upsampler with the weights of a file, or with those that come with vid2ev.  Raises UsageError."""
+    path = Path(weights) if weights else pretrained.default(events=False)
+    if path is None:
+        raise UsageError(
+            "upsampling 'net': no network of frames alone comes with this version; give the weights of one with"
+            " net:WEIGHTS, or choose flow"
+        )
+    if not path.exists():
+        raise UsageError(f"upsampling 'net:{weights}': no such file; give weights of `vid2ev train`, or choose flow")
+    return NetUpsampling(path, subframes, max_subframes, threshold)
+
+
+def _codes(frame: Frame) -> torch.Tensor:
+    """sRGB codes [1, C, H, W]."""
+    light = torch.from_numpy(np.nan_to_num(as_array(frame.light), nan=0.0, posinf=1.0))
+    planes = light[None] if light.ndim == 2 else light.permute(2, 0, 1)
+    return to_codes(planes[None].float(), "srgb")
+
+
+def _light(image: torch.Tensor, dimensions: int) -> Any:
+    light = to_light(image, "srgb")
+    return light[0].numpy() if dimensions == 2 else np.ascontiguousarray(light.permute(1, 2, 0).numpy())

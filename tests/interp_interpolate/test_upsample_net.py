@@ -1,0 +1,88 @@
+"""Light between frames by a network, found by its entry point."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_takes import SIZE, images, moving
+
+from interp import pretrained
+from interp.networks import make
+from interp.weights import save
+from vid2ev import Frame, convert
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.manifest import read_manifest
+from vid2ev.upsample import make_upsampler, registered
+
+
+@pytest.fixture(autouse=True)
+def _installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = EntryPoints([EntryPoint("net", "interp.upsampler:make", registered.GROUP)])
+    monkeypatch.setattr(registered, "entry_points", lambda **wanted: net.select(**wanted))
+
+
+@pytest.fixture
+def weights(tmp_path: Path) -> Path:
+    save(tmp_path / "rrin.safetensors", "rrin", make("rrin"))
+    return tmp_path / "rrin.safetensors"
+
+
+def two_frames(colours: bool) -> list[Frame]:
+    lights = [(frame.astype(np.float32) / 255) ** 2.2 for frame in moving(2)]
+    return [Frame(light if colours else light[..., 1], 33_333_333 * k) for k, light in enumerate(lights)]
+
+
+@pytest.mark.parametrize("colours", [False, True])
+def test_frames_come_in_even_steps_and_the_last_is_the_frame_itself(weights: Path, colours: bool) -> None:
+    a, b = two_frames(colours)
+    made = list(make_upsampler(f"net:{weights}", 4).between(a, b))
+    assert [frame.t_ns for frame in made] == [8_333_333, 16_666_667, 25_000_000, 33_333_333]
+    assert made[-1].light is b.light and [frame.original for frame in made] == [False] * 3 + [True]
+    # A network that has learned nothing is a cross-fade of codes.
+    for frame, share in zip(made[:-1], (0.25, 0.5, 0.75), strict=True):
+        assert frame.light.shape == a.light.shape and frame.light.dtype == np.float32
+        between = np.minimum(a.light, b.light) - 1e-4, np.maximum(a.light, b.light) + 1e-4
+        assert ((frame.light >= between[0]) & (frame.light <= between[1])).mean() > 0.99
+        assert np.abs(frame.light - (a.light + share * (b.light - a.light))).mean() < 0.05
+
+
+def test_steps_are_as_motion_asks_and_none_where_nothing_moves(weights: Path) -> None:
+    a, b = two_frames(False)
+    flow, net = (list(make_upsampler(method).between(a, b)) for method in ("flow", f"net:{weights}"))
+    assert [frame.t_ns for frame in net] == [frame.t_ns for frame in flow] and len(net) > 2
+    still = list(make_upsampler(f"net:{weights}").between(a, Frame(a.light.copy(), b.t_ns)))
+    assert len(still) == 1
+
+
+def test_light_that_is_not_finite_does_not_stop_it(weights: Path) -> None:
+    a, b = two_frames(False)
+    a.light[5, 5], b.light[5, 5], b.light[40, 3] = np.inf, np.inf, np.nan
+    made = list(make_upsampler(f"net:{weights}", 3).between(a, b))
+    assert made[-1].light is b.light and all(np.isfinite(frame.light).all() for frame in made[:-1])
+
+
+def test_a_conversion_says_which_weights_it_was_made_with(tmp_path: Path, weights: Path) -> None:
+    source = images(tmp_path / "in", moving(3))
+    convert(source, tmp_path / "out", upsample=f"net:{weights}", subframes=2, preview=False, threads=1)
+    said = read_manifest(tmp_path / "out")["upsampling"]
+    assert said["method"] == f"net:{weights}" and len(said["sha256"]) == 64 and said["weights"] == "rrin.safetensors"
+
+
+def test_what_cannot_be_meant_is_said(tmp_path: Path, weights: Path) -> None:
+    with pytest.raises(UsageError, match=r"expected one of none, linear, flow, net"):
+        make_upsampler("nett")
+    with pytest.raises(UsageError, match="no such file"):
+        make_upsampler(f"net:{tmp_path / 'nothing'}")
+    for name, error, sentence in (("rrin_events", UsageError, "needs events"), ("hdr", DataError, "rebuilds no")):
+        save(tmp_path / "other.safetensors", name, make(name))
+        with pytest.raises(error, match=sentence):
+            make_upsampler(f"net:{tmp_path / 'other.safetensors'}")
+    if pretrained.default(events=False) is None:
+        with pytest.raises(UsageError, match="net:WEIGHTS, or choose flow"):
+            make_upsampler("net")
+    else:
+        assert len(list(make_upsampler("net", 2).between(*two_frames(False)))) == 2
+    assert SIZE
