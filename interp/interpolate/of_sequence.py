@@ -39,6 +39,9 @@ class OfSequence:
         self.contrast = options.contrast or sequence.contrast
         self.remarks = sequence.remarks
         self._numbers = self._part(options)
+        rig = getattr(sequence, "rig", lambda: None)()
+        if rig is not None and any(np.any(camera.pose.translation_m) for camera in rig.cameras):
+            self.remarks.append("its cameras stand apart: events are laid over the frames edge on edge, as in training")
         self.rate = rate_of(sequence.times_us[self._numbers])
         self.channels = 1 if getattr(sequence, "grey", False) else 3
 

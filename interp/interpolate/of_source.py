@@ -14,6 +14,7 @@ from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from vid2ev import Events, open_source
 from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import identity
 
 FINEST = 1001  # denominators of rates
 BRIGHT = ("pq", "hlg", "log100", "log316", "linear")  # curves of more light than a film of 8 bits holds
@@ -66,7 +67,8 @@ class OfSource:
 
     def describe(self) -> dict[str, Any]:
         """What the source says."""
-        return self._about
+        path = Path(str(self._about.get("path", "")))
+        return self._about | ({"identity": identity(path)} if path.exists() else {})
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of
-from interp.interpolate.fill import Fill
+from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_still import OfStill
 from interp.interpolate.pictures import Pictures, film_rate
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
-from interp.interpolate.stretches import stretches
+from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
-from interp.interpolate.tiling import Tiling, parse_tiling
+from interp.interpolate.tiling import parse_tiling
 from interp.methods import open_method
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, sha256, versions
@@ -66,19 +68,12 @@ def interpolate(
 
     Raises UsageError for requests that cannot be meant, DataError for what cannot be read or written.
     """
-    output, grid = Path(output), grid_of(multiple, fps)
+    output, where = Path(output), device_of(device)
     kind = kind_of(output, format)
-    if cuts not in ("hold", "keep"):
-        raise UsageError(f"cuts '{cuts}': expected hold or keep")
-    take, where = open_take(source, options), device_of(device)
-    if isinstance(take, OfStill):
-        chosen = choice_of_one(method, network, str(source))
-    else:
-        chosen = choice(method, network, take.event_size is not None, str(source), where)
+    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options)
+    take, grid, fill = ready.take, ready.grid, ready.fill
     if told:
-        told(f"{chosen.method.name}: {chosen.why}")
-    after = After(Path(hdr), take.event_size is not None, where) if hdr else None
-    tiling = parse_tiling(tile, take.size, multiple_of(chosen))
+        told(f"{fill.method.name}: {ready.why}")
     rate = film_rate(take, grid, play)
     pictures = Pictures(kind, take.bits, take.curve)
     job = {
@@ -86,9 +81,9 @@ def interpolate(
         "source": take.describe(),
         "part": {"start_s": options.start_s, "stop_s": options.stop_s},
         "grid": grid.describe(),
-        "interpolation": chosen.about,
+        "interpolation": ready.about,
         "hdr": {"weights": str(hdr), "sha256": sha256(Path(hdr))} if hdr else None,
-        "tiles": tiling.describe(),
+        "tiles": fill.tiling.describe(),
         "cuts": cuts,
         "format": pictures.describe(),
         "film_rate": str(rate) if kind == "mp4" else None,
@@ -97,13 +92,80 @@ def interpolate(
         if shelf.finished:
             return shelf.finished
         started, there = time.perf_counter(), shelf.count
-        fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, where)
-        _fill(shelf, fill, after, grid, cuts == "hold", pictures, report)
+        _fill(shelf, ready, pictures, report)
         seconds = time.perf_counter() - started
         run = {"seconds": round(seconds, 3), "frames": shelf.count - there, "device": str(where), "machine": machine()}
-        manifest = shelf.job | _result(shelf, take, tiling) | {"run": run}
+        manifest = shelf.job | _result(shelf, take) | {"run": run}
         shelf.publish(manifest)
     return manifest
+
+
+def frames(
+    source: str | Path,
+    *,
+    multiple: Number | None = None,
+    fps: Number | None = None,
+    method: str | None = None,
+    network: str | Path | None = None,
+    hdr: str | Path | None = None,
+    tile: str = "auto",
+    cuts: str = "hold",
+    device: str = "cpu",
+    options: Options = AS_IT_IS,
+) -> Iterator[Filled]:
+    """The frames that `interpolate` writes, one by one, in memory that does not grow; what is wrong is refused at
+    once, as there."""
+    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, device_of(device), options)
+    return (frame for stretch in ready.stretches() for frame in ready.work(stretch)[1])
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """All that is to be known before the first frame; `why` the method was chosen, `about` for JSON what it is."""
+
+    take: Take
+    grid: Grid
+    fill: Fill
+    after: After | None
+    look: bool
+    why: str
+    about: dict[str, Any]
+
+    def stretches(self, zero_us: int | None = None, start: int = 0) -> Iterator[Stretch]:
+        """See `interp.interpolate.stretches`."""
+        return stretches(self.take, self.grid, zero_us, start, self.look)
+
+    def work(self, stretch: Stretch) -> tuple[str, Iterator[Filled]]:
+        """Why the method was not asked for a stretch, empty if it was; and its frames."""
+        work = self.fill.fill(stretch)
+        return work.remark, self.after.frames(work) if self.after else work.frames
+
+
+def prepared(
+    source: str | Path,
+    grid: Grid,
+    method: str | None,
+    network: str | Path | None,
+    hdr: str | Path | None,
+    tile: str,
+    cuts: str,
+    device: torch.device,
+    options: Options,
+) -> Ready:
+    """Open the source, its method and its tiles.  Raises as `interpolate` does."""
+    if cuts not in ("hold", "keep"):
+        raise UsageError(f"cuts '{cuts}': expected hold or keep")
+    take = open_take(source, options)
+    has_events = take.event_size is not None
+    if isinstance(take, OfStill):
+        chosen = choice_of_one(method, network, str(source))
+    else:
+        chosen = choice(method, network, has_events, str(source), device)
+    after = After(Path(hdr), has_events, device) if hdr else None
+    tiling = parse_tiling(tile, take.size, multiple_of(chosen))
+    needed = after is not None and after.needs_events
+    fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)
+    return Ready(take, grid, fill, after, cuts == "hold", chosen.why, chosen.about)
 
 
 def grid_of(multiple: Number | None, fps: Number | None) -> Grid:
@@ -120,37 +182,29 @@ def multiple_of(chosen: Choice) -> int:
     return int(getattr(getattr(chosen.method, "network", None), "multiple", 2))
 
 
-def _fill(
-    shelf: Shelf,
-    fill: Fill,
-    after: After | None,
-    grid: Grid,
-    look: bool,
-    pictures: Pictures,
-    report: Report | None,
-) -> None:
+def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None) -> None:
     """Make what is not there yet."""
-    take, zero_us = fill.take, shelf.done[0]["key_us"] if shelf.done else None
-    fill.shot = shelf.done[-1]["shot"] if shelf.done else 0
-    fill.events = after is not None and after.needs_events
-    keepers: dict[str, Fill | After] = {"fill": fill} | ({"after": after} if after else {})
+    take, zero_us = ready.take, shelf.done[0]["key_us"] if shelf.done else None
+    ready.fill.shot = shelf.done[-1]["shot"] if shelf.done else 0
+    keepers: dict[str, Fill | After] = {"fill": ready.fill} | ({"after": ready.after} if ready.after else {})
     for name, keeper in keepers.items():
         keeper.remember(_of(name, shelf.memory()))
     gaps, done = take.gaps_expected, shelf.count
-    total = grid.count(gaps, 0) if gaps is not None and grid.parts else None
+    total = None if gaps is None else ready.grid.count(gaps, round(10**6 * gaps / take.rate))
     if report:
         report(done, total)
-    for stretch in stretches(take, grid, zero_us, len(shelf.done), look):
-        work, times = fill.fill(stretch), []
+    for stretch in ready.stretches(zero_us, len(shelf.done)):
+        remark, made = ready.work(stretch)
+        times = []
         with shelf.writing():
-            for frame in after.frames(work) if after else work.frames:
+            for frame in made:
                 shelf.put(frame.instant.number, pictures.picture(frame))
                 times.append(frame.instant.t_us)
                 done += 1
                 if report:
                     report(done, total)
             memory = {f"{name}.{key}": array for name, each in keepers.items() for key, array in each.memory().items()}
-            line = {"key_us": stretch.first.t_us, "t_us": times, "remark": work.remark, "shot": fill.shot}
+            line = {"key_us": stretch.first.t_us, "t_us": times, "remark": remark, "shot": ready.fill.shot}
             shelf.stretch(line, memory)
     if not shelf.count:
         raise DataError(f"{take.name} holds no frame; give another part of it")
@@ -160,7 +214,7 @@ def _of(name: str, memory: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {key.removeprefix(f"{name}."): array for key, array in memory.items() if key.startswith(f"{name}.")}
 
 
-def _result(shelf: Shelf, take: Take, tiling: Tiling) -> dict[str, Any]:
+def _result(shelf: Shelf, take: Take) -> dict[str, Any]:
     """What the manifest says of what was made."""
     named: dict[str, list[list[float]]] = {}
     for line, after in zip(shelf.done, [*shelf.done[1:], None], strict=True):

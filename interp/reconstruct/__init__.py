@@ -2,3 +2,7 @@
 
 events -> slices (by time, or so many events) -> a filter or a network, which remembers -> pictures
 """
+
+from interp.reconstruct.whole import reconstruct as reconstruct
+
+__all__ = ["reconstruct"]

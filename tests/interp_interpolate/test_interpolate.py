@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from small_takes import SIZE, STEP_US, images, moving, recording, texture, times_of
 
 from interp.commands.interpolate import interpolate as command
-from interp.interpolate.whole import interpolate
+from interp.interpolate import frames, interpolate
 from interp.networks import make
 from interp.weights import save
 from vid2ev import open_source
@@ -43,12 +43,12 @@ def test_frames_of_16_bits_and_grey_ones_stay_what_they_are(tmp_path: Path) -> N
     interpolate(images(tmp_path / "deep", deep), tmp_path / "out16", multiple=2, method="linear", cuts="keep")
     grey = [frame[..., 0] for frame in moving(2)]
     interpolate(images(tmp_path / "grey", grey), tmp_path / "out8", multiple=2, method="linear")
-    for frames, folder in ((deep, "out16"), (grey, "out8")):
+    for source, folder in ((deep, "out16"), (grey, "out8")):
         out = made(tmp_path / folder)
-        for found, frame in zip(out[::2], frames, strict=True):
+        for found, frame in zip(out[::2], source, strict=True):
             np.testing.assert_array_equal(found, frame)
-        middle = (frames[0].astype(float) + frames[1]) / 2
-        assert np.abs(out[1] - middle).max() <= 0.51 and out[1].dtype == frames[0].dtype
+        middle = (source[0].astype(float) + source[1]) / 2
+        assert np.abs(out[1] - middle).max() <= 0.51 and out[1].dtype == source[0].dtype
 
 
 @pytest.mark.parametrize("method", ["nearest", "linear", "flow", "integration", "both", "bridge"])
@@ -194,3 +194,16 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     write_codes(tmp_path / "a" / "000001.png", moving(3)[0])
     other = CliRunner().invoke(command, ["a", "-x", "3", "--method", "linear", "-o", "a_x2.mp4", "--resume"])
     assert isinstance(other.exception, UsageError) and "--overwrite starts again" in str(other.exception)
+
+
+def test_frames_come_one_by_one_as_they_are_written(tmp_path: Path) -> None:
+    source = recording(tmp_path / "in", moving(4))
+    interpolate(source, tmp_path / "out", multiple="2.5")
+    coming = frames(source, multiple="2.5")
+    written = sorted((tmp_path / "out").glob("*.png"))
+    for path, frame, t_us in zip(written, coming, times_of(tmp_path / "out"), strict=True):
+        codes = np.rint(np.clip(frame.codes, 0, 1) * np.float32(255)).astype(np.uint8)
+        np.testing.assert_array_equal(codes, read_codes(path))
+        assert frame.instant.t_us == t_us
+    with pytest.raises(UsageError, match="needs events"):
+        frames(images(tmp_path / "a", moving(2)), method="bridge")

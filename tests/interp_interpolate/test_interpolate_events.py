@@ -105,6 +105,19 @@ def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tm
         np.testing.assert_array_equal(found, read_codes(frame))
 
 
+def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_laid_over(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    cameras = [f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\n' for kind in ("dvs", "cis")]
+    rig.write_text(cameras[0] + "translation_mm = [15, 0, 0]\nsize = [32, 24]\n" + cameras[1])
+    convert(
+        images(tmp_path / "in", moving(5)), tmp_path / "apart", rig=rig, depth="plane:2", pictures="png",
+        preview=False, threads=1, cis="ideal", overrides=["cis.frame_rate_hz=15"],
+    )  # fmt: skip
+    told = interpolate(tmp_path / "apart", tmp_path / "out", multiple=2)
+    assert told["source"]["event_size"] == [32, 24] and read_codes(tmp_path / "out" / "000001.png").shape[1] == SIZE[0]
+    assert any("stand apart" in remark for remark in told["remarks"])
+
+
 def still_and_events() -> tuple[np.ndarray, Events, np.ndarray]:
     """Light [32, H, W] whose logs go in steps of 0.2, the events of the steps, and its mean."""
     draw = np.random.default_rng(0)
