@@ -24,7 +24,8 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 )  # fmt: skip
 @click.option(
     "--baseline", "baselines", multiple=True, metavar="NAME",
-    help="Score a closed form; may be repeated.  [default: nearest, linear, flow, integration, both, bridge, ramps]",
+    help="Score a closed form; may be repeated.  [default: nearest, linear, flow, integration, both, bridge, ramps,"
+    " guided]",
 )  # fmt: skip
 @click.option(
     "--predictions", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),

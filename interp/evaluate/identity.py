@@ -22,12 +22,6 @@ def contents(path: Path) -> dict[str, Any]:
     return {"files": len(files), "bytes": sum(size for _, size in sizes), "sha256": digest.hexdigest()}
 
 
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def plain(name: str) -> str:
     """A name that can be that of a file."""
     return re.sub(r"[^\w.=+-]+", "-", name).strip("-.") or "unnamed"

@@ -13,10 +13,11 @@ import torch
 from interp.data.tensors import as_tensor
 from interp.evaluate import protocol as protocols
 from interp.evaluate.group import Footage, Group
-from interp.evaluate.identity import apart, digest_of
+from interp.evaluate.identity import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
 from vid2ev.errors import UsageError, nearest
+from vid2ev.recording.manifest import sha256
 
 WEIGHTS = "weights.safetensors"  # of a run of training
 
@@ -89,5 +90,5 @@ def methods_of(
     found = [OfMethod(name, {"closed_form": name}, open_method(name, device), protocol, device) for name in forms]
     for name, path in zip(apart([*forms, *called])[len(forms) :], paths, strict=True):
         method = of_weights(path, device, name)
-        found.append(OfMethod(name, {"weights_sha256": digest_of(path)}, method, protocol, device))
+        found.append(OfMethod(name, {"weights_sha256": sha256(path)}, method, protocol, device))
     return found

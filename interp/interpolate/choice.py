@@ -14,6 +14,7 @@ from interp.methods.one_frame import WAYS, OneFrame
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import sha256
 
+BEST = "guided"  # of what needs no training
 FALLBACK = "flow"  # where a method needs events, and there are none
 
 
@@ -39,7 +40,7 @@ def choice(
     why = "as asked"
     if not (name or network):
         network = pretrained.default(events)
-        name = None if network else "bridge" if events else FALLBACK
+        name = None if network else BEST if events else FALLBACK
         seen = "there are events" if events else "there are no events"
         best = "the network that comes with vid2ev" if network else "the best that needs no training"
         why = f"{best}, since {seen}"

@@ -1,5 +1,5 @@
 """Weights that come with the package: `NAME-SIZE.safetensors` beside this file, such as
-`rrin_events_light-tiny.safetensors`.
+`rrin_events_guided-tiny.safetensors`.
 
 What is used where nothing is asked for stands first in `PREFERRED`.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 PREFERRED: dict[bool, tuple[str, ...]] = {
-    True: ("rrin_events_light-small", "rrin_events_light-tiny"),
+    True: ("rrin_events_guided-small", "rrin_events_guided-tiny"),
     False: ("rrin-small", "rrin-tiny"),
 }
 OF_EVENTS = ("e2vid-small", "e2vid-tiny", "firenet-paper", "firenet-small", "firenet-tiny")

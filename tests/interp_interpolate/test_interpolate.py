@@ -83,7 +83,7 @@ def test_nothing_is_interpolated_across_a_cut(tmp_path: Path) -> None:
 
 def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
     source = recording(tmp_path / "in", moving(5), until=2)
-    told = interpolate(source, tmp_path / "out", multiple=2)
+    told = interpolate(source, tmp_path / "out", multiple=2, method="bridge")
     assert told["interpolation"]["method"] == "bridge"
     seconds = [STEP_US * k / 1e6 for k in range(5)]
     assert told["gaps_s"] == {"events that are not known": [[seconds[2], seconds[3]], [seconds[3], seconds[4]]]}
@@ -134,7 +134,7 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
     said: list[str] = []
     interpolate(images(tmp_path / "a", moving(2)), tmp_path / "out", multiple=1, told=said.append)
     interpolate(recording(tmp_path / "b", moving(2)), tmp_path / "out2", multiple=1, told=said.append)
-    for events, sentence, name in ((False, said[0], "flow"), (True, said[1], "bridge")):
+    for events, sentence, name in ((False, said[0], "flow"), (True, said[1], "guided")):
         weights = pretrained.default(events)
         assert sentence.startswith(weights.stem if weights else name) and "since there are" in sentence
 
