@@ -7,19 +7,21 @@ import torch
 from interp.light import to_codes, to_light
 from interp.methods.gap import Gap
 from vid2ev import Frame
-from vid2ev.upsample import make_upsampler
+from vid2ev.upsample.flow import FlowUpsampling, carried
 
-FINEST = 64  # steps that optical flow may be asked for between two frames
-NS = 10**6  # length of such a step: any
+GAP_NS = 1 << 40  # any, so long that times of 24 bits are whole
 
 
 def flow(gap: Gap, times: torch.Tensor) -> torch.Tensor:
-    """Times are taken to the nearest of the fewest even steps that hold all of them."""
-    steps = next((n for n in range(1, FINEST) if ((times * n) - (times * n).round()).abs().max() < 1e-4), FINEST)
+    """A frame for each time that lies between, however they are spaced; at 0 and 1 the key frames themselves."""
     first, last = (
-        Frame(to_light(frame, "srgb").cpu().permute(1, 2, 0).contiguous().numpy(), steps * NS * number)
+        Frame(to_light(frame, "srgb").cpu().permute(1, 2, 0).contiguous().numpy(), number * GAP_NS)
         for number, frame in enumerate((gap.frame_0, gap.frame_1))
     )
-    made = [first, *make_upsampler("flow", steps).between(first, last), last]
-    light = torch.stack([torch.from_numpy(made[int(n)].light) for n in (times * steps).round()])
+    made = {0: first.light, GAP_NS: last.light}
+    times_ns = [round(time * GAP_NS) for time in times.tolist()]
+    if inner := sorted({t_ns for t_ns in times_ns if 0 < t_ns < GAP_NS}):
+        motion = FlowUpsampling(len(inner) + 1).motion(first.luminance, last.luminance)
+        made |= {frame.t_ns: frame.light for frame in carried(first, last, motion, inner)}
+    light = torch.stack([torch.from_numpy(made[t_ns]) for t_ns in times_ns])
     return to_codes(light.permute(0, 3, 1, 2), "srgb").to(gap.frame_0)

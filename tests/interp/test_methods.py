@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch.nn import functional as F
 
+from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
+from interp.methods.flow import flow
 from interp.networks import make
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
+from vid2ev import Frame
 from vid2ev.errors import DataError, UsageError
+from vid2ev.upsample import flow as upsampled
+from vid2ev.upsample import make_upsampler
+from vid2ev.upsample.flow import motion_at
 
 TIMES = torch.tensor([0.25, 0.5, 0.875])
 NOTHING = EventCounts.none(1, (48, 48), steps=8)
@@ -44,6 +51,30 @@ def test_flow_carries_what_moves() -> None:
     inner = (slice(None), slice(None), slice(10, -10), slice(10, -10))
     truth = torch.stack(shifted[1:4])
     assert float((made - truth)[inner].pow(2).mean()) < 0.5 * float((crossed - truth)[inner].pow(2).mean())
+
+
+@pytest.mark.parametrize("steps", [2, 3, 7, 8, 32])
+def test_flow_at_even_times_is_that_of_the_upsampler(steps: int) -> None:
+    frames = torch.rand(2, 3, 12, 16).repeat_interleave(4, 2).repeat_interleave(4, 3)
+    before, after = (
+        Frame(to_light(frame, "srgb").permute(1, 2, 0).contiguous().numpy(), 10**6 * steps * number)
+        for number, frame in enumerate(frames)
+    )
+    even = [torch.from_numpy(each.light) for each in make_upsampler("flow", steps).between(before, after)]
+    times = torch.from_numpy(np.linspace(0, 1, steps + 1)[1:]).float()
+    made = flow(Gap(*frames, None, 33_333), times)
+    assert torch.equal(made, to_codes(torch.stack(even).permute(0, 3, 1, 2), "srgb"))
+
+
+def test_flow_makes_the_instants_asked_for_and_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    gap = Gap(*torch.rand(2, 3, 48, 64), None, 33_333)
+    times = torch.tensor([0.0, 0.12501, 0.2493, 0.2493, 0.9, 1.0])  # as stamps of a real camera are
+    alone = torch.cat([flow(gap, time[None]) for time in times])
+    made: list[float] = []
+    monkeypatch.setattr(upsampled, "motion_at", lambda *asked: made.append(float(asked[1])) or motion_at(*asked))
+    assert torch.equal(flow(gap, times), alone)
+    assert made == pytest.approx([0.12501, 0.2493, 0.9])
+    torch.testing.assert_close(alone[[0, -1]], torch.stack([gap.frame_0, gap.frame_1]), atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize(

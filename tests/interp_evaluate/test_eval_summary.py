@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,16 @@ def test_conditions_are_what_they_are_called() -> None:
     assert found["motion_px_per_s"] == pytest.approx(100 * found["motion_px"])
     assert found["blur_px"] == pytest.approx(found["motion_px"] / 4)
     assert (found["events_per_px"], found["disparity_px"], found["offset_us"]) == (1.5, 4.0, -7.0)
+
+
+@pytest.mark.parametrize("changed", [lambda key: np.roll(key, 64, axis=1), lambda key: key // 2])
+def test_motion_that_is_not_found_is_not_taken_for_none(changed: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Half the picture across, and half the light."""
+    group = moved(0)
+    assert conditions_of(group)["motion_px"] == 0
+    group.keys[1] = changed(group.keys[0])
+    found = conditions_of(group)
+    assert all(math.isnan(found[name]) for name in ("motion_px", "motion_px_per_s", "blur_px"))
 
 
 def test_moving_pixels_and_the_worst_window_are_scored_apart() -> None:

@@ -15,7 +15,7 @@ N. Sundaram et al., "Dense point trajectories by GPU-accelerated large displacem
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -50,6 +50,7 @@ class Motion(NamedTuple):
     sure_before: np.ndarray  # [h, w] 0 ... 1: whether backward leads back to where forward started
     sure_after: np.ndarray
     shift_px: float  # px of the frames: a high percentile of the speed of what changes visibly, 0 if nothing does
+    explained: float  # 0 ... 1: of the pixels that change visibly, those of which shift_px is; 1 if nothing does
 
 
 class FlowUpsampling:
@@ -62,7 +63,11 @@ class FlowUpsampling:
     """
 
     def __init__(
-        self, subframes: int | Literal["auto"], max_subframes: int, threshold: float, upload: Upload | None = None
+        self,
+        subframes: int | Literal["auto"] = "auto",
+        max_subframes: int = 64,
+        threshold: float = 0.15,
+        upload: Upload | None = None,
     ):
         self.subframes, self.max_subframes, self.threshold = subframes, max_subframes, threshold
         self._upload = upload
@@ -77,16 +82,17 @@ class FlowUpsampling:
             return Interval(iter([b]))
         if self.subframes == "auto" and np.array_equal(a.light, b.light):
             return Interval(iter([b]), shift_px=0.0)
-        motion = self._motion(a.luminance, b.luminance)
+        motion = self.motion(a.luminance, b.luminance)
         asked = steps_for(motion.shift_px, (b.t_ns - a.t_ns) * 1e-9)
         steps = min(asked, self.max_subframes) if self.subframes == "auto" else self.subframes
         limited = self.subframes == "auto" and asked > self.max_subframes
         if steps == 1:
             return Interval(iter([b]), limited, motion.shift_px)
-        made = carried_there(a, b, motion, steps, self._upload) if self._upload else carried(a, b, motion, steps)
+        times_ns = instants(a.t_ns, b.t_ns, steps)
+        made = carried_there(a, b, motion, times_ns, self._upload) if self._upload else carried(a, b, motion, times_ns)
         return Interval(made, limited, motion.shift_px)
 
-    def _motion(self, before: np.ndarray, after: np.ndarray) -> Motion:
+    def motion(self, before: np.ndarray, after: np.ndarray) -> Motion:
         """Motion between two images of light [H, W]."""
         proxy_before, proxy_after, nat_per_code = proxies(before, after, SHRINK)
         changed = cv2.absdiff(proxy_before, proxy_after) * nat_per_code > self.threshold / 2
@@ -101,17 +107,19 @@ class FlowUpsampling:
         sure_before, sure_after = agreement(forward, backward), agreement(backward, forward)
         speeds = np.hypot(forward[..., 0], forward[..., 1])
         speeds = speeds[changed & (sure_before > 0.5) & (speeds > 0)]
+        changing = np.count_nonzero(changed)
+        explained = speeds.size / changing if changing >= FEWEST else 1.0
         shift_px = SHRINK * float(np.percentile(speeds, FAST_PERCENTILE)) if speeds.size >= FEWEST else 0.0
-        return Motion(forward, backward, sure_before, sure_after, shift_px)
+        return Motion(forward, backward, sure_before, sure_after, shift_px, explained)
 
 
-def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
-    """The frames after a up to and including b, in even steps of time."""
+def carried(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int]) -> Iterator[Frame]:
+    """The frames at instants between a and b, in order, and b."""
     before, after = (list(map(with_margin, channels_of(frame.light))) for frame in (a, b))
     height, width = a.light.shape[:2]
     moving, last = np.empty((3, height, width), np.float32), a.light
     was_still = np.ones(strip_count(width, height), np.bool_)
-    for t_ns in instants(a.t_ns, b.t_ns, steps):
+    for t_ns in times_ns:
         time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
         motion_at(motion, time, moving)
         channels = np.empty((len(before), height, width), np.float32)
@@ -125,12 +133,11 @@ def carried(a: Frame, b: Frame, motion: Motion, steps: int) -> Iterator[Frame]:
     yield b if last is a.light else replace(b, still=Still(last, was_still))
 
 
-def carried_there(a: Frame, b: Frame, motion: Motion, steps: int, upload: Upload) -> Iterator[Frame]:
+def carried_there(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int], upload: Upload) -> Iterator[Frame]:
     """`carried` on a device, some instants at a time: what goes there is the light of a and b, and the motion."""
     before, after = (warp_tensors.with_margin(upload.light(frame.light)) for frame in (a, b))
     forward, backward, sure_before, sure_after = map(upload.tensor, motion[:4])
     (height, width), (rows, columns) = a.light.shape[:2], motion.sure_before.shape
-    times_ns = instants(a.t_ns, b.t_ns, steps)
     some = max(1, AT_ONCE // (height * width))
     for first in range(0, len(times_ns), some):
         shares = [(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns[first : first + some]]
@@ -182,7 +189,7 @@ def motion_at(motion: Motion, time: np.float32, out: np.ndarray) -> None:
 def no_motion(shape: tuple[int, ...]) -> Motion:
     """Nothing moves: frames in between are cross-fades."""
     still, sure = np.zeros((*shape, 2), np.float32), np.ones(shape, np.float32)
-    return Motion(still, still, sure, sure, 0.0)
+    return Motion(still, still, sure, sure, 0.0, 1.0)
 
 
 def with_margin(light: np.ndarray) -> np.ndarray:
