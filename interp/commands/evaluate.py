@@ -81,9 +81,12 @@ def evaluate(
     of such, or scene:NAME.  Of videos frames are dropped, and an event camera is simulated that saw them all.
     """
     from interp.evaluate.protocol import Protocol
+    from interp.evaluate.remarks import notes
+    from interp.evaluate.report import PAGE
+    from interp.evaluate.report.markdown import aligned
+    from interp.evaluate.report.overview import full_scale_table, protocol_table
     from interp.evaluate.run import evaluate as evaluated
     from interp.evaluate.simulated import Simulated
-    from interp.evaluate.table import notes, table
     from interp.methods import METHODS
     from vid2ev.commands.progress import counting, heard
     from vid2ev.sources import OPTIONS
@@ -109,8 +112,9 @@ def evaluate(
         click.echo(json.dumps(found.summary, indent=2))
         return
     if not quiet:
-        click.echo(table(found.summary))
-        click.echo(f"\n{folder}: {len(found.rows)} rows, {len(found.summary['sequences'])} sequences")
+        for table in (protocol_table(found.rows), full_scale_table(found.rows)):
+            click.echo(f"{table.title}\n\n{aligned(table)}\n")
+        click.echo(f"{folder / PAGE}: {len(found.rows)} rows of {len(found.summary['sequences'])} sequences")
     for note in notes(found.summary):
         click.echo(f"note: {note}", err=True)
 

@@ -1,7 +1,8 @@
 """An evaluation: every method rebuilds every group of every sequence, and what is known of each frame becomes a row.
 
-REPORT/rows.csv        a line for each frame and method         REPORT/worst/          pictures of the worst frames
-REPORT/summary.json    what they come to                        REPORT/job.json, kept/ what it takes to go on
+REPORT/rows.csv        a line for each frame and method         REPORT/report.md, .html   what it comes to, for people
+REPORT/summary.json    what they come to                        REPORT/worst/             pictures of the worst frames
+REPORT/job.json, kept/ what it takes to go on
 
 Sequences are gone through in order, and groups within, all methods together, so that a film is simulated once.
 """
@@ -19,6 +20,7 @@ from interp.evaluate.kept import Kept
 from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import Rebuilder, methods_of
+from interp.evaluate.report.of_evaluation import write_pages
 from interp.evaluate.row import Row
 from interp.evaluate.rows import ROWS, write_rows
 from interp.evaluate.scoring import conditions_of, rows_of
@@ -33,7 +35,6 @@ from vid2ev.recording.manifest import versions
 
 SUMMARY = "summary.json"
 Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
-Pages = Callable[[Path, Sequence[Row], Mapping[str, Any]], object]
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,6 @@ def evaluate(
     resume: bool = False,
     device: str = "cpu",
     report: Report | None = None,
-    pages: Pages | None = None,
 ) -> Evaluation:
     """Score methods on data sets, into a folder.
 
@@ -68,7 +68,6 @@ def evaluate(
     simulated     the event camera that looks at films
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
-    pages         makes a report of the folder, the rows and the summary, once these are written
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
@@ -92,8 +91,7 @@ def evaluate(
             write_rows(folder / ROWS, rows)
             with whole_file(folder / SUMMARY) as file:
                 file.write(f"{json.dumps(summary, indent=1, allow_nan=False)}\n".encode())
-        if pages:
-            pages(folder, rows, summary)
+        write_pages(folder, rows, summary)
     return Evaluation(rows, summary)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,18 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from footage_made import SIZE, pictures, write_film, write_hsergb
+from scored import METHODS as METHODS_SCORED
+from scored import scored
 
 from interp.commands.evaluate import evaluate as command
 from interp.evaluate.group import Cameras, Group
+from interp.evaluate.report.content import FROM_TRUTH
 from interp.evaluate.row import Row
 from interp.evaluate.rows import NUMBERS, read_rows, write_rows
 from interp.evaluate.scoring import conditions_of, rows_of
 from interp.evaluate.simulated import Simulated
-from interp.evaluate.summary import EDGES, binned, summarised
+from interp.evaluate.summary import summarised
+from interp.evaluate.tables import binned, edges_of, values
 from interp.evaluate.worst import COUNT, worst_of
 from interp.methods import METHODS
 from interp.representation.event_counts import EventCounts
@@ -39,23 +44,27 @@ def test_means_are_of_all_frames_and_of_sequences() -> None:
     rows += [row("b", 0, 1, psnr=10.0), row("b", 0, 2)]
     found = summarised(rows, ["m"], {"one": ["a"], "two": ["b"]})["m"]
     assert found["pooled"]["psnr"] == {
-        "mean": 25.0, "std": pytest.approx(np.std([20, 30, 40, 10])), "min": 10.0, "count": 4,
+        "mean": 25.0, "std": pytest.approx(np.std([20, 30, 40, 10])), "count": 4, "min": 10.0,
     }  # fmt: skip
     assert found["global"]["psnr"]["mean"] == 20.0 and found["global"]["psnr"]["std"] == 10.0  # of 30 and 10
     assert found["by_set"]["one"]["pooled"]["psnr"]["mean"] == 30.0
     assert found["by_position"]["1"]["psnr"]["mean"] == 15.0 and found["by_position"]["2"]["psnr"]["count"] == 1
-    assert found["by_sequence_and_position"]["a"]["3"]["psnr"]["mean"] == 40.0
+    assert found["by_sequence"]["a"]["psnr"]["mean"] == 30.0
     assert found["worst"]["psnr"] == {"sequence": "b", "group": 0, "position": 1, "psnr": 10.0}
     assert found["pooled"]["ssim"]["mean"] is None and found["worst"]["ssim"] is None
     json.dumps(found, allow_nan=False)
 
 
-def test_bins_hold_each_frame_whose_condition_is_known_once() -> None:
-    rows = [row("a", k, 1, motion_px=value, psnr=30.0) for k, value in enumerate((0, 0.99, 1, 63, 64, 1e6, math.nan))]
-    found = binned(rows, "motion_px", EDGES["motion_px"])
-    assert [(each["from"], each["to"], each["frames"]) for each in found] == [
-        (0, 1, 2), (1, 2, 1), (32, 64, 1), (64, None, 2),
-    ]  # fmt: skip
+def test_bins_are_the_same_for_all_methods_and_those_of_the_tables() -> None:
+    rows = scored(groups=3)
+    found = summarised(rows, list(METHODS_SCORED), {})
+    edges = edges_of(values(rows, "motion_px"))
+    for method in METHODS_SCORED:
+        bins = binned([each for each in rows if each.method == method], "motion_px", "ssim", edges)
+        said = found[method]["by_condition"]["motion_px"]["ssim"]
+        assert [(each["from"], each["mean"], each["count"]) for each in said] == [
+            (each.low, each.score.mean, each.score.count) for each in bins
+        ]
 
 
 def test_worst_frames_are_of_different_groups() -> None:
@@ -129,9 +138,18 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
     write_hsergb(tmp_path / "set" / "seq", pictures(18))
     shown = run("set", "--baseline", "linear", "--baseline", "bridge")
     assert shown.exit_code == 0, shown.output
-    assert shown.stdout.splitlines()[2].startswith("| linear ") and "set_eval: 28 rows, 1 sequences" in shown.stdout
+    assert "set_eval/report.html: 28 rows of 1 sequences" in shown.stdout
     assert "note: seq: 1 frames after the last complete group of 8 are not rebuilt" in shown.stderr
+    text, page = ((tmp_path / "set_eval" / name).read_text() for name in ("report.md", "report.html"))
+    assert "1 frames after the last complete group of 8 are not rebuilt" in text and "seed" not in text
+    assert page.count("data:image/png") == 2 * 2  # of the worst frames of both, of two gaps
     summary = json.loads((tmp_path / "set_eval" / "summary.json").read_text())
+    scores = summary["methods"]["linear"]["pooled"]
+    mean, least = scores["psnr"], [scores[name]["min"] for name in ("patch_psnr", "patch_ssim")]
+    for said in (shown.stdout, text):
+        plain = re.sub(r"[* ]+", " ", said)
+        assert f"| linear | 14 | {mean['mean']:.2f} ± {mean['std']:.2f} |" in plain
+        assert f"| {least[0]:.2f} | {least[1]:.3f} |" in plain
     for of in summary["methods"]["linear"]["worst_pictures"]:
         assert {
             name: read_codes(tmp_path / "set_eval" / path).shape for name, path in of["files"].items()
@@ -149,6 +167,9 @@ def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["sensor"]["parameters"]["threshold_on"] == 0.4
     assert list(summary["methods"]) == list(METHODS)
+    assert f"[default: {', '.join(METHODS)}]" in " ".join(run("--help").stdout.split())
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert FROM_TRUTH in text and "threshold_on 0.4" in text and "| event camera | clean, seed 0 |" in text
     noisy = Simulated.of("noisy", ["shot_rate_hz=3"]).spec
     assert (noisy.threshold_on, noisy.shot_rate_hz, noisy.photoreceptor_tau_us) == (0.25, 3.0, 100.0)
     wrong = run(tmp_path / "film.npz", "-o", tmp_path / "other", "--sensor", "davis")

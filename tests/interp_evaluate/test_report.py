@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scored import METHODS, SEQUENCES, row, scored
 
+from interp.evaluate.conditions import varying
 from interp.evaluate.published import of_gap
 from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_report
-from interp.evaluate.report.conditions import varying
 from interp.evaluate.report.content import FROM_TRUTH, document
 from interp.evaluate.report.markdown import escaped, markdown
 from interp.evaluate.row import Row
@@ -25,7 +25,7 @@ ABOUT: About = {
     "not_scored": {"the events end before the last frame": 14},
     "remarks": ["31 events were beyond the sensor."],
     "versions": {"vid2ev": "0.1.0"},
-    "events_from_truth": True,
+    "events_from_truth": list(SEQUENCES),
 }
 ROWS = scored(groups=3)
 NASTY = "<script>alert(1)</script>"

@@ -23,7 +23,7 @@ MARKDOWN, PAGE = "report.md", "report.html"
 def write_report(folder: Path, rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()) -> None:
     """Write `report.md` and `report.html` into a folder, each there as a whole or not at all; raises DataError.
 
-    `worst` are frames to be shown with their errors, in the order given: the first two of each method.
+    `worst` are frames to be shown with their errors, in the order given: of each method the first, or the first two.
     """
     from interp.evaluate.report.content import document
     from interp.evaluate.report.markdown import markdown

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
+from interp.evaluate.conditions import varying
 from interp.evaluate.report.about import About
 from interp.evaluate.report.beside_paper import comparison_table, quality_table
 from interp.evaluate.report.blocks import Block, Cell, Document, Items, Line, Plot, Section, Table, Text
-from interp.evaluate.report.conditions import varying
 from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
 from interp.evaluate.report.numbers import PSNR_DIGITS, SCORES, SSIM_DIGITS, number, spread
@@ -19,6 +20,7 @@ from interp.evaluate.report.overview import (
     position_table,
     protocol_table,
     sequence_table,
+    set_table,
 )
 from interp.evaluate.report.worst import WorstFrame, worst_blocks
 from interp.evaluate.row import Row
@@ -26,14 +28,14 @@ from interp.evaluate.tables import pooled, split
 
 TITLE = "How well the frames between were rebuilt"
 FROM_TRUTH = (
-    "The events were simulated from video that passes exactly through the frames that are scored. That is kinder to"
-    " every method that uses events than a real recording is, to those that add them up most of all."
+    "were simulated from light that passes exactly through the frames that are scored. That is kinder to every method"
+    " that uses events than a real recording is, to those that add them up most of all."
 )
 
 
 def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()) -> Document:
     """The report of rows.  Evaluations of several gaps get a chapter for each."""
-    opening: list[Block] = [Text(FROM_TRUTH, warning=True)] if about.get("events_from_truth") else []
+    opening = list(_from_truth(rows, about.get("events_from_truth", ())))
     gaps = split(rows, lambda row: row.multiple)
     opening += [Text(_answer(gaps[multiple])) for multiple in sorted(gaps)]
     if not rows:
@@ -41,7 +43,7 @@ def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()
     sections = [
         Section(f"{title}, {multiple - 1} frames skipped" if len(gaps) > 1 else title, tuple(blocks))
         for multiple in sorted(gaps)
-        for title, blocks in _chapter(gaps[multiple]).items()
+        for title, blocks in _chapter(gaps[multiple], about.get("sets", {})).items()
     ]
     if worst:
         sections.append(Section("The worst frames", tuple(worst_blocks(worst))))
@@ -66,10 +68,18 @@ def _answer(rows: Sequence[Row]) -> str:
     return f"{said}, {others[0]} {spread(means[others[0]], PSNR_DIGITS)} dB." if others else f"{said}."
 
 
-def _chapter(rows: Sequence[Row]) -> dict[str, list[Block]]:
+def _from_truth(rows: Sequence[Row], simulated: Sequence[str]) -> Iterator[Block]:
+    """What may not be forgotten where sequences have simulated events."""
+    if simulated:
+        of = "" if {row.sequence for row in rows} <= set(simulated) else f"of {', '.join(simulated)} "
+        yield Text(f"The events {of}{FROM_TRUTH}", warning=True)
+
+
+def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str, list[Block]]:
     conditions = varying(rows)
     chapter: dict[str, list[Block]] = {
         "All methods": [protocol_table(rows), full_scale_table(rows), *_uneven(rows)],
+        "By data set": [set_table(rows, sets, field, name) for field, name in SCORES.items() if len(sets) > 1],
         "By sequence": [
             *_drawn(distribution_plot(rows), "PSNR of the frames of each sequence: middle half, all but 5 % on either"
                     " side, median."),
@@ -82,12 +92,14 @@ def _chapter(rows: Sequence[Row]) -> dict[str, list[Block]]:
         "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
     }  # fmt: skip
     for condition, edges in conditions:
+        unknown = sum(math.isnan(getattr(row, condition.field)) for row in rows)
         caption = f"Mean score in bins of {condition.axis} [{condition.unit}]; below, how many frames are in each."
         if condition.limit is not None:
             caption += f" The line at {condition.limit:g} is where the paper's network ends."
         chapter[f"Against {condition.title}"] = [
             *_drawn(condition_plot(rows, condition, edges), caption),
             *([Text(breaking_points(rows, condition, edges))] if condition.harder else []),
+            *([Text(f"Not known of {unknown / len(rows):.0%} of the scores, which are left out.")] if unknown else []),
             *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
         ]
     chapter["Beside the paper"] = [quality_table(rows), comparison_table(rows)]
@@ -123,7 +135,7 @@ def _drawn(svg: str | None, caption: str) -> list[Block]:
 
 def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
     left_out = dict(about.get("not_scored", {}))
-    unknown = len({(row.sequence, row.method, row.group, row.position) for row in rows if row.psnr != row.psnr})
+    unknown = len({(row.sequence, row.method, row.group, row.position) for row in rows if math.isnan(row.psnr)})
     if unknown:
         left_out["rebuilt, but without a PSNR"] = unknown
     blocks: list[Block] = []
@@ -133,6 +145,12 @@ def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
     if about.get("remarks"):
         blocks.append(Items(tuple(about["remarks"])))
     yield Section("What was not scored", tuple(blocks or [Text("Nothing was left out.")]))
+    if sequences := about.get("sequences"):
+        head = tuple(next(iter(sequences.values())))
+        lines = tuple(
+            Line(name, tuple(Cell(_value(facts[title])) for title in head)) for name, facts in sequences.items()
+        )
+        yield Section("Sequences", (Table(("sequence", *head), lines, words=2),))
     for title, facts in (("Settings", about.get("settings")), ("Versions", about.get("versions"))):
         if facts:
             lines = tuple(Line(name, (Cell(_value(value)),)) for name, value in facts.items())

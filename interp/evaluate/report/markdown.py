@@ -19,6 +19,18 @@ def markdown(said: Document) -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def aligned(table: Table) -> str:
+    """A table as text that can be read as it is: Markdown with its columns below each other."""
+    lines = [[*map(escaped, table.head)], *map(_line, table.lines)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(table.head))]
+    sides = ["-" * width if k < table.words else f"{'-' * (width - 1)}:" for k, width in enumerate(widths)]
+    padded = [
+        [text.ljust(width) if k < table.words else text.rjust(width) for k, (text, width) in enumerate(each)]
+        for each in (zip(line, widths, strict=True) for line in (lines[0], sides, *lines[1:]))
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in padded)
+
+
 def escaped(text: str) -> str:
     """Text that means itself: no markup, no HTML, one line."""
     line = " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from interp.evaluate.report.conditions import Condition
+from interp.evaluate.conditions import Condition
 from interp.evaluate.report.drawing import SOFT, WIDTH_IN, figure, legend, look, styles, svg_of
 from interp.evaluate.report.numbers import SCORES
 from interp.evaluate.report.overview import best_method, by_method

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+from interp.evaluate.conditions import Condition
 from interp.evaluate.report.blocks import Cell, Line, Table
-from interp.evaluate.report.conditions import Condition
 from interp.evaluate.report.numbers import cells, digits_of, marked, number, short, spread
 from interp.evaluate.row import Row
 from interp.evaluate.tables import Bin, Mean, binned, breaks_at, by_position, least, per_sequence, pooled, split
@@ -72,6 +72,22 @@ def full_scale_table(rows: Sequence[Row]) -> Table:
         "Against full scale, and the worst",
         FULL_SCALE,
     )
+
+
+def set_table(rows: Sequence[Row], sets: Mapping[str, Sequence[str]], field: str, title: str) -> Table:
+    """A line for each data set, of all its frames."""
+    parts = by_method(rows)
+    lines = [
+        Line(
+            name,
+            cells(
+                [pooled([row for row in part if row.sequence in of], field).mean for part in parts.values()],
+                _shown(field),
+            ),
+        )
+        for name, of in sets.items()
+    ]
+    return Table(("data set", *parts), tuple(lines), title)
 
 
 def sequence_table(rows: Sequence[Row], field: str, title: str) -> Table:

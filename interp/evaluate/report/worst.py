@@ -15,7 +15,7 @@ from interp.evaluate.report.blocks import Block, Picture
 from interp.evaluate.report.numbers import PSNR_DIGITS, SSIM_DIGITS, number
 from interp.evaluate.row import Row
 
-MOST = 2  # frames shown of each method: half a megabyte and more each
+MOST, MOST_OF_ALL = 2, 8  # frames shown of each method, and of all if they are many: half a megabyte and more each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,12 +30,13 @@ class WorstFrame:
 
 
 def worst_blocks(worst: Sequence[WorstFrame]) -> Iterator[Block]:
-    """A picture for each frame, of each method those that come first."""
-    shown = Counter[str]()
+    """A picture for each frame, of each method those that come first: one at least."""
+    shown, methods = Counter[str](), {frame.row.method for frame in worst}
+    most = min(MOST, max(1, MOST_OF_ALL // max(1, len(methods))))
     for frame in worst:
         row = frame.row
         shown[row.method] += 1
-        if shown[row.method] > MOST:
+        if shown[row.method] > most:
             continue
         picture = panel(frame.truth, frame.rebuilt, (row.patch_x, row.patch_y), frame.similarity)
         rms = float(np.sqrt((error_codes(frame.truth, frame.rebuilt) ** 2).mean()))

@@ -1,0 +1,49 @@
+"""What has to be known beside the scores of an evaluation, of its summary: what was left out, and what is peculiar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+NAMED = 3  # sequences that are named where many have the same to be said of them
+
+
+def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
+    """What was not scored: reason and number."""
+    found: dict[str, int] = {}
+    for of in summary["sequences"].values():
+        counts = {f"gaps: {reason}": count for reason, count in of["not_scored"].items()}
+        counts |= {f"frames that {method} lacks": count for method, count in of["missing"].items() if count}
+        for reason, count in counts.items():
+            found[reason] = found.get(reason, 0) + count
+    return found
+
+
+def remarks(summary: Mapping[str, Any]) -> list[str]:
+    """Sentences: what cannot be used, what is peculiar about sequences, and frames without any error."""
+    said: dict[str, list[str]] = {}
+    for name, of in summary["sequences"].items():
+        for remark in of["remarks"]:
+            said.setdefault(remark, []).append(name)
+    return [
+        *(f"{name}: not used: {reason}" for name, reason in summary["unusable"].items()),
+        *(f"{_several(names)}: {remark}" for remark, names in said.items()),
+        *_perfect(summary["methods"]),
+    ]
+
+
+def notes(summary: Mapping[str, Any]) -> list[str]:
+    """All of it, a sentence each."""
+    return [*remarks(summary), *(f"not scored: {count} {reason}" for reason, count in left_out(summary).items())]
+
+
+def _perfect(methods: Mapping[str, Any]) -> Iterator[str]:
+    for name, of in methods.items():
+        if of["perfect"]:
+            yield f"{name}: {of['perfect']} frames without any error count as 100 dB each"
+
+
+def _several(names: Iterable[str]) -> str:
+    listed = list(names)
+    more = len(listed) - NAMED
+    return ", ".join(listed) if more <= 1 else f"{', '.join(listed[:NAMED])} and {more} more"
