@@ -53,8 +53,15 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 @click.option("--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Of the event camera.")
 @click.option("--limit", type=click.IntRange(1), metavar="N", help="Only the first N gaps of each sequence.")
 @click.option(
-    "-o", "--output", metavar="REPORT", help="Folder of rows, summary and pictures.  [default: DATASET_eval here]"
+    "-o",
+    "--output",
+    metavar="REPORT",
+    help="Folder of report, rows and summary.  [default: DATASET_eval here]",
 )
+@click.option(
+    "--figures", is_flag=True,
+    help="Also films, sheets of methods by moments and maps of errors, of the first gaps: REPORT/figures.",
+)  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run was; networks may be added.")
 @click.option("--device", default="cpu", show_default=True, metavar="DEVICE", help="Of networks: cpu or cuda.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")

@@ -22,7 +22,7 @@ class Row:
     patch_x, patch_y         left and top of the one of patch_psnr [px]
     motion_px                motion between the key frames: 95th percentile of the optical flow's length, where they
                              differ visibly and the flow leads there and back; 0 where they do not differ, NaN where
-                             it does so for less than half of what differs: too far, flicker, or noise [px]
+                             it does so for less than a quarter of that: too far, flicker, or noise [px]
     motion_px_per_s          the same per second
     events_per_px            events of the gap per pixel of the event camera
     contrast                 standard deviation of the truth's log light [nat]

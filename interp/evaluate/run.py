@@ -2,7 +2,7 @@
 
 REPORT/rows.csv        a line for each frame and method         REPORT/report.md, .html   what it comes to, for people
 REPORT/summary.json    what they come to                        REPORT/worst/             pictures of the worst frames
-REPORT/job.json, kept/ what it takes to go on
+REPORT/job.json, kept/ what it takes to go on                REPORT/figures/           films and sheets, if asked for
 
 Sequences are gone through in order, and groups within, all methods together, so that a film is simulated once.
 """
@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from interp.evaluate.figures.of_evaluation import write_figures
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.kept import Kept
 from interp.evaluate.predictions import predictions_in
@@ -58,6 +59,7 @@ def evaluate(
     resume: bool = False,
     device: str = "cpu",
     report: Report | None = None,
+    figures: bool = False,
 ) -> Evaluation:
     """Score methods on data sets, into a folder.
 
@@ -68,6 +70,7 @@ def evaluate(
     simulated     the event camera that looks at films
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
+    figures       films and sheets of the first gaps, too (`figures/of_evaluation.py`)
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
@@ -92,6 +95,8 @@ def evaluate(
             with whole_file(folder / SUMMARY) as file:
                 file.write(f"{json.dumps(summary, indent=1, allow_nan=False)}\n".encode())
         write_pages(folder, rows, summary)
+        if figures:
+            write_figures(folder, found.footage, methods, rows)
     return Evaluation(rows, summary)
 
 

@@ -17,14 +17,14 @@ def beside(pictures: Sequence[np.ndarray]) -> np.ndarray:
     """Pictures uint8 [H, W, 3] from left to right, with dark gaps; lower ones are filled up below."""
     height = max(picture.shape[0] for picture in pictures)
     gap = np.full((height, GAP_PX, 3), GROUND, np.uint8)
-    return np.concatenate([part for one in pictures for part in (gap, _filled(one, height, one.shape[1]))][1:], 1)
+    return np.concatenate([part for one in pictures for part in (gap, filled(one, height, one.shape[1]))][1:], 1)
 
 
 def below(pictures: Sequence[np.ndarray]) -> np.ndarray:
     """Pictures from top to bottom, likewise; narrower ones are filled up on the right."""
     width = max(picture.shape[1] for picture in pictures)
     gap = np.full((GAP_PX, width, 3), GROUND, np.uint8)
-    return np.concatenate([part for one in pictures for part in (gap, _filled(one, one.shape[0], width))][1:], 0)
+    return np.concatenate([part for one in pictures for part in (gap, filled(one, one.shape[0], width))][1:], 0)
 
 
 def titled(picture: np.ndarray, title: np.ndarray) -> np.ndarray:
@@ -72,7 +72,8 @@ def check_pictures(**pictures: np.ndarray) -> None:
             )
 
 
-def _filled(picture: np.ndarray, height: int, width: int) -> np.ndarray:
+def filled(picture: np.ndarray, height: int, width: int) -> np.ndarray:
+    """A picture with dark ground below and on its right, up to a size."""
     made = np.full((height, width, 3), GROUND, np.uint8)
     made[: picture.shape[0], : picture.shape[1]] = picture
     return made

@@ -92,14 +92,12 @@ def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str
         "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
     }  # fmt: skip
     for condition, edges in conditions:
-        unknown = sum(math.isnan(getattr(row, condition.field)) for row in rows)
         caption = f"Mean score in bins of {condition.axis} [{condition.unit}]; below, how many frames are in each."
         if condition.limit is not None:
             caption += f" The line at {condition.limit:g} is where the paper's network ends."
         chapter[f"Against {condition.title}"] = [
             *_drawn(condition_plot(rows, condition, edges), caption),
             *([Text(breaking_points(rows, condition, edges))] if condition.harder else []),
-            *([Text(f"Not known of {unknown / len(rows):.0%} of the scores, which are left out.")] if unknown else []),
             *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
         ]
     chapter["Beside the paper"] = [quality_table(rows), comparison_table(rows)]
@@ -142,8 +140,8 @@ def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
     if left_out:
         lines = tuple(Line(reason, (Cell(f"{count:,}"),)) for reason, count in left_out.items())
         blocks.append(Table(("reason", "number"), lines))
-    if about.get("remarks"):
-        blocks.append(Items(tuple(about["remarks"])))
+    if remarks := (*about.get("remarks", ()), *_unknown_motion(rows)):
+        blocks.append(Items(remarks))
     yield Section("What was not scored", tuple(blocks or [Text("Nothing was left out.")]))
     if sequences := about.get("sequences"):
         head = tuple(next(iter(sequences.values())))
@@ -155,6 +153,16 @@ def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
         if facts:
             lines = tuple(Line(name, (Cell(_value(value)),)) for name, value in facts.items())
             yield Section(title, (Table(("", ""), lines, words=2),))
+
+
+def _unknown_motion(rows: Sequence[Row]) -> Iterator[str]:
+    frames = {(row.sequence, row.group, row.position): row.motion_px for row in rows}
+    if unknown := sum(map(math.isnan, frames.values())):
+        yield (
+            f"the motion between the key frames is not known of {unknown} of {_many(len(frames), 'frame')}, which are"
+            " not among those against motion, speed and blur: optical flow does not follow what changes, as where it"
+            " moves far, flickers or is noise"
+        )
 
 
 def _value(value: object) -> str:

@@ -33,8 +33,8 @@ def short(value: float) -> str:
 
 
 def spread(mean: Mean, digits: int) -> str:
-    """Mean ± standard deviation."""
-    if math.isnan(mean.std):
+    """Mean ± standard deviation, which one number does not have."""
+    if math.isnan(mean.std) or mean.count == 1:
         return number(mean.mean, digits)
     return f"{number(mean.mean, digits)} ± {number(mean.std, digits)}"
 

@@ -72,9 +72,13 @@ def _settings(summary: Mapping[str, Any]) -> dict[str, object]:
     settings |= {f"weights of {name} (SHA-256)": digest for name, digest in weights.items()}
     if any(of["kind"] in FILMS for of in summary["sequences"].values()):
         settings["event camera"] = f"{sensor['name']}, seed {sensor['seed']}"
-        settings["its parameters"] = [f"{name} {value}" for name, value in sensor["parameters"].items()]
+        settings["its parameters"] = [
+            f"{name} {_fact(value)}" for name, value in sensor["parameters"].items() if value != []
+        ]
     return settings
 
 
 def _fact(value: object) -> object:
+    if isinstance(value, float):
+        return f"{value:g}"
     return "×".join(map(str, value)) if isinstance(value, list) else value

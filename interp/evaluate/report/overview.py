@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from interp.evaluate.conditions import Condition
@@ -143,7 +144,7 @@ def breaking_points(rows: Sequence[Row], condition: Condition, edges: Sequence[f
 
 def _span(one: Bin, edges: Sequence[float]) -> str:
     """What a bin is of: one value where values are a bin each, otherwise from edge to edge."""
-    if one.low == one.high or (one.at == one.low and edges[-1] == edges[-2]):
+    if one.low == one.high or (math.isclose(one.at, one.low) and edges[-1] == edges[-2]):
         return short(one.low)
     return f"{short(one.low)} … {short(one.high)}"
 
