@@ -18,6 +18,7 @@ import numpy as np
 
 from interp.evaluate.row import Row
 
+LEAST_VARIED = 0.1  # by how much of its largest value a condition has to vary
 MOST_VALUES = 8  # different values of a condition up to which each is a bin of its own
 MOST_BINS = 8  # that even bins are meant to be
 DECADES = 2  # below the largest value that bins of a wide condition reach; the first one has all that is less
@@ -96,7 +97,7 @@ def least(rows: Iterable[Row], field: str) -> float:
 
 
 def edges_of(condition: np.ndarray) -> list[float]:
-    """Edges of bins for the values of a condition; none where it is not known or does not vary.
+    """Edges of bins for the values of a condition; none where it is not known or hardly varies.
 
     Few different values are a bin each.  What is never negative and spreads over more than a decade gets edges of
     1, 2, 5, 10 ...; other values even edges at round numbers.
@@ -105,6 +106,8 @@ def edges_of(condition: np.ndarray) -> list[float]:
     if len(known) < 2:
         return []
     low, high = float(known[0]), float(known[-1])
+    if high - low < LEAST_VARIED * max(abs(low), abs(high)):
+        return []
     if len(known) <= MOST_VALUES:
         return [*map(float, known), high]
     if low >= 0 and low < high / 10:

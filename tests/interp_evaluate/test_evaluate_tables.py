@@ -101,3 +101,4 @@ def test_bins_hold_every_value_once(spread: tuple[float, float]) -> None:
 
 def test_a_condition_that_does_not_vary_has_no_bins() -> None:
     assert edges_of(np.array([2.0, 2.0, NAN])) == []
+    assert edges_of(np.array([0.408, 0.412, 0.418])) == [] and edges_of(np.array([0.4, 0.45])) == [0.4, 0.45, 0.45]

@@ -139,6 +139,8 @@ def breaking_points(rows: Sequence[Row], condition: Condition, edges: Sequence[f
         if bins:
             found = breaks_at(bins, CLEARLY_DB)
             said.append(f"{method} {'nowhere' if found is None else f'from {short(found.low)}'}")
+    if said and all(each.endswith(" nowhere") for each in said):
+        return f"No method is more than {CLEARLY_DB:g} dB below its own mean in the first bin."
     return f"More than {CLEARLY_DB:g} dB below its own mean in the first bin [{condition.unit}]: {', '.join(said)}."
 
 
