@@ -7,9 +7,15 @@ on the luminance of the ramps (`ramps.py`), which is there already, not between 
     F_tk = DIS(luminance of the ramps at t -> luminance of frame k)            nearby, whatever the motion in between
     J    = sum_k w_k g(I_k, F_tk)      w_k ~ s_k exp(-a e_k), s = (1 - t, t), e_k how far luminance is off there
     C    = luminance of the ramps in the colours of J
+    I    = C + m (J - C)               m = exp(-a min_k e_k) / 2
 
-J is free of the noise of events, C right where nothing in the key frames is.  Motion counts where it explains light
+J is free of the noise of events, C right where nothing in the key frames is, and I is nearer than either: half of each
+where J agrees.  Motion counts where it explains light
 better than standing still does (`vid2ev.upsample.flow.convincing`), so what stands still stays as it is.
+
+Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +2.3 dB and +0.029 with a clean sensor, +2.2 dB and +0.039
+with a noisy one; 28 parts of seven real videos +1.5 dB and +0.008, +6.3 dB and +0.10.  With m = 1/2 everywhere it is
+better on scenes (34.4 for 34.0 dB) and below the bridge on fast things in real videos (36.8 for 37.3).
 
 DIS runs on the CPU, and has no gradients.
 
@@ -55,6 +61,12 @@ class Guided:
         """J at times [B, N]."""
         return blend(self.warps, self.logits, torch.stack([1 - times, times], -1))[0]
 
+    def image(self, pictures: torch.Tensor, times: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+        """I at times [B, N], of the pictures that it was guided by."""
+        carried = self.blend(times)
+        start = recoloured(pictures, carried, transfer)
+        return start + half_way(self.logits) * (carried - start)
+
 
 @in_full_precision
 def guided(frame_0: torch.Tensor, frame_1: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb") -> Guided:
@@ -72,6 +84,11 @@ def agreement(warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = 
     error = (_shown(warps, transfer) - _shown(pictures, transfer)[:, :, None]).abs().squeeze(3)
     mean = F.avg_pool2d(error.flatten(0, 1), AROUND_PX, 1, AROUND_PX // 2, count_include_pad=False)
     return -SHARP * mean.unflatten(0, error.shape[:2])
+
+
+def half_way(logits: torch.Tensor) -> torch.Tensor:
+    """m [B, N, 1, H, W] of logits [B, N, K, H, W]."""
+    return 0.5 * torch.exp(logits.amax(2, keepdim=True))
 
 
 @in_full_precision

@@ -10,7 +10,7 @@ import torch
 
 from interp.candidates.bridge import Method as Way
 from interp.candidates.bridge import bridge
-from interp.candidates.guided import guided, recoloured
+from interp.candidates.guided import guided
 from interp.candidates.ramps import ramps
 from interp.methods.gap import Gap
 from interp.representation.carried import over
@@ -58,11 +58,9 @@ def of_ramps(gap: Gap, times: torch.Tensor) -> torch.Tensor:
 
 
 def of_guided(gap: Gap, times: torch.Tensor) -> torch.Tensor:
-    """Halfway between integration in the colours of carried frames and these frames (`candidates.guided`)."""
+    """Integration in the colours of carried frames, half and half with these where they agree (`candidates.guided`)."""
     pictures = of_ramps(gap, times)[None]
-    frames = gap.frame_0[None], gap.frame_1[None]
-    carried = guided(*frames, pictures).blend(times[None])
-    return ((recoloured(pictures, carried) + carried) / 2)[0]
+    return guided(gap.frame_0[None], gap.frame_1[None], pictures).image(pictures, times[None])[0]
 
 
 def of_events(way: Way) -> Law:
