@@ -6,8 +6,8 @@
     I_t  = C' + (m + n) (J - C') + residue        C' = C in the colours of J      residue, n = U4(I0, I1, J, C', events)
 
 It has U2, U3 and U4 of RRINEvents, and in place of U1, which would have to learn optical flow, the flow of
-`candidates/guided.py` from the target itself; a_k says how far luminance is off there, and m how far to go from C' to J, half
-the way where they agree.  Untrained it is that closed form.
+`candidates/guided.py` from the target itself; a_k says how far luminance is off there, and m how far to go from C' to
+J, half the way where they agree.  Untrained it is that closed form.
 
 All networks work at half the resolution (U4 on squares of pixels), and where no event is near they change nothing: what
 stands still is the closed form's.  Without that, static pixels of real clips lost 0.5 dB in 800 steps of training.
