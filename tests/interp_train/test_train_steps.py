@@ -11,6 +11,7 @@ import torch
 from small_run import NETWORK, STEPS_OF_RUN, clips, kept, session
 
 from interp import weights
+from interp.methods import METHODS
 from interp.train.checkpoints import WholeFiles, read_checkpoint
 from interp.train.curves import read_curve
 from interp.train.learner import number_of
@@ -67,16 +68,7 @@ def test_a_torn_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
 
 def test_a_run_keeps_all_that_it_has_to_show(tmp_path: Path) -> None:
     done = session(tmp_path / "run")
-    assert set(done.scores["scenes"]) == {
-        "network",
-        "nearest",
-        "linear",
-        "flow",
-        "integration",
-        "both",
-        "bridge",
-        "ramps",
-    }
+    assert done.scores["scenes"].keys() == {"network", *METHODS}
     run = json.loads((tmp_path / "run" / "run.json").read_text())
     assert {"torch", "lightning", "vid2ev"} <= run["versions"].keys()
     assert [row["step"] for row in read_curve(tmp_path / "run" / "validation.csv")] == ["0", "6", f"{STEPS_OF_RUN}"]

@@ -35,7 +35,13 @@ OF_DRAWN = ["juggle, slow", "karma, fast", "rocket, later", "candle", "parallax 
 
 @pytest.mark.parametrize(
     ("name", "sensor"),
-    [("edge", "poles"), ("sine", "poles"), ("rocket", "poles"), ("edge", "davis346"), ("karma, fast", "davis346")],
+    [
+        ("edge", "poles"),
+        ("sine", "poles"),
+        ("rocket", "poles"),
+        pytest.param("edge", "davis346", marks=pytest.mark.slow),  # (kernels that are compiled for minutes)
+        pytest.param("karma, fast", "davis346", marks=pytest.mark.slow),
+    ],
 )
 def test_a_few_clips_stay_within_their_bounds(name: str, sensor: str) -> None:
     """And within their estimates."""
