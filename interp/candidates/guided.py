@@ -71,11 +71,19 @@ class Guided:
 @in_full_precision
 def guided(frame_0: torch.Tensor, frame_1: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb") -> Guided:
     """Frames [B, C, H, W] carried to where the luminance of pictures [B, N, C, H, W] is; all are codes."""
-    shown = _shown(pictures, transfer)
-    keys = [_shown(frame[:, None], transfer) for frame in (frame_0, frame_1)]
-    flows = torch.cat([_flows(shown, key) for key in keys], 2)
+    flows = flows_to(frame_0, frame_1, pictures, transfer)
     warps = torch.stack([warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:])], 2)
     return Guided(flows, warps, agreement(warps, pictures, transfer))
+
+
+@in_full_precision
+def flows_to(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb"
+) -> torch.Tensor:
+    """Motion [B, N, 4, H, W] px from the luminance of pictures to both frames; as `guided`."""
+    shown = _shown(pictures, transfer)
+    keys = [_shown(frame[:, None], transfer) for frame in (frame_0, frame_1)]
+    return torch.cat([_flows(shown, key) for key in keys], 2)
 
 
 @in_full_precision

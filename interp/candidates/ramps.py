@@ -27,9 +27,10 @@ import torch
 from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, EVEN_EVENTS, coloured, ratios_of
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
-from interp.representation.event_counts import EventCounts
+from interp.representation.event_counts import EventCounts, as_voxels
 
 FIRST = 0.5  # share of the first event of a pixel
+RISEN_CHANNELS = 4
 Steps = torch.Tensor  # [B, S, H, W]
 
 
@@ -50,6 +51,11 @@ class Risen:
         """w, the share of the drift at times [B, N], 0 ... 1."""
         t = times[..., None, None, None]
         return (self.number + EVEN_EVENTS * t) / (self.number + self.more + EVEN_EVENTS)
+
+    def channels(self) -> torch.Tensor:
+        """All of it as networks take it, [B, N, 4, H, W], about 0 ... 1 where little is."""
+        numbers = torch.cat([self.number, self.more], 2)
+        return torch.cat([as_voxels(self.change), as_voxels(self.left), torch.log1p(numbers) / 2], 2)
 
 
 @in_full_precision
@@ -110,9 +116,9 @@ def _shares(number: Steps) -> Steps:
 def _on_the_way(some: torch.Tensor, seen: torch.Tensor, times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """f [B, N, H, W], 0 where no event comes any more, and the sub-interval of the next event."""
     steps = some.shape[1]
-    place = torch.arange(steps, device=some.device)[:, None, None].expand_as(some[0])[None]
-    last = torch.where(some, place, -1).cummax(1).values
-    coming = torch.where(some, place, steps).flip(1).cummin(1).values.flip(1)
+    place = torch.arange(steps, dtype=torch.int16, device=some.device)[:, None, None].expand_as(some[0])[None]
+    last = torch.where(some, place, place.new_tensor(-1)).cummax(1).values
+    coming = torch.where(some, place, place.new_tensor(steps)).flip(1).cummin(1).values.flip(1)
     last = torch.cat([torch.full_like(last[:, :1], -1), last], 1)  # by the number of sub-intervals seen
     coming = torch.cat([coming, torch.full_like(coming[:, :1], steps)], 1)
     index = seen[..., None, None].expand(-1, -1, *some.shape[2:])
@@ -120,7 +126,7 @@ def _on_the_way(some: torch.Tensor, seen: torch.Tensor, times: torch.Tensor) -> 
     since = torch.where(p < 0, 0, (p + 0.5) / steps)
     until = (n + 0.5) / steps
     way = ((times[..., None, None] - since) / (until - since)).clamp(0, 1)
-    return torch.where(n < steps, way, 0), n.clamp(max=steps - 1)
+    return torch.where(n < steps, way, 0), n.clamp(max=steps - 1).long()
 
 
 def _until(values: Steps, seen: torch.Tensor) -> torch.Tensor:

@@ -29,7 +29,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.pictures.film import join_films, write_film
 from vid2ev.recording.disk import lock, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
-from vid2ev.recording.manifest import difference, read_manifest, write_manifest
+from vid2ev.recording.manifest import is_of_job, read_manifest, write_manifest
 
 Kind = Literal["mp4", "png", "exr"]
 PIECE = 128  # pictures
@@ -180,14 +180,7 @@ class Shelf:
         self._encode(PIECE)
 
     def _is_same(self, path: Path) -> bool:
-        earlier = read_manifest(path)
-        changed = difference({key: earlier.get(key) for key in self.job}, self.job)
-        if changed and not self.overwrite:
-            raise UsageError(
-                f"{self.output} was begun with {changed}; --resume needs the options it was begun with,"
-                " --overwrite starts again"
-            )
-        return not changed
+        return is_of_job(path, self.job, self.output, self.overwrite)
 
     def _encode(self, least: int) -> None:
         """Of a film, make a piece of the frames that wait, if there are so many."""

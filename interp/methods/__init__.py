@@ -19,11 +19,14 @@ line in `METHODS`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import torch
 
-from interp.methods.closed_forms import ClosedForm, linear, nearest, of_events, of_guided, of_ramps
+from interp.candidates.bridge import bridge
+from interp.candidates.ramps import ramps
+from interp.methods.closed_forms import ClosedForm, guided_by_ramps, linear, nearest, of_events
 from interp.methods.flow import flow
 from interp.methods.gap import Gap, Method
 from interp.methods.of_networks import of_weights
@@ -36,11 +39,11 @@ METHODS: dict[str, Callable[[], Method]] = {
     "nearest": lambda: ClosedForm("nearest", nearest, needs_events=False),
     "linear": lambda: ClosedForm("linear", linear, needs_events=False),
     "flow": lambda: ClosedForm("flow", flow, needs_events=False),
-    "integration": lambda: ClosedForm("integration", of_events("nearest")),
-    "both": lambda: ClosedForm("both", of_events("both")),
-    "bridge": lambda: ClosedForm("bridge", of_events("bridge")),
-    "ramps": lambda: ClosedForm("ramps", of_ramps),
-    "guided": lambda: ClosedForm("guided", of_guided),
+    "integration": lambda: ClosedForm("integration", of_events(partial(bridge, method="nearest"))),
+    "both": lambda: ClosedForm("both", of_events(partial(bridge, method="both"))),
+    "bridge": lambda: ClosedForm("bridge", of_events(bridge)),
+    "ramps": lambda: ClosedForm("ramps", of_events(ramps)),
+    "guided": lambda: ClosedForm("guided", of_events(guided_by_ramps)),
 }
 
 

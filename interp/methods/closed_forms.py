@@ -8,16 +8,16 @@ from typing import Self
 
 import torch
 
-from interp.candidates.bridge import Method as Way
-from interp.candidates.bridge import bridge
 from interp.candidates.guided import guided
 from interp.candidates.ramps import ramps
 from interp.methods.gap import Gap
 from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
 Law = Callable[[Gap, torch.Tensor], torch.Tensor]
+Form = Callable[[torch.Tensor, torch.Tensor, EventCounts, torch.Tensor], torch.Tensor]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,21 +50,8 @@ def linear(gap: Gap, times: torch.Tensor) -> torch.Tensor:
     return gap.frame_0 + times[:, None, None, None] * (gap.frame_1 - gap.frame_0)
 
 
-def of_ramps(gap: Gap, times: torch.Tensor) -> torch.Tensor:
-    """Integration of events, as `candidates.ramps` does it."""
-    assert gap.events is not None
-    height, width = gap.frame_0.shape[-2:]
-    return ramps(gap.frame_0[None], gap.frame_1[None], over(gap.events, (height, width)), times[None])[0]
-
-
-def of_guided(gap: Gap, times: torch.Tensor) -> torch.Tensor:
-    """Integration in the colours of carried frames, half and half with these where they agree (`candidates.guided`)."""
-    pictures = of_ramps(gap, times)[None]
-    return guided(gap.frame_0[None], gap.frame_1[None], pictures).image(pictures, times[None])[0]
-
-
-def of_events(way: Way) -> Law:
-    """Integration of events, as `candidates.bridge` does it."""
+def of_events(form: Form) -> Law:
+    """Integration of events: a form of `interp.candidates`, some images at a time."""
 
     def law(gap: Gap, times: torch.Tensor) -> torch.Tensor:
         assert gap.events is not None
@@ -72,6 +59,14 @@ def of_events(way: Way) -> Law:
         events = over(gap.events, (height, width))
         some = max(1, AT_ONCE_PX // (height * width))
         frames = gap.frame_0[None], gap.frame_1[None]
-        return torch.cat([bridge(*frames, events, part[None], method=way)[0] for part in times.split(some)])
+        return torch.cat([form(*frames, events, part[None])[0] for part in times.split(some)])
 
     return law
+
+
+def guided_by_ramps(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, times: torch.Tensor
+) -> torch.Tensor:
+    """Ramps in the colours of carried frames, half and half with these where they agree (`candidates.guided`)."""
+    pictures = ramps(frame_0, frame_1, events, times)
+    return guided(frame_0, frame_1, pictures).image(pictures, times)

@@ -31,7 +31,7 @@ https://github.com/HopLee6/RRIN; events, Radomski et al., section III.A.2.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import torch
 from pydantic import Field
@@ -41,15 +41,13 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.ramps import Risen, ramps, risen
+from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
 from interp.networks.gate import gate_of
-from interp.networks.spec import FrameFedSpec
-from interp.representation.event_counts import EventCounts, as_voxels
+from interp.networks.spec import Depth, FrameFedSpec
+from interp.representation.event_counts import EventCounts
 from interp.warp import flows_at
-
-Depth = Annotated[int, Field(ge=2, le=7)]
 
 
 class RrinEventsSpec(FrameFedSpec):
@@ -111,7 +109,7 @@ class RrinEvents(FrameFed):
         self.refine = Unet(2 * colours + 4 + events, 4, layouts[1], zero)
         self.masks = Unet(masks_in, pictures, layouts[2], zero)
         corrections = colours + (spec.candidate == "mixed")
-        corrected = 3 * colours + candidate + 4 * self._residue_sees_events
+        corrected = 3 * colours + candidate + RISEN_CHANNELS * self._residue_sees_events
         if spec.coarse:
             halved = rrin_layout(spec.depths[3] - 1, 2 * spec.base)
             self.residue: nn.Module = HalfSized(corrected, corrections, halved, zero)
@@ -153,7 +151,7 @@ class RrinEvents(FrameFed):
         draft = of_warps
         if self.spec.candidate == "softmax":
             draft, weights = self._blend_with_candidate(warps, candidate[0], logits, times)
-        said = [_as_input(found)] if found and self._residue_sees_events else []
+        said = [found.channels()] if found and self._residue_sees_events else []
         correction = run(self.residue, [pair.frame_0, pair.frame_1, draft, *candidate, *said])
         image = self._start(draft, candidate) + pair.once[1][:, None] * self._correction(correction, draft, candidate)
         return Interpolated(image, self.scale.flow_up(pair.flows), flows, warps, weights, of_warps)
@@ -204,9 +202,3 @@ class RrinEvents(FrameFed):
 
     def _gate(self, pair: Pair) -> torch.Tensor:
         return gate_of(pair) if self.spec.gate else torch.ones_like(pair.frame_0[:, :1])
-
-
-def _as_input(found: Risen) -> torch.Tensor:
-    """[B, N, 4, H, W]: change and number of events before and after the target, all about 0 ... 1 where little is."""
-    numbers = torch.cat([found.number, found.more], 2)
-    return torch.cat([as_voxels(found.change), as_voxels(found.left), torch.log1p(numbers) / 2], 2)

@@ -15,8 +15,6 @@ stands still is the closed form's.  Without that, static pixels of real clips lo
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import torch
 from pydantic import Field
 from torch.nn import functional as F
@@ -24,16 +22,13 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import agreement, guided, half_way, recoloured
-from interp.candidates.ramps import Risen, ramps, risen
+from interp.candidates.guided import agreement, flows_to, half_way, recoloured
+from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
 from interp.networks.gate import gate_of
-from interp.networks.spec import FrameFedSpec
-from interp.representation.event_counts import EventCounts, as_voxels
-
-Depth = Annotated[int, Field(ge=2, le=7)]
-SAID = 4  # channels of what events say of a pixel
+from interp.networks.spec import Depth, FrameFedSpec
+from interp.representation.event_counts import EventCounts
 
 
 class RrinEventsGuidedSpec(FrameFedSpec):
@@ -64,7 +59,9 @@ class RrinEventsGuided(FrameFed):
         self.scale = Scale(2)
         self.refine = Unet(3 * colours + 4 + events, 4, layouts[0], zero)
         self.masks = Unet(5 * colours + 4 + events, 2, layouts[1], zero)
-        self.residue = HalfSized(4 * colours + SAID, colours + 1, rrin_layout(spec.depths[2] - 1, 2 * spec.base), zero)
+        self.residue = HalfSized(
+            4 * colours + RISEN_CHANNELS, colours + 1, rrin_layout(spec.depths[2] - 1, 2 * spec.base), zero
+        )
         self.multiple = 2 * 2 ** (max(spec.depths) - 1)
 
     def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
@@ -77,7 +74,7 @@ class RrinEventsGuided(FrameFed):
         candidate = ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, found=found)
         seen = [self.scale.down(each) for each in (pair.frame_0, pair.frame_1, candidate)]
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
-        first = guided(pair.frame_0, pair.frame_1, candidate, self.spec.transfer).flows
+        first = flows_to(pair.frame_0, pair.frame_1, candidate, self.spec.transfer)
         at = self.scale.down(first) / self.scale.factor
         open_half = self.scale.down(pair.once[1])[:, None]
         correction = open_half * run(self.refine, [at, *seen]) * self.spec.flow_scale
@@ -99,11 +96,5 @@ class RrinEventsGuided(FrameFed):
         self, pair: Pair, start: torch.Tensor, draft: torch.Tensor, found: Risen, way: torch.Tensor
     ) -> torch.Tensor:
         """The image, from C' and J, and from how far it is from the one to the other."""
-        said = pair.once[1][:, None] * run(self.residue, [pair.frame_0, pair.frame_1, draft, start, _as_input(found)])
+        said = pair.once[1][:, None] * run(self.residue, [pair.frame_0, pair.frame_1, draft, start, found.channels()])
         return start + (way + torch.tanh(said[:, :, -1:]) / 2) * (draft - start) + said[:, :, :-1]
-
-
-def _as_input(found: Risen) -> torch.Tensor:
-    """[B, N, 4, H, W]: change and number of events before and after the target, all about 0 ... 1 where little is."""
-    numbers = torch.cat([found.number, found.more], 2)
-    return torch.cat([as_voxels(found.change), as_voxels(found.left), torch.log1p(numbers) / 2], 2)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Size = Literal["tiny", "small", "paper"]
+Depth = Annotated[int, Field(ge=2, le=7)]  # levels of a UNet
 BASES = {"tiny": 8, "small": 16, "paper": 32}
 
 

@@ -30,7 +30,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import lock, sync, whole_file, writing
-from vid2ev.recording.manifest import difference, read_manifest
+from vid2ev.recording.manifest import is_of_job, read_manifest
 
 FILES = re.compile(  # what a recording holds, and nothing else
     r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
@@ -181,15 +181,7 @@ class Folder:
             file.seek(0, os.SEEK_END)
 
     def _is_same(self, path: Path) -> bool:
-        """Whether a job or manifest is of this job; if it is not, that is an error unless it may be overwritten."""
-        earlier = read_manifest(path)
-        changed = difference({key: earlier.get(key) for key in self.job}, self.job)
-        if changed and not self.overwrite:
-            raise UsageError(
-                f"{self.directory} was begun with {changed}; --resume needs the options it was begun with,"
-                " --overwrite starts again"
-            )
-        return not changed
+        return is_of_job(path, self.job, self.directory, self.overwrite)
 
     def _clear(self) -> None:
         for path in self.partial.iterdir():

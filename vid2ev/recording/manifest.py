@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, UsageError
 
 LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
 HEAD = 1 << 20  # bytes at the start of a file by which it is known
@@ -68,6 +68,18 @@ def read_manifest(path: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or "vid2ev" not in manifest.get("versions", {}):
         raise DataError(f"{path} is not the manifest of a vid2ev recording; give a folder that `vid2ev convert` wrote")
     return manifest
+
+
+def is_of_job(path: Path, job: Mapping[str, Any], output: Path, overwrite: bool) -> bool:
+    """Whether the job or manifest in a file is of this job; if it is not, that is a UsageError unless `output` may be
+    overwritten."""
+    earlier = read_manifest(path)
+    changed = difference({key: earlier.get(key) for key in job}, job)
+    if changed and not overwrite:
+        raise UsageError(
+            f"{output} was begun with {changed}; --resume needs the options it was begun with, --overwrite starts again"
+        )
+    return not changed
 
 
 def difference(one: Any, other: Any, name: str = "") -> str:
