@@ -19,7 +19,7 @@ test: .venv/dev
 	$(BIN)/python -m pytest $(PYTEST_FLAGS)
 
 lint: .venv/dev
-	$(BIN)/ruff check .
+	$(BIN)/ruff check --no-cache .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 

@@ -19,7 +19,7 @@ import click
 import numpy as np
 
 from vid2ev.formats import FORMATS, format_named
-from vid2ev.formats.event_file import BLOCK, Format, Recording, stretch
+from vid2ev.formats.event_file import BLOCK, Format, Recording
 from vid2ev.stream.events import Events
 
 SIZE = (1280, 720)
@@ -44,9 +44,7 @@ def recording_of(events: Events) -> Recording:
     """All of them as a recording."""
     count = len(events)
     starts = range(0, count, BLOCK)
-    return Recording(
-        SIZE, 0, DURATION_US, count, lambda: (stretch(events, at, min(at + BLOCK, count)) for at in starts)
-    )
+    return Recording(SIZE, 0, DURATION_US, count, lambda: (events.stretch(at, min(at + BLOCK, count)) for at in starts))
 
 
 def measure(kind: Format, events: Events, path: Path) -> tuple[float, float, float]:
@@ -74,7 +72,7 @@ def main(names: tuple[str, ...], count: int, rounds: int) -> None:
     best: dict[str, tuple[float, ...]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for kind in kinds:
-            measure(kind, stretch(events, 0, min(count, 1000)), Path(folder) / f"events{kind.suffix}")
+            measure(kind, events.stretch(0, min(count, 1000)), Path(folder) / f"events{kind.suffix}")
         for _ in range(rounds):
             for kind in kinds:
                 found = measure(kind, events, Path(folder) / f"events{kind.suffix}")

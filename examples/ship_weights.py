@@ -17,7 +17,6 @@ from typing import Any
 import click
 
 from interp import pretrained, weights
-from interp.evaluate.table import table
 
 
 @click.command()
@@ -69,7 +68,7 @@ def _card(
     ]
     for report in reports:
         summary = json.loads((report / "summary.json").read_text())
-        lines += ["", f"## {report.name}", "", table(summary)]
+        lines += ["", f"## {report.name}", "", *_scores(summary)]
     return "\n".join(lines) + "\n"
 
 
@@ -85,6 +84,16 @@ def _validation(run: Path) -> list[str]:
     lines = [f"| PSNR-255 / SSIM | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
     for name, of in found.items():
         lines.append(f"| {name} | {' | '.join(f'{psnr:.2f} / {ssim:.3f}' for psnr, ssim in of.values())} |")
+    return lines
+
+
+def _scores(summary: dict[str, Any]) -> list[str]:
+    """What an evaluation found, of every method it compared."""
+    lines = ["| Time Lens protocol | PSNR | SSIM | moving | static |", "|---" * 5 + "|"]
+    for name, found in summary["methods"].items():
+        means = {score: found["pooled"][score]["mean"] for score in ("psnr", "ssim", "psnr_moving", "psnr_static")}
+        shown = ("–" if mean is None else f"{mean:.{3 if score == 'ssim' else 2}f}" for score, mean in means.items())
+        lines.append(f"| {name} | {' | '.join(shown)} |")
     return lines
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import importlib.util
 import json
 import re
@@ -46,6 +47,13 @@ def measured(against_v2e: ModuleType) -> list[dict]:
     done = CliRunner().invoke(against_v2e.main, ["--json"])
     assert done.exit_code == 0, done.output
     return json.loads(done.output)
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "examples").glob("*.py")))
+def test_each_example_finds_what_it_imports(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "examples")
+    monkeypatch.delitem(sys.modules, name, raising=False)
+    importlib.import_module(name)
 
 
 def test_the_presets_obey_the_laws(measured: list[dict]) -> None:

@@ -3,8 +3,8 @@
     Super SloMo, SloMoEvents   204 L1 + 102 warps + 0.005 features + smoothness of flows
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
     Time Lens                  L1 + 0.1 features
-    rrin_events_light, rrin_events_guided     Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades
-                               + 0.1 pyramid
+    rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
+    rrin_events_guided         0.1 log error
     E2VID, FireNet             L1 + features from the second image on; FireNet + 2 inconsistency
     HDR                        100 inconsistency, from image to image and to the first + 10 features + 100 L1
 
@@ -23,7 +23,7 @@ from collections.abc import Callable
 import torch
 
 from interp.losses.over_time import inconsistency, visibility
-from interp.losses.terms import absolute, between_frames, charbonnier, pyramid, smoothness
+from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks.frame_fed import Interpolated
 
 Terms = dict[str, torch.Tensor]
@@ -61,6 +61,12 @@ def supervised_residue(made: Interpolated, truth: torch.Tensor, progress: float 
         "warps": 0.25 * max(0.0, 1 - progress / WARPS_FADE) * charbonnier(made.warps, truth[:, :, None]),
         "pyramid": 0.1 * pyramid(made.images, truth),
     }
+
+
+def by_ratio(made: Interpolated, truth: torch.Tensor) -> Terms:
+    """The term for a network that starts from images that are nearly right, and flows that need no help: of sums of
+    differences, those of the hardest pictures would decide, at the cost of the rest; truth [B, N, C, H, W]."""
+    return {"image": 0.1 * log_error(made.images, truth)}
 
 
 def time_lens(made: Interpolated, truth: torch.Tensor, features: Features) -> Terms:

@@ -1,8 +1,11 @@
 """Differences between images, and what is wanted of flows: means over all their values, in float32 also under autocast.
 
     Charbonnier   mean sqrt(d^2 + e^2), e = 0.001: near 0 a parabola, so that what is exactly right has slope 0 and
-    not infinity pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid
+                  not infinity
+    pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid
     smoothness    mean |dF/dx| + mean |dF/dy|
+    log error     mean over images of ln(mean d^2 + e), e = 1e-6, where PSNR is 60 dB: PSNR in nepers, so that a decibel
+                  counts the same in pictures that are nearly right as in those that are far off
 
 Sources: Charbonnier et al. (1994), "Two deterministic half-quadratic regularization algorithms for computed imaging",
 ICIP; Burt and Adelson (1983), "The Laplacian pyramid as a compact image code", IEEE Trans. Communications 31(4);
@@ -18,6 +21,7 @@ from interp.precision import in_full_precision
 from interp.warp import warp
 
 EPSILON = 1e-3
+LEAST_ERROR = 1e-6
 LEVELS = 5
 BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
 
@@ -32,6 +36,12 @@ def charbonnier(images: torch.Tensor, truth: torch.Tensor, epsilon: float = EPSI
 def absolute(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
     """The mean absolute difference."""
     return (images - truth).abs().mean()
+
+
+@in_full_precision
+def log_error(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
+    """How far images [..., C, H, W] are from the truth, by ratio."""
+    return torch.log(((images - truth) ** 2).mean((-3, -2, -1)) + LEAST_ERROR).mean()
 
 
 @in_full_precision

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from torch.nn import functional as F
 from interp.losses import objectives
 from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
-from interp.losses.terms import absolute, between_frames, charbonnier, pyramid, smoothness
+from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks import make
 from interp.warp import warp
 from vid2ev import DataError, UsageError
@@ -160,6 +161,18 @@ def test_warps_are_looked_at_while_training_begins() -> None:
     assert float(later["warps"].detach()) == 0 and torch.equal(early["image"], later["image"])
     assert set(objectives.residue(made, truth)) == {"image"}
     assert set(objectives.time_lens(made, truth, Perceptual())) == {"image", "features"}
+
+
+def test_a_decibel_counts_the_same_in_every_picture() -> None:
+    truth = torch.rand(1, 2, 3, 16, 16)
+    wrong = torch.tensor([0.01, 0.1])[None, :, None, None, None] * torch.randn(truth.shape)
+    here, better = (log_error(truth + scale * wrong, truth) for scale in (1.0, 0.5))
+    torch.testing.assert_close(here - better, torch.tensor(math.log(4.0)), atol=0.02, rtol=0)
+    only_the_hard_one = torch.tensor([1.0, 0.5])[None, :, None, None, None]
+    torch.testing.assert_close(
+        log_error(truth + only_the_hard_one * wrong, truth), (here + better) / 2, atol=0.02, rtol=0
+    )
+    assert float(log_error(truth, truth)) == pytest.approx(math.log(1e-6))
 
 
 def test_the_first_picture_from_events_does_not_count() -> None:
