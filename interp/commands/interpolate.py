@@ -37,7 +37,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--play", metavar="RATE", help="Frames per second of the film: 30 is slow motion.  [default: real time]")
 @click.option(
     "--events", type=click.Path(exists=True, path_type=Path), metavar="EVENTS",
-    help="Event file to a video, images or a single frame, on their clock; laid over the frames edge on edge.",
+    help="Event file to a video, images or a single frame, on their clock.",
 )  # fmt: skip
 @click.option("--start", type=float, metavar="S", help="Begin at this second; of recordings after the first frame.")
 @click.option("--stop", type=float, metavar="S", help="End there.")

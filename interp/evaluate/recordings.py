@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from interp.candidates.contrast import with_fitted_contrast
+from interp.candidates.calibrated import calibrated
 from interp.data.layouts import Sequence, windows
 from interp.data.layouts.own import Own
 from interp.data.tensors import as_tensor
@@ -17,8 +16,7 @@ from interp.evaluate.cameras import CamerasOf
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
-from interp.representation.carried import over
-from interp.representation.event_counts import EventCounts, count_events
+from interp.representation.event_counts import count_events
 from vid2ev.errors import DataError
 
 
@@ -79,7 +77,7 @@ class Recording:
         counts = count_events(seen, sequence.event_size, start_us, stop_us, protocol.steps)
         number = (first - self._begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2) if cameras else Cameras()
-        events = with_contrast(counts, keys, sequence.contrast)
+        events = calibrated(*as_tensor(keys), counts, sequence.contrast, sequence.apart)
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
 
     def _remarks(self) -> list[str]:
@@ -96,12 +94,3 @@ class Recording:
                 f" --skip {apart - 1} takes its own"
             )
         return remarks
-
-
-def with_contrast(counts: EventCounts, keys: np.ndarray, contrast: tuple[float, float] | None) -> EventCounts:
-    """Counts with what an OFF and an ON event stand for [nat]; where nobody knows, what fits the key frames best."""
-    if contrast is not None:
-        return replace(counts, contrast=counts.contrast.new_tensor([contrast]))
-    frames = as_tensor(keys)[:, None]
-    laid = over(counts, (keys.shape[1], keys.shape[2]))
-    return replace(counts, contrast=with_fitted_contrast(frames[0], frames[1], laid).contrast)

@@ -17,15 +17,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import torch
 
-from interp.candidates.contrast import with_fitted_contrast
+from interp.candidates.calibrated import calibrated
 from interp.interpolate.instants import Instant
 from interp.interpolate.memory import as_arrays, nested
 from interp.interpolate.stretches import CUT, UNRELATED, Stretch
 from interp.interpolate.take import Key, Take
 from interp.interpolate.tiling import Tiling, between
 from interp.methods import Gap, Method
-from interp.representation.carried import over
-from interp.representation.event_counts import USUAL_NATS, EventCounts, count_events
+from interp.representation.event_counts import EventCounts, count_events
 
 FEWEST, MOST = 32, 128  # sub-intervals in which events are counted
 AT_ONCE = 1 << 28  # values of frames that are made at a time, 4 bytes each
@@ -139,15 +138,8 @@ class Fill:
         events = self.take.events(first.t_us, second.t_us)
         if events is None:
             return None
-        contrast = self.take.contrast
-        counts = count_events(
-            events, size, first.t_us, second.t_us, steps_for(self.parts), contrast or (USUAL_NATS, USUAL_NATS)
-        ).to(self.device)
-        if contrast:
-            return counts
-        height, width = frames[0].shape[-2:]
-        fitted = with_fitted_contrast(frames[0][None], frames[1][None], over(counts, (height, width)))
-        return EventCounts(counts.off_on, fitted.contrast)
+        counts = count_events(events, size, first.t_us, second.t_us, steps_for(self.parts)).to(self.device)
+        return calibrated(*frames, counts, self.take.contrast, self.take.apart)
 
 
 def steps_for(parts: int | None) -> int:

@@ -26,6 +26,7 @@ class FramesBesideEvents(OfSource):
         super().__init__(path, options, has_events=True)
         self._cursor, self._events_path = EventCursor(events), events
         self.event_size, self.contrast = self._cursor.size, options.contrast
+        self.apart = self.event_size != self.size
 
     def describe(self) -> dict[str, Any]:
         """What source and event file are."""
@@ -45,6 +46,7 @@ class OfEventFile:
 
     curve = "srgb"
     bits = 8
+    apart = False  # one sensor
 
     def __init__(self, path: Path, options: Options):
         unfit = {"--crop": options.crop, "--size": options.size, "the rate of frames": options.source_hz}

@@ -36,12 +36,11 @@ class OfSequence:
         self._sequence = sequence = open_sequence(folder)
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
         self.event_size: tuple[int, int] | None = sequence.event_size
-        self.contrast = options.contrast or sequence.contrast
+        self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.remarks = sequence.remarks
         self._numbers = self._part(options)
-        rig = getattr(sequence, "rig", lambda: None)()
-        if rig is not None and any(np.any(camera.pose.translation_m) for camera in rig.cameras):
-            self.remarks.append("its cameras stand apart: events are laid over the frames edge on edge, as in training")
+        if self.apart:
+            self.remarks.append("its cameras stand apart: events are brought to where the frames saw the same change")
         self.rate = rate_of(sequence.times_us[self._numbers])
         self.channels = 1 if getattr(sequence, "grey", False) else 3
 

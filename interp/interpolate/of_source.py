@@ -25,6 +25,7 @@ class OfSource:
 
     event_size: tuple[int, int] | None = None
     contrast: tuple[float, float] | None = None
+    apart = False
 
     def __init__(self, path: str, options: Options, has_events: bool = False):
         if options.contrast and not has_events:

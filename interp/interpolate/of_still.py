@@ -39,6 +39,7 @@ class OfStill:
     """
 
     curve = "srgb"
+    apart = False
 
     def __init__(self, picture: Path, events: Path, options: Options):
         unfit = {"--crop": options.crop, "--size": options.size, "--start": options.start_s, "--stop": options.stop_s}

@@ -43,6 +43,7 @@ class Take(Protocol):
     gaps_expected  how many gaps there should be; None if there is no telling
     event_size   width and height of the event camera [px]; None without one
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    apart        whether the event camera stands elsewhere than the frame camera
     remarks      what a person should know, one sentence each; more may come while it is read
     """
 
@@ -64,6 +65,8 @@ class Take(Protocol):
     def event_size(self) -> tuple[int, int] | None: ...
     @property
     def contrast(self) -> tuple[float, float] | None: ...
+    @property
+    def apart(self) -> bool: ...
     @property
     def remarks(self) -> list[str]: ...
 

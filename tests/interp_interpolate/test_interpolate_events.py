@@ -105,7 +105,7 @@ def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tm
         np.testing.assert_array_equal(found, read_codes(frame))
 
 
-def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_laid_over(tmp_path: Path) -> None:
+def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     cameras = [f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\n' for kind in ("dvs", "cis")]
     rig.write_text(cameras[0] + "translation_mm = [15, 0, 0]\nsize = [32, 24]\n" + cameras[1])

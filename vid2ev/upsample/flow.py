@@ -164,12 +164,16 @@ def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes
     Better by at least least_codes, on average around a pixel: in smooth places any flow explains the noise as well as
     any other, and what DIS returns there wanders by many pixels.
     """
-    rows, columns = np.indices(start.shape, np.float32)
-    there = cv2.remap(
-        end, columns + flow[..., 0], rows + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
-    gain = cv2.subtract(cv2.absdiff(start, end), cv2.absdiff(start, there), dtype=cv2.CV_32F)
+    gain = cv2.subtract(cv2.absdiff(start, end), cv2.absdiff(start, carried_along(end, flow)), dtype=cv2.CV_32F)
     return flow * (cv2.blur(gain, (AROUND, AROUND)) > least_codes)[..., None]
+
+
+def carried_along(picture: np.ndarray, flow: np.ndarray) -> np.ndarray:
+    """A picture [H, W] of 8 bits at where a flow [H, W, 2] px leads."""
+    rows, columns = np.indices(picture.shape, np.float32)
+    return cv2.remap(
+        picture, columns + flow[..., 0], rows + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
 
 
 def motion_at(motion: Motion, time: np.float32, out: np.ndarray) -> None:

@@ -47,6 +47,7 @@ class Ergb:
     """
 
     contrast: tuple[float, float] | None = None
+    apart = True  # two cameras, brought together for one distance
 
     def __init__(self, folder: Path, layout: str):
         names = LAYOUTS[layout]

@@ -15,7 +15,6 @@ from interp.data.layouts.sequence import Placed
 from vid2ev import CisSpec, DataError, read_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes
 from vid2ev.recording.manifest import read_manifest
-from vid2ev.rig.rig_file import read_rig
 
 MANIFEST = "manifest.json"
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
@@ -49,6 +48,7 @@ class Own:
         self.size, self.grey = first.shape[1::-1], first.ndim == 2
         self.event_size = tuple(events[0]["size"])
         self.contrast = events[0]["contrast"]
+        self.apart = _apart(folder, self.keys_folder.parent.name, self.events_folder.name)
         self._span_us = events[0]["span_us"]
 
     @property
@@ -80,11 +80,6 @@ class Own:
         t, x, y, p = (np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in "txyp")
         return Placed(t.astype(np.int64), x.astype(np.float32), y.astype(np.float32), p.astype(np.uint8))
 
-    def rig(self) -> Any:
-        """The rig of the recording (`vid2ev.rig.camera.Rig`), or None of a single place."""
-        path = self.folder / "rig.toml"
-        return read_rig(path) if path.exists() else None
-
 
 def _cameras(folder: Path) -> list[dict[str, Any]]:
     """Kind, folder and what else matters of each camera of a recording."""
@@ -103,6 +98,22 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
             facts["span_us"] = (begin, begin + said["duration_us"])
         found.append(facts)
     return found
+
+
+def _apart(folder: Path, *names: str) -> bool:
+    """Whether two cameras of a recording look from different places, or through different lenses."""
+    placed = {each["name"]: each for each in read_manifest(folder / MANIFEST).get("rig", {}).get("cameras", [])}
+    one, other = (placed.get(name) for name in names)
+    return one is not None and other is not None and not np.allclose(_sight(one), _sight(other), atol=1e-6)
+
+
+def _sight(camera: dict[str, Any]) -> np.ndarray:
+    """Place, direction and lens as numbers: those of the lens in widths of the picture."""
+    lens = camera["intrinsics"]
+    across, edge = lens["size"][0], (np.array(lens["centre_px"]) + 0.5, lens["focal_px"])
+    bent = np.zeros(8)
+    bent[: len(lens["distortion"])] = lens["distortion"]
+    return np.concatenate([camera["translation_m"], *camera["rotation"], np.ravel(edge) / across, bent])
 
 
 class _Pictures:

@@ -36,6 +36,7 @@ class Sequence(Protocol):
     event_size   the same of the event camera
     times_us     when the frames were taken, int64; not always increasing in files of the field
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    apart        whether the event camera stands elsewhere than the frame camera, or sees through another lens
     remarks      what cannot be used, with numbers, one sentence each; more may come while events are read
     """
 
@@ -45,6 +46,7 @@ class Sequence(Protocol):
     event_size: tuple[int, int]
     times_us: np.ndarray
     contrast: tuple[float, float] | None
+    apart: bool
     remarks: list[str]
 
     @property

@@ -1,0 +1,92 @@
+"""Events of a camera that stands elsewhere, brought to where the frames have seen the same change.
+
+    d(x) = ln Y1 - ln Y0       between the key frames, of light over a pixel of the event camera
+    E(x) = c_ON n_ON - c_OFF n_OFF       of all events between them, laid over the frames edge on edge
+    F    = DIS(d -> E)         counts at x are those at x + F(x)
+
+Both pictures are of one and the same change, so how far they are apart is what the cameras are apart, pixel by pixel,
+without calibration or depth.  Motion between the frames does not count: both are of the whole gap.  F is taken where
+it makes the pictures agree better than edge on edge does, by two codes of 255, of which 127 are as much as nearly all
+pixels change; and only if it explains, over the picture, three tenths of the variance that is not explained without:
+noise is matched with noise somewhere, always.  (Of sensors 15 mm beside it explained 0.7 to 0.8, of sensors in the
+same place 0.02 to 0.17.)
+
+Measured with a sensor of 9 pixels of the frame per pixel, 15 mm beside it, near scenes (disparity 7.6 px in the mean,
+20 px at the most), x8, PSNR of `guided` beside that of a sensor in the same place: edge on edge 29.0 for 30.5 and 27.2
+for 29.1 dB, brought 30.3 and 29.0; with the depth of the scene in the middle of the gap 30.3 for the first.  Events of
+a sensor that is in the same place, as fine as the frames, are moved now and then, too (-0.07 to +0.26 dB), so this is
+for those that are not.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import torch
+from torch.nn import functional as F
+
+from interp.candidates.bridge import DARK
+from interp.candidates.guided import SMALLEST
+from interp.light import Transfer, luminance, to_light
+from interp.precision import in_full_precision
+from interp.representation.carried import carried, over, places_over
+from interp.representation.event_counts import EventCounts
+from vid2ev.upsample.flow import carried_along, convincing
+
+CONVINCED_CODES = 2.0
+EXPLAINED = 0.3
+NEARLY_ALL = 0.98  # of the pixels change by less than what 127 codes stand for
+LEAST_NATS = 0.3  # that these stand for
+
+
+@in_full_precision
+def registered(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer = "srgb"
+) -> EventCounts:
+    """Counts [B, 2, S, h, w] between frames [B, C, H, W], at the pixels of these."""
+    height, width = frame_0.shape[-2:]
+    if min(height, width) < SMALLEST:
+        return over(events, (height, width))
+    footprint = max(1, round(width / events.off_on.shape[-1]))
+    first, last = (torch.log(_averaged(frame, footprint, transfer) + DARK) for frame in (frame_0, frame_1))
+    net = _net(over(EventCounts(events.off_on.float().sum(2, keepdim=True), events.contrast), (height, width)))
+    moved = [_moved(*pictures) for pictures in zip((last - first)[:, 0], net, strict=True)]
+    per_pixel = events.off_on.shape[-1] / width
+    places = places_over(events, (height, width))
+    each = [
+        carried(EventCounts(events.off_on[b : b + 1], events.contrast[b : b + 1]), places + per_pixel * flow.to(places))
+        for b, flow in enumerate(moved)
+    ]
+    return EventCounts.stacked(each)
+
+
+def _averaged(frame: torch.Tensor, footprint: int, transfer: Transfer) -> torch.Tensor:
+    """Luminance over squares of pixels around each, [B, 1, H, W]."""
+    light = luminance(to_light(frame, transfer)).clamp(min=0)
+    before, after = (footprint - 1) // 2, footprint // 2
+    return F.avg_pool2d(F.pad(light, (before, after, before, after), mode="replicate"), footprint, 1)
+
+
+def _net(events: EventCounts) -> torch.Tensor:
+    """E of counts in one sub-interval, [B, H, W] nat."""
+    off, on = events.contrast[:, :, None, None].unbind(1)
+    return on * events.off_on[:, 1, 0] - off * events.off_on[:, 0, 0]
+
+
+def _moved(change: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+    """F [H, W, 2] px from the change of the frames to that of the events, [H, W] nat."""
+    largest = max(LEAST_NATS, float(np.quantile(change.abs().cpu().numpy(), NEARLY_ALL)))
+    start, end = (
+        (127.5 * (1 + each / largest)).clamp(0, 255).cpu().numpy().astype(np.uint8) for each in (change, seen)
+    )
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)  # type: ignore[attr-defined]
+    flow = convincing(dis.calc(start, end, None), start, end, CONVINCED_CODES)
+    explains = _unexplained(start, carried_along(end, flow)) <= (1 - EXPLAINED) * _unexplained(start, end)
+    return torch.from_numpy(flow if explains else np.zeros_like(flow))
+
+
+def _unexplained(change: np.ndarray, seen: np.ndarray) -> float:
+    """Share of the variance of a picture that no multiple of another one explains."""
+    one, other = (each - each.mean(dtype=np.float64) for each in (change, seen))
+    most = (one**2).sum() * (other**2).sum()
+    return 1 - float((one * other).sum() ** 2 / most) if most else 1.0

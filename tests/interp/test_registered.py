@@ -1,0 +1,96 @@
+"""Events of a camera that stands elsewhere are brought to where the frames have seen the same change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch.nn import functional as F
+
+from interp.candidates.calibrated import calibrated
+from interp.candidates.registered import registered
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
+
+SIZE = 96, 128  # height, width
+C = 0.1
+
+
+def texture(seed: int, size: tuple[int, int]) -> torch.Tensor:
+    """Smooth codes [1, 1, H, W] with details of some pixels."""
+    coarse = torch.rand(1, 1, size[0] // 6, size[1] // 6, generator=torch.Generator().manual_seed(seed))
+    return 0.1 + 0.8 * F.interpolate(coarse, size, mode="bicubic", align_corners=False).clamp(0, 1)
+
+
+def seen(seed: int, shift: tuple[int, int], coarser: int = 1) -> tuple[torch.Tensor, torch.Tensor, EventCounts]:
+    """Two frames of a texture that moves by 3 px, and what an ideal sensor counts that is `shift` px beside."""
+    wide = texture(seed, (SIZE[0] + 60, SIZE[1] + 60)).expand(1, 3, -1, -1)
+    first, last = (wide[..., 30 : 30 + SIZE[0], 30 + by : 30 + by + SIZE[1]] for by in (0, 3))
+    x, y = 30 - shift[0], 30 - shift[1]
+    linear = [wide[:, :1, y : y + SIZE[0], x + by : x + by + SIZE[1]] ** 2.2 for by in (0, 3)]
+    before, after = (torch.log(F.avg_pool2d(light, coarser) + 1e-3)[:, 0] for light in linear)
+    net = ((after - before) / C).round()
+    off_on = torch.stack([(-net).clamp(min=0), net.clamp(min=0)], 1)[:, :, None]
+    return first, last, EventCounts(off_on, torch.full((1, 2), C))
+
+
+def apart(one: EventCounts, other: EventCounts) -> float:
+    """Mean difference of counts away from the border."""
+    return float((one.off_on.float() - other.off_on.float()).abs()[..., 16:-16, 16:-16].mean())
+
+
+@pytest.mark.parametrize("coarser", [1, 3])
+@pytest.mark.parametrize("shift", [(7, 0), (-5, 4), (0, 10)])
+def test_what_is_beside_comes_to_its_place(shift: tuple[int, int], coarser: int) -> None:
+    size = (SIZE[0] // coarser * coarser, SIZE[1] // coarser * coarser)
+    first, last, beside = seen(1, shift, coarser)
+    first, last = (each[..., : size[0], : size[1]] for each in (first, last))
+    here = over(seen(1, (0, 0), coarser)[2], size)
+    assert apart(registered(first, last, beside), here) < 0.35 * apart(over(beside, size), here)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_what_is_in_its_place_stays_there(seed: int) -> None:
+    first, last, counts = seen(seed, (0, 0))
+    assert apart(registered(first, last, counts), counts) < 0.02 * float(counts.off_on.mean())
+
+
+def test_each_of_a_batch_is_moved_by_itself() -> None:
+    made = [seen(seed, shift) for seed, shift in ((1, (6, 0)), (2, (0, -6)))]
+    first, last = (torch.cat([each[k] for each in made]) for k in (0, 1))
+    both = registered(first, last, EventCounts.stacked([each[2] for each in made]))
+    for k, each in enumerate(made):
+        assert torch.equal(both.off_on[k : k + 1], registered(*each).off_on)
+
+
+def test_what_nobody_saw_change_is_not_moved() -> None:
+    flat = torch.full((1, 3, *SIZE), 0.5)
+    noise = EventCounts(torch.poisson(torch.full((1, 2, 4, *SIZE), 0.02)), torch.full((1, 2), C))
+    assert torch.equal(registered(flat, flat, noise).off_on, noise.off_on)
+    assert registered(flat, flat, EventCounts.none(1, (32, 43))).off_on.abs().max() == 0
+
+
+def test_pictures_too_small_for_flow_are_laid_over() -> None:
+    tiny = torch.rand(1, 3, 8, 8)
+    counts = EventCounts(torch.randint(0, 3, (1, 2, 4, 4, 4)), torch.full((1, 2), C))
+    assert torch.equal(registered(tiny, tiny, counts).off_on, over(counts, (8, 8)).off_on)
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (8, 0)])
+def test_thresholds_that_nobody_knows_are_fitted_where_the_events_belong(shift: tuple[int, int]) -> None:
+    first, last, counts = seen(3, shift)
+    found = calibrated(first[0], last[0], replace(counts, contrast=torch.full((1, 2), 0.15)), None, apart=True)
+    np.testing.assert_allclose(found.contrast.numpy(), C, rtol=0.1)
+    known = calibrated(first[0], last[0], counts, (0.2, 0.3), apart=False)
+    assert known.contrast.tolist() == [pytest.approx([0.2, 0.3])] and torch.equal(known.off_on, counts.off_on)
+
+
+def test_noise_is_not_matched_with_noise() -> None:
+    frames = torch.rand(2, 1, 3, *SIZE)
+    noise = EventCounts(torch.poisson(torch.full((1, 2, 4, *SIZE), 0.05)), torch.full((1, 2), C))
+    assert torch.equal(registered(*frames, noise).off_on, noise.off_on)
