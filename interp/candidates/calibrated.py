@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import torch
@@ -13,21 +14,17 @@ from interp.representation.event_counts import EventCounts
 
 
 def calibrated(
-    frame_0: torch.Tensor,
-    frame_1: torch.Tensor,
-    counts: EventCounts,
-    contrast: tuple[float, float] | None,
-    apart: bool,
+    frames: Iterable[torch.Tensor], counts: EventCounts, contrast: tuple[float, float] | None, apart: bool
 ) -> EventCounts:
-    """Counts [1, 2, S, h, w] between frames [C, H, W], ready for methods.
+    """Counts [1, 2, S, h, w] between two frames [C, H, W], ready for methods.
 
     contrast   what an OFF and an ON event stand for [nat]; fitted where nobody knows
     apart      whether the event camera stands elsewhere: then counts are brought to the pixels of the frames
     """
-    frames = frame_0[None], frame_1[None]
+    first, last = (frame[None] for frame in frames)
     if contrast is not None:
         known = replace(counts, contrast=counts.contrast.new_tensor([contrast]))
-        return registered(*frames, known) if apart else known
-    found = with_fitted_contrast(*frames, over(counts, (frame_0.shape[-2], frame_0.shape[-1])))
+        return registered(first, last, known) if apart else known
+    found = with_fitted_contrast(first, last, over(counts, (first.shape[-2], first.shape[-1])))
     known = replace(counts, contrast=found.contrast)
-    return with_fitted_contrast(*frames, registered(*frames, known)) if apart else known
+    return with_fitted_contrast(first, last, registered(first, last, known)) if apart else known

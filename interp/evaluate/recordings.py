@@ -77,7 +77,7 @@ class Recording:
         counts = count_events(seen, sequence.event_size, start_us, stop_us, protocol.steps)
         number = (first - self._begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2) if cameras else Cameras()
-        events = calibrated(*as_tensor(keys), counts, sequence.contrast, sequence.apart)
+        events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart)
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
 
     def _remarks(self) -> list[str]:

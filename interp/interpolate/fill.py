@@ -139,7 +139,7 @@ class Fill:
         if events is None:
             return None
         counts = count_events(events, size, first.t_us, second.t_us, steps_for(self.parts)).to(self.device)
-        return calibrated(*frames, counts, self.take.contrast, self.take.apart)
+        return calibrated(frames, counts, self.take.contrast, self.take.apart)
 
 
 def steps_for(parts: int | None) -> int:

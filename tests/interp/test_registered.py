@@ -84,9 +84,9 @@ def test_pictures_too_small_for_flow_are_laid_over() -> None:
 @pytest.mark.parametrize("shift", [(0, 0), (8, 0)])
 def test_thresholds_that_nobody_knows_are_fitted_where_the_events_belong(shift: tuple[int, int]) -> None:
     first, last, counts = seen(3, shift)
-    found = calibrated(first[0], last[0], replace(counts, contrast=torch.full((1, 2), 0.15)), None, apart=True)
+    found = calibrated((first[0], last[0]), replace(counts, contrast=torch.full((1, 2), 0.15)), None, apart=True)
     np.testing.assert_allclose(found.contrast.numpy(), C, rtol=0.1)
-    known = calibrated(first[0], last[0], counts, (0.2, 0.3), apart=False)
+    known = calibrated((first[0], last[0]), counts, (0.2, 0.3), apart=False)
     assert known.contrast.tolist() == [pytest.approx([0.2, 0.3])] and torch.equal(known.off_on, counts.off_on)
 
 
