@@ -13,6 +13,13 @@ J is free of the noise of events, C right where nothing in the key frames is, an
 where J agrees.  Motion counts where it explains light
 better than standing still does (`vid2ev.upsample.flow.convincing`), so what stands still stays as it is.
 
+Where a pixel of the event camera looks at k x k pixels of the frames, C has luminance averaged over them and nothing
+finer.  So F and e are of luminance averaged alike, a is a / sqrt(k), for C is rougher, m is 1 - 1 / (2 k^2), and light
+carried from key frame to key frame is a third picture in J, of share 1/2; twice over, I in place of C.  That is a
+compromise.  With k = 3, near things that move slowly: 34.5, 33.2 and 38.0 dB in three scenes, for 30.6, 29.2 and 32.8
+without all this, and 34.6, 34.3 and 39.2 of optical flow alone.  With k = 2, where flow is at 27 dB: 33.9 for 34.5, of
+SSIM 0.968 for 0.962.
+
 Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +2.3 dB and +0.029 with a clean sensor, +2.2 dB and
 +0.039 with a noisy one; 28 parts of seven real videos +1.5 dB and +0.008, +6.3 dB and +0.10.  With m = 1/2 everywhere
 it was below the bridge on what is fast in a real video (36.8 for 37.3 dB; now 37.9).
@@ -48,55 +55,86 @@ AROUND_PX = 5  # mean of errors over so many pixels
 class Guided:
     """Both key frames at N instants.
 
-    flows    [B, N, 4, H, W] px: from the target to the first frame (x, y), to the second
-    warps    [B, N, 2, C, H, W]: the frames, carried
-    logits   [B, N, 2, H, W]: -a e, how well each agrees with the luminance that was given
+    flows      [B, N, 4, H, W] px: from the target to the first frame (x, y), to the second
+    warps      [B, N, K, C, H, W]: the frames, carried, and the picture beside them, if there is one
+    logits     [B, N, K, H, W]: -a e, how well each agrees with the luminance that was given
+    footprint  k
     """
 
     flows: torch.Tensor
     warps: torch.Tensor
     logits: torch.Tensor
+    footprint: int = 1
 
     def blend(self, times: torch.Tensor) -> torch.Tensor:
         """J at times [B, N]."""
-        return blend(self.warps, self.logits, torch.stack([1 - times, times], -1))[0]
+        beside = [torch.full_like(times, 0.5)] * (self.warps.shape[2] - 2)
+        return blend(self.warps, self.logits, torch.stack([1 - times, times, *beside], -1))[0]
 
     def image(self, pictures: torch.Tensor, times: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
         """I at times [B, N], of the pictures that it was guided by."""
         carried = self.blend(times)
         start = recoloured(pictures, carried, transfer)
-        return start + half_way(self.logits) * (carried - start)
+        return start + half_way(self.logits, self.footprint) * (carried - start)
 
 
 @in_full_precision
-def guided(frame_0: torch.Tensor, frame_1: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb") -> Guided:
-    """Frames [B, C, H, W] carried to where the luminance of pictures [B, N, C, H, W] is; all are codes."""
-    flows = flows_to(frame_0, frame_1, pictures, transfer)
-    warps = torch.stack([warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:])], 2)
-    return Guided(flows, warps, agreement(warps, pictures, transfer))
+def guided(
+    frame_0: torch.Tensor,
+    frame_1: torch.Tensor,
+    pictures: torch.Tensor,
+    transfer: Transfer = "srgb",
+    footprint: int = 1,
+    beside: torch.Tensor | None = None,
+) -> Guided:
+    """Frames [B, C, H, W] carried to where the luminance of pictures [B, N, C, H, W] is; all are codes.
+
+    footprint   k, pixels across that a pixel of the event camera looks at
+    beside      another picture of the targets, [B, N, C, H, W], to be weighed with both
+    """
+    flows = flows_to(frame_0, frame_1, pictures, transfer, footprint)
+    made = [warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:]), *([] if beside is None else [beside])]
+    warps = torch.stack(made, 2)
+    return Guided(flows, warps, agreement(warps, pictures, transfer, footprint), footprint)
 
 
 @in_full_precision
 def flows_to(
-    frame_0: torch.Tensor, frame_1: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb"
+    frame_0: torch.Tensor,
+    frame_1: torch.Tensor,
+    pictures: torch.Tensor,
+    transfer: Transfer = "srgb",
+    footprint: int = 1,
 ) -> torch.Tensor:
     """Motion [B, N, 4, H, W] px from the luminance of pictures to both frames; as `guided`."""
-    shown = _shown(pictures, transfer)
-    keys = [_shown(frame[:, None], transfer) for frame in (frame_0, frame_1)]
+    shown = averaged(_shown(pictures, transfer), footprint)
+    keys = [averaged(_shown(frame[:, None], transfer), footprint) for frame in (frame_0, frame_1)]
     return torch.cat([_flows(shown, key) for key in keys], 2)
 
 
 @in_full_precision
-def agreement(warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+def agreement(
+    warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
+) -> torch.Tensor:
     """Logits [B, N, K, H, W] of warps [B, N, K, C, H, W] by how far their luminance is from that of pictures."""
-    error = (_shown(warps, transfer) - _shown(pictures, transfer)[:, :, None]).abs().squeeze(3)
+    difference = _shown(warps, transfer) - _shown(pictures, transfer)[:, :, None]
+    error = averaged(difference, footprint).abs().squeeze(3)
     mean = F.avg_pool2d(error.flatten(0, 1), AROUND_PX, 1, AROUND_PX // 2, count_include_pad=False)
-    return -SHARP * mean.unflatten(0, error.shape[:2])
+    return -SHARP / footprint**0.5 * mean.unflatten(0, error.shape[:2])
 
 
-def half_way(logits: torch.Tensor) -> torch.Tensor:
+def half_way(logits: torch.Tensor, footprint: int = 1) -> torch.Tensor:
     """m [B, N, 1, H, W] of logits [B, N, K, H, W]."""
-    return 0.5 * torch.exp(logits.amax(2, keepdim=True))
+    return (1 - 0.5 / footprint**2) * torch.exp(logits.amax(2, keepdim=True))
+
+
+def averaged(values: torch.Tensor, footprint: int) -> torch.Tensor:
+    """Means over squares of so many pixels across around each of [..., H, W]."""
+    if footprint == 1:
+        return values
+    before, after = (footprint - 1) // 2, footprint // 2
+    flat = F.pad(values.flatten(0, -3)[:, None], (before, after, before, after), mode="replicate")
+    return F.avg_pool2d(flat, footprint, 1).view_as(values)
 
 
 @in_full_precision

@@ -10,12 +10,14 @@ import torch
 
 from interp.candidates.guided import guided
 from interp.candidates.ramps import ramps
+from interp.methods.flow import flow
 from interp.methods.gap import Gap
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
+ROUNDS = 2  # of guiding, where events are coarse
 Law = Callable[[Gap, torch.Tensor], torch.Tensor]
 Form = Callable[[torch.Tensor, torch.Tensor, EventCounts, torch.Tensor], torch.Tensor]
 
@@ -69,4 +71,11 @@ def guided_by_ramps(
 ) -> torch.Tensor:
     """Ramps in the colours of carried frames, half and half with these where they agree (`candidates.guided`)."""
     pictures = ramps(frame_0, frame_1, events, times)
-    return guided(frame_0, frame_1, pictures).image(pictures, times)
+    if events.footprint == 1:
+        return guided(frame_0, frame_1, pictures).image(pictures, times)
+    each = zip(frame_0, frame_1, times, strict=True)
+    beside = torch.stack([flow(Gap(first, last, None, 0), at) for first, last, at in each])
+    for _ in range(ROUNDS):
+        found = guided(frame_0, frame_1, pictures, footprint=events.footprint, beside=beside)
+        pictures = found.image(pictures, times)
+    return pictures

@@ -33,11 +33,12 @@ def carried(counts: EventCounts, places: torch.Tensor) -> EventCounts:
     """
     height, width = counts.off_on.shape[-2:]
     seen = ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
-    factor = _pixels_across(places, seen)
+    across = _pixels_across(places, seen)
+    factor, footprint = max(1, round(across)), max(1, round(1 / max(across, 1e-9)))
     maps = counts.pooled(factor).off_on.float()
     where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
     found = sample(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float())
-    return replace(counts, off_on=(found * seen).unflatten(1, counts.off_on.shape[1:3]))
+    return replace(counts, off_on=(found * seen).unflatten(1, counts.off_on.shape[1:3]), footprint=footprint)
 
 
 def over(counts: EventCounts, size: tuple[int, int]) -> EventCounts:
@@ -73,7 +74,7 @@ def places_of(
     return torch.from_numpy(pixel_map(frame_camera, frame_pose, depth, event_camera, event_pose))
 
 
-def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> int:
-    """How many pixels of the event camera a pixel of the frame is wide, in the middle of all; at least 1."""
+def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> float:
+    """How many pixels of the event camera a pixel of the frame is wide, in the middle of all."""
     across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
-    return max(1, round(float(across.median()))) if len(across) else 1
+    return float(across.median()) if len(across) else 1.0

@@ -39,10 +39,12 @@ class EventCounts:
 
     off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals
     contrast   [B, 2] nats that an OFF and an ON event stand for
+    footprint  pixels across of the frames that a pixel of the event camera looks at, where it has been laid over them
     """
 
     off_on: torch.Tensor
     contrast: torch.Tensor
+    footprint: int = 1
 
     @property
     def steps(self) -> int:
@@ -91,11 +93,11 @@ class EventCounts:
 
     def reversed(self) -> EventCounts:
         """With time running backwards: the last sub-interval first, ON for OFF."""
-        return EventCounts(self.off_on.flip(1, 2), self.contrast.flip(1))
+        return replace(self, off_on=self.off_on.flip(1, 2), contrast=self.contrast.flip(1))
 
     def to(self, device: torch.device | str) -> EventCounts:
         """The same on a device."""
-        return EventCounts(self.off_on.to(device), self.contrast.to(device))
+        return replace(self, off_on=self.off_on.to(device), contrast=self.contrast.to(device))
 
     @staticmethod
     def none(batch: int, size: tuple[int, int], steps: int = 1, contrast: float = USUAL_NATS) -> EventCounts:
@@ -104,8 +106,9 @@ class EventCounts:
 
     @staticmethod
     def stacked(counts: Sequence[EventCounts]) -> EventCounts:
-        """Several as one batch; they must have one size and one number of sub-intervals."""
-        return EventCounts(torch.cat([one.off_on for one in counts]), torch.cat([one.contrast for one in counts]))
+        """Several of one camera as one batch; they must have one size and one number of sub-intervals."""
+        off_on, contrast = (torch.cat([getattr(one, name) for one in counts]) for name in ("off_on", "contrast"))
+        return EventCounts(off_on, contrast, counts[0].footprint)
 
 
 def before_and_after(times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

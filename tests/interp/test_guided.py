@@ -103,3 +103,19 @@ def test_it_stands_light_that_is_not_finite() -> None:
     last[..., 3:5, 4] = torch.nan
     assert guided(first, last, last[:, None]).flows.isfinite().all()
     assert make("rrin_events_guided")(first, first, [0.5], counts(1, (32, 32), rate=20.0)).images.isfinite().all()
+
+
+def test_coarse_events_do_not_blur_what_moves_as_a_whole() -> None:
+    """Events of pixels nine times as large say where things go; how they look is in the key frames."""
+    path = [6 * k / STEPS for k in range(STEPS + 1)]
+    first, last, truth = shifted(0), shifted(6), torch.cat([shifted(1.5), shifted(3), shifted(4.5)])
+    side = SIDE // 3 * 3
+    gap = [each[0, :, :side, :side] for each in (first, last)]
+    fine = moving(path)
+    coarse = EventCounts(fine.off_on[..., :side, :side], fine.contrast).pooled(3)
+    error = {
+        name: float((open_method(name).between(Gap(*gap, coarse, 33_333), torch.tensor([0.25, 0.5, 0.75]))
+                     - truth[..., :side, :side])[..., 8:-8, 8:-8].square().mean())
+        for name in ("bridge", "guided")
+    }  # fmt: skip
+    assert error["guided"] < error["bridge"] / 4
