@@ -32,6 +32,7 @@ Source: DIS, T. Kroeger et al., "Fast optical flow using dense inverse search", 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -144,6 +145,18 @@ def recoloured(pictures: torch.Tensor, around: torch.Tensor, transfer: Transfer 
     return to_codes(coloured(light, ratios_of(to_light(around, transfer))), transfer)
 
 
+def dense_flow() -> Any:
+    """DIS of OpenCV's medium preset, down to single pixels and half as smooth.
+
+    Of half the resolution, as the preset is, edges are off by half a pixel: `guided` loses 0.4 to 0.5 dB in scenes and
+    0.05 to 0.1 in real videos, and registered events 0.7 dB.  It takes three times as long, 0.43 s at 1280x720.
+    """
+    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)  # type: ignore[attr-defined]
+    dis.setFinestScale(0)
+    dis.setVariationalRefinementAlpha(10.0)
+    return dis
+
+
 def _shown(pictures: torch.Tensor, transfer: Transfer) -> torch.Tensor:
     """Luminance as codes [..., 1, H, W], about as differences are seen."""
     return to_codes(luminance(to_light(pictures, transfer)), "srgb")
@@ -154,7 +167,7 @@ def _flows(shown: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
     if min(shown.shape[-2:]) < SMALLEST:
         return shown.new_zeros(*shown.shape[:2], 2, *shown.shape[-2:])
     starts, ends = (_eight_bits(each) for each in (shown.detach(), key.detach()))
-    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)  # type: ignore[attr-defined]
+    dis = dense_flow()
     found = [
         [convincing(dis.calc(start, end[0], None), start, end[0], CONVINCED_CODES) for start in some]
         for some, end in zip(starts, ends, strict=True)

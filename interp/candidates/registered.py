@@ -20,12 +20,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import torch
 
 from interp.candidates.bridge import DARK
-from interp.candidates.guided import SMALLEST, averaged
+from interp.candidates.guided import SMALLEST, averaged, dense_flow
 from interp.light import Transfer, luminance, to_light
 from interp.precision import in_full_precision
 from interp.representation.carried import carried, over, places_over
@@ -72,8 +71,7 @@ def _moved(change: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
     start, end = (
         (127.5 * (1 + each / largest)).clamp(0, 255).cpu().numpy().astype(np.uint8) for each in (change, seen)
     )
-    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)  # type: ignore[attr-defined]
-    flow = convincing(dis.calc(start, end, None), start, end, CONVINCED_CODES)
+    flow = convincing(dense_flow().calc(start, end, None), start, end, CONVINCED_CODES)
     explains = _unexplained(start, carried_along(end, flow)) <= (1 - EXPLAINED) * _unexplained(start, end)
     return torch.from_numpy(flow if explains else np.zeros_like(flow))
 
