@@ -25,6 +25,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 FLOORS = {
     "errors": 0,
     "toml_text": 0,
+    "cluster": 1,
     "requests": 1,
     "kernel_cache": 0,
     "kernel_flags": 0,

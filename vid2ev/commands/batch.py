@@ -1,30 +1,39 @@
-"""Many videos in one go: found, converted one after the other, and told of in a table."""
+"""Many videos in one go: found, converted one after the other or shared out, and told of in a table."""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.errors import Vid2evError
+from vid2ev.errors import DataError, UsageError, Vid2evError
+
+if TYPE_CHECKING:
+    from vid2ev.cluster.task import Tell
+    from vid2ev.cluster.workers import Workers
 
 CLIPS = {
     ".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".y4m", ".ogv", ".3gp",
     ".mts", ".m2ts", ".gif", ".npy", ".npz",
 }  # fmt: skip
 
+LIST = ".txt"
+
 Convert = Callable[[str, Path], dict[str, Any]]
 
 
 def sources_in(video: str) -> list[str]:
-    """The sources that an argument stands for: itself, or what a folder without pictures holds: videos, arrays and
-    folders of pictures, in natural order."""
+    """The sources that an argument stands for: itself, what a folder without pictures holds (videos, arrays and folders
+    of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line."""
     from vid2ev.light.recognise import natural
 
     folder = Path(video)
+    if folder.suffix.lower() == LIST and folder.is_file() and not _is_events(folder):
+        return [source for line in _listed(folder) for source in sources_in(line)]
     if video == "-" or not folder.is_dir() or _holds_pictures(folder) or (folder / "manifest.json").exists():
         return [video]
     children = sorted(folder.iterdir(), key=lambda path: natural(path.name))
@@ -60,15 +69,49 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
             made = convert(video, directory)
         except Vid2evError as error:
             click.echo(f"error: {error}", err=True)
-            result |= {"state": "failed", "error": str(error), "exit_code": error.exit_code}
+            result |= _failed(error)
         except Exception as error:  # (a mistake of ours in one video does not stop the others either)
             traceback.print_exc()
-            result |= {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
+            result |= _failed(error)
         else:
-            events = _events(made)
-            result |= {"state": "planned" if events is None else "done", "events": events}
+            result |= _done(made)
         results.append(result)
     return results
+
+
+def convert_shared(
+    directories: dict[str, Path],
+    convert: Callable[[Tell, str, Path], dict[str, Any]],
+    check: Callable[[str, Path], object],
+    workers: Workers,
+    quiet: bool,
+) -> list[dict[str, Any]]:
+    """`convert_each` by workers, each of which converts one video at a time; `check` raises at once, here, for what
+    need not be tried."""
+    from vid2ev.cluster.task import Task
+    from vid2ev.commands.live import shared_out
+
+    results, tasks = dict[str, dict[str, Any]](), list[Task]()
+    for video, directory in directories.items():
+        try:
+            check(video, directory)
+        except Vid2evError as error:
+            results[video] = _failed(error)
+            click.echo(f"error: {error}", err=True)
+        else:
+            tasks.append(Task(video, partial(convert, video=video, directory=directory)))
+    with shared_out(tasks, workers, "clips", quiet) as (outcomes, live):
+        for name, made, error in outcomes:
+            results[name] = result = _done(made) if error is None else _failed(error)
+            events = result.get("events")
+            if error and not isinstance(error, Vid2evError):
+                traceback.print_exception(error)
+            if live:
+                said = f"{events or 0:,} events" if error is None else f"error: {error}"
+                live.end(name, bool(error), events, f"{name} -> {directories[name]}: {said}")
+            elif error:
+                click.echo(f"error: {error}", err=True)
+    return [{"video": video, "directory": str(directories[video])} | results[video] for video in directories]
 
 
 def exit_code(results: list[dict[str, Any]]) -> int:
@@ -89,6 +132,17 @@ def table(results: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def _done(made: dict[str, Any]) -> dict[str, Any]:
+    events = _events(made)
+    return {"state": "planned" if events is None else "done", "events": events}
+
+
+def _failed(error: Exception) -> dict[str, Any]:
+    if isinstance(error, Vid2evError):
+        return {"state": "failed", "error": str(error), "exit_code": error.exit_code}
+    return {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
+
+
 def _events(made: dict[str, Any]) -> int | None:
     """How many there are, by a manifest; None before they are made."""
     results = [made] if "counts" in made else list(made.get("results", {}).values())
@@ -103,3 +157,26 @@ def _holds_pictures(folder: Path) -> bool:
     from vid2ev.light.recognise import PICTURE_SUFFIXES
 
     return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())
+
+
+def _is_events(path: Path) -> bool:
+    """Whether a text file holds events, which are no list."""
+    from vid2ev.formats import recognise
+
+    return recognise(path) is not None
+
+
+def _listed(path: Path) -> list[str]:
+    """The lines of a list but for empty ones and those that begin with #.  Raises DataError, UsageError."""
+    try:
+        lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{path} cannot be read as a list of videos ({error}); give a text file, a line for each"
+        ) from error
+    found = [line for line in lines if line and not line.startswith("#")]
+    if not found:
+        raise UsageError(f"{path} names no videos; expected a line for each")
+    if inner := next((line for line in found if Path(line).suffix.lower() == LIST), None):
+        raise UsageError(f"{path} names {inner}, a list within a list; expected videos and folders of them")
+    return found

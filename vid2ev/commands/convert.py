@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vid2ev.commands.source_options import source_options
+from vid2ev.commands.worker_options import worker_options
+from vid2ev.errors import UsageError
+
+if TYPE_CHECKING:
+    from vid2ev.cluster.task import Tell
+    from vid2ev.recipe import Recipe
+    from vid2ev.recorder import Progress
 
 
 class Auto(click.ParamType):
@@ -98,8 +106,9 @@ class Auto(click.ParamType):
     "--threads",
     type=click.IntRange(1),
     metavar="N",
-    help="Changes nothing but the time it takes.  [default: all cores]",
+    help="Changes nothing but the time it takes.  [default: all cores; with --jobs a job's share of them]",
 )
+@worker_options("Videos")
 @click.option(
     "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="cpu", show_default=True,
     help="Where light and events are made; auto: on a GPU, if there is one and enough to do.",
@@ -176,21 +185,25 @@ def convert(
     """Turn each VIDEO into the recording of an event camera.
 
     VIDEO is a video file, a folder of images (with timestamps.txt, or --fps), a .npy or .npz array, a photograph (with
-    --motion), - for standard input, camera:0, synthetic:NAME, or a folder of videos.  A recording is a folder with
-    events.h5, preview.mp4 and manifest.json.
+    --motion), - for standard input, camera:0, synthetic:NAME, a folder of videos, or a list of videos, NAME.txt.  A
+    recording is a folder with events.h5, preview.mp4 and manifest.json.
 
     Of several videos, one that fails does not stop the others; with --resume, those that are done are left as they are.
     """
     from vid2ev import conversion
     from vid2ev.commands import batch
+    from vid2ev.commands.progress import given
+    from vid2ev.commands.worker_options import workers_of
 
     quiet |= as_json
+    workers = workers_of(options)
     if options["device"] == "cuda" and not quiet:
         _warn_without_gpu()
     options["seed"] = None if options["seed"] == "random" else options["seed"]
     found = [source for video in videos for source in batch.sources_in(video)]
-    if len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/"):
-        directory = Path(output) if output else conversion.default_directory(videos[0])
+    single = len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/")
+    directory = Path(output) if output and single else conversion.default_directory(videos[0])
+    if single and workers.scheduler is None:
         made = _one(videos[0], directory, dry_run, verbose, quiet, options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
@@ -199,7 +212,17 @@ def convert(
     def one(video: str, directory: Path) -> dict[str, Any]:
         return _one(video, directory, dry_run, verbose, quiet, dict(options))
 
-    results = batch.convert_each(batch.directories(found, Path(output or "")), one, quiet)
+    directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))
+    if workers.alone or dry_run:
+        results = batch.convert_each(directories, one, quiet)
+    else:
+        options["threads"] = options["threads"] or workers.threads
+        check = partial(_check_shared, overwrite=options["overwrite"], resume=options["resume"])
+        # (What was checked is free, so that going on is beginning, and a task that is tried again goes on.)
+        options["resume"] |= not options["overwrite"]
+        results = batch.convert_shared(
+            directories, partial(_on_worker, options=options, named=given()), check, workers, quiet
+        )
     click.echo(
         json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )
@@ -220,14 +243,14 @@ def _one(
     """Convert a video; returns the manifest, of a dry run what it would begin with."""
     from vid2ev import conversion
     from vid2ev.commands import summary
-    from vid2ev.commands.progress import bar, heard, kept
+    from vid2ev.commands.progress import bar, given, heard, kept
 
     budget = options.pop("budget")
     if budget is not None:
         from vid2ev.cost.front import Budget
 
         Budget.parse(budget)
-        options = options if dry_run else _within(budget, video, directory, quiet, options)
+        options = options if dry_run else _within(budget, video, directory, quiet, options, given())
     if dry_run or verbose:
         recipe, plan = _plan(video, directory, dict(options))
         if not quiet:
@@ -245,9 +268,37 @@ def _one(
     return manifest
 
 
-def _within(budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any]) -> dict[str, Any]:
-    """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on."""
-    from vid2ev.commands.progress import given, pass_bar
+def _check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> None:
+    """Raise UsageError for what no worker need try."""
+    from vid2ev.recording.folder import check_free
+
+    if video == "-" or video.startswith("camera:"):
+        raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
+    check_free(directory, overwrite, resume)
+
+
+def _on_worker(tell: Tell, video: str, directory: Path, options: dict[str, Any], named: set[str]) -> dict[str, Any]:
+    """Convert a video, as a task; returns the manifest.  `named`: the options of the command line."""
+    from vid2ev import conversion
+
+    options = dict(options)
+    budget = options.pop("budget")
+    if budget is not None:
+        options = _within(budget, video, directory, True, options, named)
+
+    def report(recipe: Recipe, done: Progress) -> None:
+        total = recipe.source.frames_expected
+        tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
+
+    return conversion.convert(video, directory, report=report, **options)
+
+
+def _within(
+    budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str]
+) -> dict[str, Any]:
+    """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on; those
+    `named` on the command line stay as they are."""
+    from vid2ev.commands.progress import pass_bar
     from vid2ev.cost.choice import chosen, taken_up
     from vid2ev.outputs import Outputs
     from vid2ev.recording.folder import begun_job, check_free
@@ -260,7 +311,7 @@ def _within(budget: str, video: str, directory: Path, quiet: bool, options: dict
         Outputs.taken_from(rest)
         threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
         with pass_bar(quiet) as report:
-            choice = chosen(video, budget, rest, given=given(), threads=threads, report=report)
+            choice = chosen(video, budget, rest, given=named, threads=threads, report=report)
     if not quiet:
         click.echo(choice.line)
     return choice.rung.applied(options) | {"notes": {"budget": choice.note}}

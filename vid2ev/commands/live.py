@@ -1,0 +1,117 @@
+"""What a person sees of work that is shared out: a live line of all of it, and a line for each thing that is done."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vid2ev.commands import INTERRUPTED
+
+if TYPE_CHECKING:
+    from vid2ev.cluster.task import Task
+    from vid2ev.cluster.work import Outcome
+    from vid2ev.cluster.workers import Workers
+
+LINE = "{percentage:3.0f}% {bar:12} {postfix}, {elapsed} gone, {remaining} left"
+
+
+@dataclass
+class _Task:
+    """How far a task is: its share 0 ... 1, and its events now and when they were first told of."""
+
+    share: float = 0.0
+    events: int = 0
+    events_before: int = 0
+    running: bool = False
+    told: bool = False
+
+
+class Live:
+    """The line: how many of `count` are done, failed and running, events and events per second, and the time left.
+
+    `watch` may be called in any thread.
+    """
+
+    def __init__(self, count: int, noun: str, quiet: bool):
+        from tqdm import tqdm
+
+        self._count, self._noun = count, noun
+        self._tasks: dict[str, _Task] = {}
+        self._done = self._failed = 0
+        self._began_s, self._lock = time.monotonic(), threading.Lock()
+        self._bar = tqdm(total=count, bar_format=LINE, leave=False, disable=quiet or None)
+        self._show()
+
+    def watch(self, name: str, facts: Mapping[str, Any]) -> None:
+        """What a task tells: `begun`, its `share`, its `events`."""
+        with self._lock:
+            task = self._tasks.setdefault(name, _Task())
+            task.running, task.share = True, facts.get("share", task.share)
+            if "events" in facts:
+                task.events = facts["events"]
+                task.events_before = task.events_before if task.told else task.events
+                task.told = True
+            self._show()
+
+    def end(self, name: str, failed: bool, events: int | None, text: str) -> None:
+        """A task is over, with so many events; `text` is said of it."""
+        with self._lock:
+            task = self._tasks.setdefault(name, _Task())
+            if events is not None:
+                task.events, task.events_before = events, task.events_before if task.told else events
+            task.running, task.share = False, 1.0
+            self._failed, self._done = self._failed + failed, self._done + (not failed)
+            if not self._bar.disable:
+                self._bar.clear()
+            click.echo(f"[{self._done + self._failed}/{self._count}] {text}", err=failed)
+            self._show()
+
+    def close(self) -> None:
+        """Take the line away."""
+        self._bar.close()
+
+    @property
+    def text(self) -> str:
+        """What the line says."""
+        tasks = self._tasks.values()
+        parts = [f"{self._done}/{self._count} {self._noun}"]
+        parts += [f"{self._failed} failed"] * bool(self._failed)
+        parts.append(f"{sum(task.running for task in tasks)} running")
+        if events := sum(task.events for task in tasks):
+            made = sum(task.events - task.events_before for task in tasks)
+            parts += [f"{events:,} events", f"{made / (time.monotonic() - self._began_s):,.0f}/s"]
+        return ", ".join(parts)
+
+    def _show(self) -> None:
+        if not self._bar.disable:
+            self._bar.set_postfix_str(self.text, refresh=False)
+            self._bar.n = sum(task.share for task in self._tasks.values())
+            self._bar.refresh()
+
+
+@contextmanager
+def shared_out(
+    tasks: Sequence[Task], workers: Workers, noun: str, quiet: bool
+) -> Iterator[tuple[Iterator[Outcome], Live | None]]:
+    """The outcomes of tasks, in whatever order they come, and the live line; None if `quiet`.
+
+    Ctrl-C ends the program, and says that it can be resumed.
+    """
+    from vid2ev.cluster.work import outcomes
+
+    live = None if quiet else Live(len(tasks), noun, quiet)
+    try:
+        yield outcomes(tasks, workers, live.watch if live else None), live
+    except KeyboardInterrupt:
+        click.echo("interrupted; what is done is kept, the same command with --resume goes on", err=True)
+        sys.exit(INTERRUPTED)
+    finally:
+        if live:
+            live.close()
