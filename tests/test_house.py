@@ -52,11 +52,13 @@ FLOORS = {
     "truth": 8,
     "tracks": 9,
     "instants": 10,
+    "parts": 10,
     "recipe": 9,
     "reformat": 9,
     "recorder": 11,
     "plan": 12,
     "conversion": 13,
+    "split": 14,
     "cost": 14,
     "": 15,  # vid2ev/__init__.py: the public names
     "commands": 16,

@@ -16,6 +16,7 @@ from typing import Any
 from vid2ev.errors import DataError, UsageError
 from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
+from vid2ev.parts import Made
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import described, planned
@@ -25,7 +26,7 @@ from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sensors.tiles import usable_cores
+from vid2ev.sensors.tiles import WHOLE, Part, usable_cores
 from vid2ev.sight import scene_of
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
@@ -52,6 +53,8 @@ def convert(
     tolerance: float = TOLERANCE,
     notes: Mapping[str, Any] | None = None,
     device: str = "cpu",
+    part: Part = WHOLE,
+    made: Made | None = None,
     **rest: Any,
 ) -> dict[str, Any]:
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
@@ -69,6 +72,8 @@ def convert(
     notes      what else the manifest is to say, ready for JSON
     device     where light and events are made: cpu, cuda (a GPU; the CPU where there is none), or auto, by how much
                there is to do (`sensors.devices`); "simulated" is for tests.  Light differs by what float32 rounds
+    part       pixels of the event cameras that are simulated; `split` puts the recordings of all parts together
+    made       the events of all parts, which are then not simulated
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
 
@@ -93,11 +98,14 @@ def convert(
         raise UsageError(f"{video} passes once and cannot be taken up again; leave --resume out")
     job = _asked(recipe, tolerance) if planner else recipe.describe() | described(plans)
     job |= {"outputs": outputs.describe()} | plain({**(notes or {})})
+    job |= {} if part == WHOLE else {"part": list(part)}
     beside = growing(recipe, outputs)
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
             return folder.finished
-        make = partial(Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip, device=where)
+        make = partial(
+            Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip, device=where, part=part, made=made
+        )
         recorder = _recorded(recipe, planner, folder, make, piece, report)
         said = described(planner.plans if planner else plans)
         manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
@@ -183,7 +191,7 @@ def _record(recorder: Recorder, planner: Planner | None, piece: int, report: Rep
     """From the point of the last checkpoint to the end of the source; returns False where there are new plans."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
-    coming = planner.instants if planner else partial(instants, recipe, device=recorder.device)
+    coming = planner.instants if planner else partial(instants, recorder.seen, device=recorder.device)
     with closing(coming(max(done.frames - 1, 0))) as seen:
         first = next(seen, None)
         if first is None:

@@ -17,6 +17,7 @@ from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.toml_text import toml_value
 
 Spec = DvsSpec | CisSpec
@@ -109,15 +110,17 @@ class Mount:
         """The camera's part of the recording's folder, with a slash at its end."""
         return f"{self.name}/" if self.name else ""
 
-    def dvs(self, labels: bool = False, threads: int = 1, skip: bool = True, device: Device = CPU) -> Dvs:
-        """The event sensor, before its first frame."""
+    def dvs(
+        self, labels: bool = False, threads: int = 1, skip: bool = True, device: Device = CPU, part: Part = WHOLE
+    ) -> Dvs:
+        """The event sensor, before its first frame; of a part of its pixels on a CPU."""
         assert isinstance(self.sensor.spec, DvsSpec)
         spec, number = self.sensor.spec, self.number
         if device.name != "cpu":
             from vid2ev.sensors.dvs_on_card import DvsOnCard
 
             return DvsOnCard(spec, self.size, self.seed, memory=device.memory, camera=number, labels=labels)
-        return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip)
+        return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part)
 
     def cis(self, threads: int = 1, device: Device = CPU) -> Cis:
         """The frame sensor, before its first frame."""

@@ -15,11 +15,13 @@ import numpy as np
 from vid2ev.instants import Instant, pictures
 from vid2ev.mounts import Mount
 from vid2ev.outputs import Outputs
+from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.rig.rig_file import write_rig
 from vid2ev.sensors.devices import CPU, Device
+from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -72,6 +74,9 @@ class Recorder:
 
     `take_up` comes first, then `begin` with the first instant (or the last source frame before the checkpoint), `add`
     for each that follows and now and then `checkpoint`, and in the end `finish` and `write`.
+
+    part   pixels of the event cameras that are simulated
+    made   the event cameras' events, where they were made before, in parts
     """
 
     def __init__(
@@ -82,11 +87,19 @@ class Recorder:
         threads: int,
         skip: bool = True,
         device: Device = CPU,
+        part: Part = WHOLE,
+        made: Made | None = None,
     ):
         self.recipe, self.outputs, self.folder, self.device = recipe, outputs, folder, device
+        self._part, self._made = part, made
         self.done = Progress()
         self.tracks: Sequence[Track] = [self._track(mount, threads, skip) for mount in recipe.mounts]
         self._truths = [TruthTrack(mount, folder) for mount in recipe.mounts if recipe.truth]
+
+    @property
+    def seen(self) -> Recipe:
+        """The recipe by whose light the recording is made."""
+        return self.recipe if self._made is None else self._made.seen(self.recipe)
 
     def take_up(self) -> None:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
@@ -121,6 +134,8 @@ class Recorder:
             for track in self.tracks:
                 track.finish()
         self.done.finished = True
+        if self._made:
+            self.done.subframes, self.done.limited = self._made.subframes
         self.checkpoint()
 
     def checkpoint(self) -> None:
@@ -171,8 +186,9 @@ class Recorder:
         if mount.kind == "cis":
             return CisTrack(mount.cis(threads, self.device), self.folder, self.outputs, within=mount.within)
         source = self.recipe.source
+        dvs = None if self._made is None else self._made.sensor(mount, self.recipe.labels)
         return DvsTrack(
-            mount.dvs(self.recipe.labels, threads, skip, self.device),
+            dvs or mount.dvs(self.recipe.labels, threads, skip, self.device, self._part),
             self.folder,
             self.outputs,
             within=mount.within,

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from vid2ev.commands.worker_options import worker_options
+
 SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 
 
@@ -37,7 +39,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
 @click.option(
     "--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Another seed, other scenes."
 )
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Scenes made at a time.  [default: as many as cores]")
+@worker_options("Scenes", "as many as cores")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
 @click.option("--json", "as_json", is_flag=True, help="Print what is in it as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
@@ -45,7 +47,6 @@ def dataset(
     directory: Path,
     videos: tuple[str, ...],
     size: str,
-    jobs: int | None,
     resume: bool,
     as_json: bool,
     quiet: bool,
@@ -61,16 +62,18 @@ def dataset(
     from interp.data.dataset_spec import DatasetSpec
     from vid2ev.commands.batch import sources_in
     from vid2ev.commands.progress import counting
+    from vid2ev.commands.worker_options import workers_of
     from vid2ev.errors import UsageError
     from vid2ev.sensors.tiles import usable_cores
 
+    workers = workers_of(options, usable_cores())
     found = tuple(source for video in videos for source in sources_in(video))
     try:
         spec = DatasetSpec(videos=found, size=_size(size), **options)
     except ValidationError as error:
         raise UsageError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
     with counting(quiet or as_json, SCENES) as report:
-        facts = write_dataset(directory, spec, resume=resume, jobs=jobs or usable_cores(), report=report)
+        facts = write_dataset(directory, spec, resume=resume, workers=workers, report=report)
     if as_json:
         click.echo(json.dumps(facts, indent=2))
     elif not quiet:

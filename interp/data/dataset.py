@@ -24,10 +24,14 @@ from interp.data.dataset_spec import DatasetSpec, Scene, scenes_of
 from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from vid2ev import DataError, UsageError, convert
+from vid2ev.cluster.task import Task, Tell
+from vid2ev.cluster.work import WorkerLost, outcomes
+from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.recording.disk import lock, sync, whole_file, writing
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
 FACTS = "dataset.json"
+ALONE = Workers()
 Report = Callable[[int, int, str], object]  # scenes done, of how many, and the last one's name
 
 
@@ -40,14 +44,19 @@ class Made(NamedTuple):
 
 
 def write_dataset(
-    directory: Path, spec: DatasetSpec, *, resume: bool = False, jobs: int = 1, report: Report | None = None
+    directory: Path,
+    spec: DatasetSpec,
+    *,
+    resume: bool = False,
+    workers: Workers = ALONE,
+    report: Report | None = None,
 ) -> dict[str, Any]:
     """Make a data set; returns its facts, which dataset.json and the data card have.
 
-    jobs     processes that make a scene each; they change nothing but the time it takes
+    workers  who make a scene each; they change nothing but the time it takes
     resume   go on where an interrupted run was; a finished data set is left as it is
-    Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, or
-    no scene can be made.
+    Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, no
+    scene can be made, or the workers of one died.
     """
     job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")}))
     if directory.exists():
@@ -61,7 +70,7 @@ def write_dataset(
         handle = lock(made_in)
         try:
             _begin(made_in / "job.json", job, directory)
-            made = sorted(_all(scenes, made_in, spec, jobs, report))
+            made = sorted(_all(scenes, made_in, spec, workers, report))
             facts = _facts(job, spec, made)
             _publish(made_in, directory, facts)
         finally:
@@ -69,16 +78,38 @@ def write_dataset(
     return facts
 
 
-def _all(scenes: list[Scene], folder: Path, spec: DatasetSpec, jobs: int, report: Report | None) -> Iterator[Made]:
+def _all(
+    scenes: list[Scene], folder: Path, spec: DatasetSpec, workers: Workers, report: Report | None
+) -> Iterator[Made]:
     """All recordings, in whatever order they come."""
     make = partial(make_scene, folder=folder, layout=spec.layout, multiple=spec.multiple)
-    if jobs == 1:
+    if workers.alone:
         coming: Iterator[Made] = map(make, scenes)
         yield from _told(coming, len(scenes), report)
-        return
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as processes:
-        futures = [processes.submit(make, scene) for scene in scenes]
-        yield from _told((future.result() for future in as_completed(futures)), len(scenes), report)
+    elif workers.scheduler or has_dask():
+        yield from _told(_shared_out(scenes, make, workers), len(scenes), report)
+    else:
+        with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as processes:
+            futures = [processes.submit(make, scene) for scene in scenes]
+            yield from _told((future.result() for future in as_completed(futures)), len(scenes), report)
+
+
+def _shared_out(scenes: list[Scene], make: Callable[[Scene], Made], workers: Workers) -> Iterator[Made]:
+    """All recordings, by workers.  What is left out is so because of itself, not of them: raises WorkerLost at the end
+    if one was lost."""
+    lost: Exception | None = None
+    for outcome in outcomes([Task(scene.name, partial(_as_task, make, scene)) for scene in scenes], workers):
+        if outcome.error and not isinstance(outcome.error, WorkerLost):
+            raise outcome.error
+        lost = lost or outcome.error
+        if outcome.value:
+            yield outcome.value
+    if lost:
+        raise WorkerLost(f"{lost}; the other scenes are kept, the same command with --resume goes on")
+
+
+def _as_task(make: Callable[[Scene], Made], scene: Scene, _: Tell) -> Made:
+    return make(scene)
 
 
 def _told(coming: Iterator[Made], count: int, report: Report | None) -> Iterator[Made]:

@@ -64,14 +64,16 @@ def test_a_task_that_takes_too_much_memory_is_named_and_the_others_are_done(
 
 
 def test_what_cannot_be_meant_is_said_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(UsageError, match="--memory much: expected a size such as 4GiB"):
-        Workers(jobs=2, memory="much")
+    with (
+        pytest.raises(UsageError, match="--memory much: expected a size such as 4GiB"),
+        Workers(2, memory="much").client(),
+    ):
+        pass
     with pytest.raises(UsageError, match="expected an address such as"), Workers(scheduler="nowhere").client():
         pass
     monkeypatch.setattr(workers_module, "REACHED_S", 1)
     with pytest.raises(OSError, match="no Dask scheduler answers"), Workers(scheduler="tcp://127.0.0.1:9").client():
         pass
     monkeypatch.setattr(workers_module, "has_dask", lambda: False)
-    with pytest.raises(UsageError, match=r"pip install 'vid2ev\[cluster\]'"):
-        Workers(jobs=2)
-    assert Workers().alone
+    with pytest.raises(UsageError, match=r"pip install 'vid2ev\[cluster\]'"), Workers(2).client():
+        pass

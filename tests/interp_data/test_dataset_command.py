@@ -19,6 +19,7 @@ from interp.data.layouts import open_sequence, windows
 from interp.data.layouts.own import Own
 from interp.data.recorded import clip_of
 from vid2ev import DataError, UsageError, open_source
+from vid2ev.cluster.workers import Workers
 
 QUICK = {"count": 2, "size": (32, 24), "frames": 3}
 
@@ -116,6 +117,14 @@ def test_other_layouts_hold_the_same(made: Path, tmp_path: Path, layout: str) ->
     between = int(ours.times_us[3]), int(ours.times_us[40])
     for name in "txyp":
         np.testing.assert_array_equal(getattr(ours.events(*between), name), getattr(theirs.events(*between), name))
+
+
+def test_workers_change_no_byte(made: Path, tmp_path: Path) -> None:
+    again = write_dataset(tmp_path / "set", DatasetSpec(**QUICK), workers=Workers(jobs=2))
+    assert again == json.loads((made / "dataset.json").read_text())
+    for path in made.rglob("*"):
+        if path.is_file() and path.name != "manifest.json":  # (which says when it was made)
+            assert path.read_bytes() == (tmp_path / "set" / path.relative_to(made)).read_bytes(), path
 
 
 KILLED = """

@@ -22,6 +22,10 @@ REMEDY = "give each worker more (--memory here), or run fewer at a time (--jobs)
 Watch = Callable[[str, Mapping[str, Any]], object]  # the name of a task, and what it tells; {"begun": True} at first
 
 
+class WorkerLost(DataError):
+    """A task was not done for want of memory, or because its workers died; another machine may well do it."""
+
+
 class Outcome(NamedTuple):
     """What a task gave, or the error that it ended with at last."""
 
@@ -103,19 +107,19 @@ def _as_they_come(
             )
 
 
-def _of_deaths(name: str, client: Client, pids: Sequence[int]) -> DataError:
+def _of_deaths(name: str, client: Client, pids: Sequence[int]) -> WorkerLost:
     """Why the workers of a task died."""
     events = client.get_events(OUT_OF_MEMORY)
     taken = {event["pid"]: event["rss"] for _, event in events if event["pid"] in pids}
     times = f"{len(pids)} time{'s' * (len(pids) != 1)}"
     if taken:
         size = f"{max(taken.values()) / 2**30:.2g} GiB"
-        return DataError(f"{name} ran out of memory: its worker was ended {times}, at {size}; {REMEDY}")
-    return DataError(f"{name}: its worker died {times}, as it does when the machine's memory runs out; {REMEDY}")
+        return WorkerLost(f"{name} ran out of memory: its worker was ended {times}, at {size}; {REMEDY}")
+    return WorkerLost(f"{name}: its worker died {times}, as it does when the machine's memory runs out; {REMEDY}")
 
 
 def _said(name: str, error: BaseException) -> Exception:
     """The error as people read it."""
     if isinstance(error, MemoryError):
-        return DataError(f"{name} ran out of memory ({error}); {REMEDY}")
+        return WorkerLost(f"{name} ran out of memory ({error}); {REMEDY}")
     return error if isinstance(error, Exception) else DataError(f"{type(error).__name__}: {error}")

@@ -32,23 +32,12 @@ class Workers:
     scheduler  address of a Dask scheduler, such as tcp://10.0.0.1:8786; None for processes of this machine
     retries    how often a task is tried again after an error or the death of its worker
     memory     of each process here, such as "4 GiB"; by default its share of the machine's
-    Raises UsageError for what cannot be meant, and where Dask is needed and not installed.
     """
 
     jobs: int = 1
     scheduler: str | None = None
     retries: int = 2
     memory: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.alone:
-            return
-        if not has_dask():
-            raise UsageError(
-                "--jobs and --scheduler share work out by Dask, which is not installed; pip install 'vid2ev[cluster]'"
-            )
-        if self.memory is not None:
-            _bytes_of(self.memory)
 
     @property
     def alone(self) -> bool:
@@ -64,8 +53,12 @@ class Workers:
     def client(self) -> Iterator[Client]:
         """A client of the scheduler, or of one that is started here with its processes and ends with them.
 
-        Raises UsageError for an address that is none, DataError where no scheduler answers.
+        Raises UsageError where Dask is not installed or what is asked cannot be meant, DataError where none answers.
         """
+        if not has_dask():
+            raise UsageError(
+                "--jobs and --scheduler share work out by Dask, which is not installed; pip install 'vid2ev[cluster]'"
+            )
         if self.scheduler is None:
             with self._here() as client:
                 yield client

@@ -13,7 +13,6 @@ import click
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
 if TYPE_CHECKING:
-    from vid2ev.cluster.task import Tell
     from vid2ev.cluster.workers import Workers
 
 CLIPS = {
@@ -81,13 +80,16 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
 
 def convert_shared(
     directories: dict[str, Path],
-    convert: Callable[[Tell, str, Path], dict[str, Any]],
+    convert: Callable[..., dict[str, Any]],
     check: Callable[[str, Path], object],
     workers: Workers,
     quiet: bool,
 ) -> list[dict[str, Any]]:
-    """`convert_each` by workers, each of which converts one video at a time; `check` raises at once, here, for what
-    need not be tried."""
+    """`convert_each` by workers, each of which converts one video at a time.
+
+    convert  a task: takes `Tell`, and `video` and `directory` by name
+    check    raises at once, here, for what need not be tried
+    """
     from vid2ev.cluster.task import Task
     from vid2ev.commands.live import shared_out
 
@@ -101,16 +103,16 @@ def convert_shared(
         else:
             tasks.append(Task(video, partial(convert, video=video, directory=directory)))
     with shared_out(tasks, workers, "clips", quiet) as (outcomes, live):
-        for name, made, error in outcomes:
-            results[name] = result = _done(made) if error is None else _failed(error)
+        for name, made, wrong in outcomes:
+            results[name] = result = _done(made) if wrong is None else _failed(wrong)
             events = result.get("events")
-            if error and not isinstance(error, Vid2evError):
-                traceback.print_exception(error)
+            if wrong and not isinstance(wrong, Vid2evError):
+                traceback.print_exception(wrong)
             if live:
-                said = f"{events or 0:,} events" if error is None else f"error: {error}"
-                live.end(name, bool(error), events, f"{name} -> {directories[name]}: {said}")
-            elif error:
-                click.echo(f"error: {error}", err=True)
+                said = f"{events or 0:,} events" if wrong is None else f"error: {wrong}"
+                live.end(name, bool(wrong), events, f"{name} -> {directories[name]}: {said}")
+            elif wrong:
+                click.echo(f"error: {wrong}", err=True)
     return [{"video": video, "directory": str(directories[video])} | results[video] for video in directories]
 
 

@@ -23,7 +23,7 @@ from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.sleep import Sleep
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sensors.tiles import Tiles
+from vid2ev.sensors.tiles import WHOLE, Part, Tiles
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import NOT_TOLD, Still, strip_count, told_of
@@ -50,6 +50,7 @@ class Dvs:
               they are refused, because linear light was not promised
     skip      let strips of pixels sleep in which nothing can happen; changes nothing but the time it takes
               (`vid2ev.kernels.sleep`)
+    part      pixels, in blocks of 2048, that are simulated; the others send nothing, and these what they always do
 
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
@@ -67,12 +68,13 @@ class Dvs:
         labels: bool = False,
         transfer: str | None = None,
         skip: bool = True,
+        part: Part = WHOLE,
     ):
         check_sensor(size, seed, camera, threads)
         width, height = size
         self.size, self.labels, self.transfer, self._skip = (width, height), labels, transfer, skip
         self._intake = Intake(self.size, transfer)
-        self._tiles = Tiles(-(-width * height // BLOCK), threads)
+        self._tiles = Tiles(-(-width * height // BLOCK), threads, part)
         self._work = [new_work() for _ in range(self._tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
         self._be(spec, seed, camera)

@@ -6,20 +6,35 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 R = TypeVar("R")
+
+
+class Part(NamedTuple):
+    """Part `number`, from 0, of `count` into which the blocks of a sensor are cut; they are equal but for one block."""
+
+    number: int = 0
+    count: int = 1
+
+    def within(self, blocks: int) -> tuple[int, int]:
+        """The first of its blocks, and the one after its last."""
+        return blocks * self.number // self.count, blocks * (self.number + 1) // self.count
+
+
+WHOLE = Part()
 
 
 class Tiles:
     """`count` runs of consecutive blocks: at most one for each of `threads`, the first of which is the caller's own.
 
-    How the blocks are cut changes nothing but the time it takes.
+    How the blocks are cut changes nothing but the time it takes.  Of a `part`, its blocks are all there are.
     """
 
-    def __init__(self, blocks: int, threads: int):
-        self.count = min(threads, blocks)
-        self._cuts = [blocks * k // self.count for k in range(self.count + 1)]
+    def __init__(self, blocks: int, threads: int, part: Part = WHOLE):
+        first, last = part.within(blocks)
+        self.count = min(threads, last - first)
+        self._cuts = [first + (last - first) * k // self.count for k in range(self.count + 1)]
         self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
 
     def each(self, work: Callable[[int], R]) -> list[R]:

@@ -1,0 +1,133 @@
+"""Events that were made before, each part of the pixels by itself: what a recording is put together from.
+
+The noise of a pixel depends on no other, so the events of a part are those of the whole at its pixels; and all are
+ordered by (t, y, x), so there is one way to put them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vid2ev.formats import read_events
+from vid2ev.mounts import Mount
+from vid2ev.recipe import Recipe
+from vid2ev.recording.manifest import read_manifest
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+BLOCK = 1 << 18  # events of a part that are read at a time
+
+
+@dataclass(frozen=True)
+class Made:
+    """The recordings of all parts, in folders of their own."""
+
+    folders: tuple[Path, ...]
+
+    def sensor(self, mount: Mount, labels: bool) -> Dvs:
+        """What sends the events of a camera; to a track it is the camera."""
+        return Replayed(mount, [folder / mount.within for folder in self.folders], labels)  # type: ignore[return-value]
+
+    def seen(self, recipe: Recipe) -> Recipe:
+        """The recipe for the frames that the recording still needs: those of the source."""
+        return recipe if recipe.source.dense else replace(recipe, upsample="none", subframes="auto")
+
+    @property
+    def subframes(self) -> tuple[int, int]:
+        """How many there were, and how many intervals were limited."""
+        manifest = read_manifest(self.folders[0])
+        counts = next(iter(manifest.get("results", {"": manifest}).values()))["counts"]
+        return counts["subframes"], counts["limited_intervals"]
+
+
+class Replayed:
+    """The sensor of a mount whose events were made before: what a track asks of a `Dvs`, but for what is inside."""
+
+    at_once = 1
+    slept = (0, 0)
+
+    def __init__(self, mount: Mount, folders: Sequence[Path], labels: bool):
+        assert isinstance(mount.sensor.spec, DvsSpec)
+        self.size, self.spec, self.labels = mount.size, mount.sensor.spec, labels
+        self._mount, self._folders = mount, folders
+        self._parts = [_Stream(folder) for folder in folders]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """See `Dvs.counts`."""
+        of_parts = [read_manifest(folder)["counts"] for folder in self._folders]
+        names = ("on", "off", "swallowed", "capped", "not_finite")
+        return {name: sum(counts[name] for counts in of_parts) for name in names}
+
+    def step(self, light: Any, t_ns: int) -> Events:
+        """The first frame, in which a sensor settles."""
+        return Events.empty(self.labels)
+
+    def see_all(self, frames: Sequence[Frame]) -> list[Events]:
+        """The events up to each frame."""
+        return [self._until(frame.t_ns // 1000) for frame in frames]
+
+    def flush(self) -> Events:
+        """What is left."""
+        return self._until(np.iinfo(np.int64).max)
+
+    def maps(self) -> dict[str, np.ndarray]:
+        """See `Dvs.maps`."""
+        return self._mount.dvs(self.labels).maps()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """How many events of each part are sent."""
+        return {"sent": np.array([part.sent for part in self._parts], np.int64)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state."""
+        self._parts = [_Stream(folder, int(sent)) for folder, sent in zip(self._folders, state["sent"], strict=True)]
+
+    def _until(self, last_us: int) -> Events:
+        events = Events.concatenate(part.until(last_us) for part in self._parts)
+        if not len(events):
+            return Events.empty(self.labels)
+        return events.select(np.lexsort((events.x, events.y, events.t)))  # (which keeps the order within a pixel)
+
+
+class _Stream:
+    """The events of one part, in their order; the first `sent` are left out."""
+
+    def __init__(self, folder: Path, sent: int = 0):
+        self.sent = 0
+        self._blocks: Iterator[Events] = read_events(folder, block=BLOCK)
+        self._held = Events.empty()
+        while self.sent < sent:
+            self._fill()
+            self._take(min(len(self._held), sent - self.sent))
+
+    def until(self, last_us: int) -> Events:
+        """Those up to an instant."""
+        taken = []
+        while self._fill():
+            due = int(np.searchsorted(self._held.t, last_us, side="right"))
+            taken.append(self._take(due))
+            if len(self._held):
+                break
+        return Events.concatenate(taken)
+
+    def _fill(self) -> bool:
+        """Whether there are events, after reading some if need be."""
+        while not len(self._held):
+            block = next(self._blocks, None)
+            if block is None:
+                return False
+            self._held = block
+        return True
+
+    def _take(self, count: int) -> Events:
+        taken, self._held = self._held.stretch(0, count), self._held.stretch(count, len(self._held))
+        self.sent += count
+        return taken
