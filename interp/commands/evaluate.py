@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from vid2ev.commands.source_options import source_options
+from vid2ev.commands.worker_options import worker_options
 
 GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {remaining} left{postfix}"
 
@@ -63,6 +64,7 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
     help="Also films, sheets of methods by moments and maps of errors, of the first gaps: REPORT/figures.",
 )  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run was; networks may be added.")
+@worker_options("Sequences")
 @click.option("--device", default="cpu", show_default=True, metavar="DEVICE", help="Of networks: cpu or cuda.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
@@ -96,8 +98,10 @@ def evaluate(
     from interp.evaluate.simulated import Simulated
     from interp.methods import METHODS
     from vid2ev.commands.progress import counting, heard
+    from vid2ev.commands.worker_options import workers_of
     from vid2ev.sources import OPTIONS
 
+    workers = workers_of(options)
     edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}
     folder = Path(output or f"{_name(datasets[0])}_eval")
     with kept(folder), heard() as check, counting(quiet or as_json, GROUPS) as shown:
@@ -113,6 +117,7 @@ def evaluate(
             protocol=Protocol(skip, insert or skip, times, rounding),
             simulated=Simulated.of(sensor, overrides, seed, **edits),
             report=report,
+            workers=workers,
             **options,
         )
     if as_json:

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import json
+import sys
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from interp.commands.making import bar, contrast_of, kept
+from vid2ev.commands.worker_options import worker_options
+
+if TYPE_CHECKING:
+    from interp.interpolate.take import Options
+    from vid2ev.cluster.task import Tell
+    from vid2ev.cluster.workers import Workers
 
 FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elapsed} gone, {remaining} left"
 
 
 @click.command(short_help="Make the high-frame-rate video of a recording or a video.")
-@click.argument("source")
+@click.argument("sources", nargs=-1, required=True, metavar="SOURCE...")
 @click.option(
     "-x", "multiple", metavar="N", help="So many times the frames: 32, 2.5.  [default: 8, unless there is --fps]"
 )
@@ -29,7 +37,9 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     "--hdr", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
     help="Of `vid2ev train --network hdr`: gives all frames, key frames too, the range that events show.",
 )  # fmt: skip
-@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_x8.mp4 here]")
+@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR",
+    help="What to make; of several sources the folder for all.  [default: NAME_x8.mp4 here]",
+)  # fmt: skip
 @click.option(
     "--format", type=click.Choice(["mp4", "png", "exr"]),
     help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
@@ -60,22 +70,26 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
     help="Where; auto: on a GPU, if there is one.",
 )  # fmt: skip
+@worker_options("Sources")
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
 @click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
-    """Make the frames of SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or BS-ERGB,
-    an event file with frames, a video, or a folder of images; also a single frame with its events (--events, or
-    NAME.mat beside NAME.png).
+def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
+    """Make the frames of each SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or
+    BS-ERGB, an event file with frames, a video, or a folder of images; also a single frame with its events (--events,
+    or NAME.mat beside NAME.png); or all that is in a folder, or in a list of them, NAME.txt.
 
     Frames of the source stay as they are, and nothing is interpolated across a cut.  Instants are whole microseconds on
     an exact grid.  A folder has timestamps.txt, so that `vid2ev convert` reads it again.
     """
+    from interp.commands.many import places, sources_in
     from interp.interpolate.take import Options
-    from interp.interpolate.whole import interpolate as make
+    from vid2ev.commands import batch
+    from vid2ev.commands.worker_options import workers_of
 
     quiet |= as_json
+    workers = workers_of(options)
     taken = Options(
         start_s=options.pop("start"),
         stop_s=options.pop("stop"),
@@ -86,16 +100,66 @@ def interpolate(source: str, output: Path | None, as_json: bool, quiet: bool, **
         contrast=contrast_of(options.pop("contrast")),
         events=options.pop("events"),
     )
-    path = output or _default(source, options)
+    found = [each for source in sources for each in sources_in(source)]
+    single = found == [*sources] and len(found) == 1
+    if single and workers.scheduler is None:
+        made = _one(found[0], output or _default(found[0], options), quiet, taken, options)
+        if as_json:
+            click.echo(json.dumps(made, indent=2))
+        return
+    if output and single:
+        paths = {found[0]: output}
+    else:
+        paths = places(found, output or Path(), lambda source: _default(source, options))
+
+    def one(source: str, path: Path) -> dict[str, Any]:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return _one(source, path, quiet, taken, options)
+
+    shared = partial(_shared, paths, workers, quiet, taken, options)
+    results = batch.convert_each(paths, one, quiet) if workers.alone else shared()
+    if not quiet or as_json:
+        click.echo(json.dumps(results, indent=2) if as_json else batch.table(results))
+    sys.exit(batch.exit_code(results))
+
+
+def _one(source: str, path: Path, quiet: bool, taken: Options, options: dict[str, Any]) -> dict[str, Any]:
+    """Interpolate a source; returns the manifest."""
+    from interp.interpolate.whole import interpolate as make
+    from vid2ev.commands import summary
+
     tell = None if quiet else lambda text: click.echo(f"by {text}")
     with kept(path), bar(quiet, FRAMES, " frames") as report:
         made = make(source, path, options=taken, report=report, told=tell, **options)
-    if as_json:
-        click.echo(json.dumps(made, indent=2))
-    elif not quiet:
-        from vid2ev.commands import summary
-
+    if not quiet:
         click.echo(summary.lines(_facts(path, made)))
+    return made
+
+
+def _shared(
+    paths: dict[str, Path], workers: Workers, quiet: bool, taken: Options, options: dict[str, Any]
+) -> list[dict[str, Any]]:
+    """Interpolate sources by workers."""
+    from interp.interpolate.shelf import check_free, kind_of
+    from vid2ev.commands import batch
+
+    def check(_: str, path: Path) -> None:
+        check_free(path, kind_of(path, options["format"]), options["overwrite"], options["resume"])
+
+    # (What was checked is free, so that going on is beginning, and a task that is tried again goes on.)
+    goes_on = options | {"resume": options["resume"] or not options["overwrite"]}
+    return batch.convert_shared(paths, partial(_on_worker, taken=taken, options=goes_on), check, workers, quiet)
+
+
+def _on_worker(tell: Tell, video: str, directory: Path, taken: Options, options: dict[str, Any]) -> dict[str, Any]:
+    """Interpolate a source, as a task; returns the manifest."""
+    from interp.interpolate.whole import interpolate as make
+
+    def report(done: int, total: int | None) -> None:
+        tell({"share": done / total} if total else {})
+
+    directory.parent.mkdir(parents=True, exist_ok=True)
+    return make(video, directory, options=taken, report=report, **options)
 
 
 def _default(source: str, options: dict[str, Any]) -> Path:

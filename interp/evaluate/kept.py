@@ -27,39 +27,11 @@ KEPT = "kept"
 ABOUT = "about.json"
 
 
-class Kept:
-    """The folder of an evaluation, as a context: no other process writes it meanwhile.
+class KeptRows:
+    """The rows in the folder of an evaluation; one process at a time writes those of a sequence."""
 
-    job       what decides all numbers, ready for JSON
-    methods   what decides those of each method, by their names; others may be added later
-    Raises UsageError where the folder is taken, or was begun with something else, DataError where it cannot be written.
-    """
-
-    def __init__(self, folder: Path, job: Mapping[str, Any], methods: Mapping[str, Any], resume: bool):
+    def __init__(self, folder: Path):
         self.folder = folder
-        wanted = json.loads(json.dumps({**job, "methods": methods}))
-        there = (folder / JOB).exists()
-        if folder.exists() and not there and any(folder.iterdir()):
-            raise UsageError(f"{folder} holds something else; choose another folder with -o")
-        if there and not resume:
-            raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")
-        before = read_job(folder) if there else wanted
-        known = before["methods"]
-        shared = {name: of for name, of in wanted["methods"].items() if name in known}
-        begun, asked = (before | {"methods": {name: known[name] for name in shared}}, wanted | {"methods": shared})
-        if changed := difference(begun, asked):
-            raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
-        with writing(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            self._handle = lock(folder)
-            with whole_file(folder / JOB) as file:
-                file.write(_line(wanted | {"methods": known | wanted["methods"]}))
-
-    def __enter__(self) -> Kept:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self._handle)
 
     def rows(self, sequence: str, method: str) -> dict[int, list[Row]]:
         """The rows of each group that is done; what was written in part is cut off.  Raises DataError."""
@@ -100,6 +72,41 @@ class Kept:
 
     def _path(self, sequence: str, method: str) -> Path:
         return self.folder / KEPT / sequence / f"{method}.jsonl"
+
+
+class Kept(KeptRows):
+    """The folder of an evaluation, as a context: no other process writes it meanwhile.
+
+    job       what decides all numbers, ready for JSON
+    methods   what decides those of each method, by their names; others may be added later
+    Raises UsageError where the folder is taken, or was begun with something else, DataError where it cannot be written.
+    """
+
+    def __init__(self, folder: Path, job: Mapping[str, Any], methods: Mapping[str, Any], resume: bool):
+        super().__init__(folder)
+        wanted = json.loads(json.dumps({**job, "methods": methods}))
+        there = (folder / JOB).exists()
+        if folder.exists() and not there and any(folder.iterdir()):
+            raise UsageError(f"{folder} holds something else; choose another folder with -o")
+        if there and not resume:
+            raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")
+        before = read_job(folder) if there else wanted
+        known = before["methods"]
+        shared = {name: of for name, of in wanted["methods"].items() if name in known}
+        begun, asked = (before | {"methods": {name: known[name] for name in shared}}, wanted | {"methods": shared})
+        if changed := difference(begun, asked):
+            raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            self._handle = lock(folder)
+            with whole_file(folder / JOB) as file:
+                file.write(_line(wanted | {"methods": known | wanted["methods"]}))
+
+    def __enter__(self) -> Kept:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._handle)
 
 
 def read_job(folder: Path) -> dict[str, Any]:

@@ -12,12 +12,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from interp.evaluate.figures.of_evaluation import write_figures
 from interp.evaluate.group import Footage, Group
-from interp.evaluate.kept import Kept
+from interp.evaluate.kept import Kept, KeptRows
 from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import Rebuilder, methods_of
@@ -28,13 +29,17 @@ from interp.evaluate.scoring import conditions_of, rows_of
 from interp.evaluate.sets import Found, footage_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
-from interp.evaluate.worst import WorstPictures
+from interp.evaluate.worst import WorstPictures, prune
 from interp.methods import METHODS
+from vid2ev.cluster.task import Task, Tell
+from vid2ev.cluster.work import outcomes
+from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.manifest import versions
 
 SUMMARY = "summary.json"
+ALONE = Workers()
 Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
 
 
@@ -60,6 +65,7 @@ def evaluate(
     device: str = "cpu",
     report: Report | None = None,
     figures: bool = False,
+    workers: Workers = ALONE,
 ) -> Evaluation:
     """Score methods on data sets, into a folder.
 
@@ -71,6 +77,7 @@ def evaluate(
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
     figures       films and sheets of the first gaps, too (`figures/of_evaluation.py`)
+    workers       who score a sequence each; they change nothing but the time it takes
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
@@ -85,10 +92,16 @@ def evaluate(
         "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},
     }  # fmt: skip
     with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:
-        rows, about = _scored(found.footage, methods, len(protocol.positions), kept, report)
+        frames = len(protocol.positions)
+        if not workers.alone:
+            _share_out(found.footage, methods, frames, kept, workers, report)
+            report = None
+        rows, about = _scored(found.footage, methods, frames, kept, report)
         if not rows:
             reasons = [*found.unusable.values(), *(f"{name}: {of['not_scored']}" for name, of in about.items())]
             raise DataError(f"no frame could be scored: {'; '.join(reasons[:3])}")
+        for method in methods:
+            prune(folder, method.name, rows)
         summary = _summary(job, found, methods, rows, about)
         with writing(folder):
             write_rows(folder / ROWS, rows)
@@ -108,8 +121,39 @@ def _check(methods: Sequence[Rebuilder]) -> None:
         raise UsageError(f"two methods are called '{twice}': expected names that differ; rename a file or folder")
 
 
+def _share_out(
+    footage: Sequence[Footage],
+    methods: Sequence[Rebuilder],
+    frames: int,
+    kept: Kept,
+    workers: Workers,
+    report: Report | None,
+) -> None:
+    """Have workers score the sequences that are not done, each by itself.  Raises what one of them ends with, when the
+    others are done."""
+    names = {method.name for method in methods}
+    left = [each for each in footage if names - set((kept.about(each.name) or {"missing": {}})["missing"])]
+    done, total = dict[str, int](), sum(each.expected for each in left)
+    rows = KeptRows(kept.folder)
+
+    def watch(name: str, facts: Mapping[str, Any]) -> None:
+        if report and "groups" in facts:
+            done[name] = facts["groups"]
+            report(min(sum(done.values()), total), total, name)
+
+    tasks = [Task(each.name, partial(_score_sequence, each, methods, frames, rows)) for each in left]
+    errors = [outcome.error for outcome in outcomes(tasks, workers, watch) if outcome.error]
+    if errors:
+        raise errors[0]
+
+
+def _score_sequence(each: Footage, methods: Sequence[Rebuilder], frames: int, kept: KeptRows, tell: Tell) -> None:
+    """Score a sequence, as a task."""
+    _scored([each], methods, frames, kept, lambda done, *_: tell({"groups": done}))
+
+
 def _scored(
-    footage: Sequence[Footage], methods: Sequence[Rebuilder], frames: int, kept: Kept, report: Report | None
+    footage: Sequence[Footage], methods: Sequence[Rebuilder], frames: int, kept: KeptRows, report: Report | None
 ) -> tuple[list[Row], dict[str, Any]]:
     """All rows, and what is known of each sequence; `frames` of a group are scored."""
     before = {(each.name, method.name): kept.rows(each.name, method.name) for each in footage for method in methods}
@@ -149,7 +193,7 @@ def _score_group(
     group: Group,
     methods: Sequence[Rebuilder],
     found: Mapping[str, dict[int, list[Row]]],
-    kept: Kept,
+    kept: KeptRows,
     worst: Mapping[str, WorstPictures],
 ) -> None:
     """Score a group, where that is not done yet."""

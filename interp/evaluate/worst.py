@@ -80,3 +80,11 @@ def remove(folder: Path, row: Row) -> None:
     """Remove the pictures of a row."""
     for name in names_of(row).values():
         (folder / name).unlink(missing_ok=True)
+
+
+def prune(folder: Path, method: str, rows: Iterable[Row]) -> None:
+    """Remove the pictures of a method that are not of its worst rows, as where each sequence kept its own."""
+    names = {name for row in worst_of(row for row in rows if row.method == method) for name in names_of(row).values()}
+    for path in (folder / FOLDER / method).glob("*.png"):
+        if path.relative_to(folder).as_posix() not in names:
+            path.unlink()

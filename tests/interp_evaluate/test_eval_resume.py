@@ -16,6 +16,7 @@ from interp.evaluate.run import evaluate
 from interp.networks import make
 from interp.weights import save
 from vid2ev import DataError, UsageError
+from vid2ev.cluster.workers import Workers
 
 BASELINES = ("linear", "bridge")
 
@@ -72,6 +73,15 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
     evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
     assert contents(tmp_path / "report") == whole
     assert len(rebuilt) == 3 * (9 - stop)  # nothing is scored twice
+
+
+def test_workers_change_no_byte(data: Path, whole: dict[str, bytes], tmp_path: Path) -> None:
+    told: list[int] = []
+    two = Workers(jobs=2, retries=0)
+    evaluate(
+        datasets(data), tmp_path / "report", workers=two, report=lambda done, *_: told.append(done), **options(data)
+    )
+    assert contents(tmp_path / "report") == whole and told == sorted(told)
 
 
 def test_a_finished_evaluation_is_left_as_it_is(

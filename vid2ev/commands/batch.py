@@ -109,7 +109,7 @@ def convert_shared(
             if wrong and not isinstance(wrong, Vid2evError):
                 traceback.print_exception(wrong)
             if live:
-                said = f"{events or 0:,} events" if wrong is None else f"error: {wrong}"
+                said = "error: " * bool(wrong) + _told(result)
                 live.end(name, bool(wrong), events, f"{name} -> {directories[name]}: {said}")
             elif wrong:
                 click.echo(f"error: {wrong}", err=True)
@@ -128,15 +128,22 @@ def table(results: list[dict[str, Any]]) -> str:
     width = max(len(result["video"]) for result in results)
     lines = [""]
     for result in results:
-        events = "" if result.get("events") is None else f"{result['events']:,} events"
-        lines.append(f"{result['state']:<7} {result['video']:<{width}}  {result.get('error', events)}".rstrip())
+        lines.append(f"{result['state']:<7} {result['video']:<{width}}  {_told(result)}".rstrip())
     lines.append(f"{len(results) - failed} of {len(results)} {verb}" + f", {failed} failed" * (failed > 0))
     return "\n".join(lines)
 
 
 def _done(made: dict[str, Any]) -> dict[str, Any]:
+    if "frames" in made:  # (of a film)
+        return {"state": "done", "frames": made["frames"]}
     events = _events(made)
     return {"state": "planned" if events is None else "done", "events": events}
+
+
+def _told(result: dict[str, Any]) -> str:
+    """What came of a video: its events, its frames, or the error."""
+    counts = [f"{result[what]:,} {what}" for what in ("events", "frames") if result.get(what) is not None]
+    return result.get("error", "".join(counts))
 
 
 def _failed(error: Exception) -> dict[str, Any]:

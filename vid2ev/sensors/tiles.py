@@ -12,14 +12,14 @@ R = TypeVar("R")
 
 
 class Part(NamedTuple):
-    """Part `number`, from 0, of `count` into which the blocks of a sensor are cut; they are equal but for one block."""
+    """Part `number`, from 0, of the `parts` into which the blocks of a sensor are cut, equal but for one block."""
 
     number: int = 0
-    count: int = 1
+    parts: int = 1
 
     def within(self, blocks: int) -> tuple[int, int]:
         """The first of its blocks, and the one after its last."""
-        return blocks * self.number // self.count, blocks * (self.number + 1) // self.count
+        return blocks * self.number // self.parts, blocks * (self.number + 1) // self.parts
 
 
 WHOLE = Part()

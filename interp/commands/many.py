@@ -1,0 +1,38 @@
+"""Many recordings and videos for `vid2ev interpolate`: found, and where their films go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+
+def sources_in(source: str) -> list[str]:
+    """What an argument stands for: itself, the recordings in a folder, its videos and folders of images, or what the
+    lines of a list NAME.txt stand for.  Raises UsageError, DataError."""
+    from interp.data.layouts import is_sequence, sequences_in
+    from vid2ev.commands import batch
+    from vid2ev.errors import UsageError
+
+    folder = Path(source)
+    if not folder.is_dir():
+        found = batch.sources_in(source)
+        return found if found == [source] else [each for line in found for each in sources_in(line)]
+    if is_sequence(folder):
+        return [source]
+    try:
+        recordings, unusable = sequences_in(folder)
+    except UsageError:
+        return batch.sources_in(source)
+    return [*map(str, recordings), *unusable]
+
+
+def places(sources: Sequence[str], folder: Path, named: Callable[[str], Path]) -> dict[str, Path]:
+    """Where the film of each source goes within a folder; of sources with one name, the second gets a number."""
+    found: dict[str, Path] = {}
+    for source in dict.fromkeys(sources):
+        name, number = named(source), 2
+        plain = name
+        while folder / name in found.values():
+            name, number = plain.with_stem(f"{plain.stem}_{number}"), number + 1
+        found[source] = folder / name
+    return found

@@ -1,0 +1,52 @@
+"""Many recordings and videos interpolated: found, in turn or shared out, to the same bytes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from small_takes import images, moving, recording
+
+from interp.commands.interpolate import interpolate
+from interp.commands.many import sources_in
+
+
+@pytest.fixture(autouse=True)
+def takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """recordings/: two of them, and one that is damaged; films/: two folders of images; list.txt names all."""
+    monkeypatch.chdir(tmp_path)
+    for k in range(2):
+        recording(Path(f"recordings/r{k}"), moving(3, seed=k))
+        images(Path(f"films/f{k}"), moving(3, seed=k))
+    Path("recordings/r2/images_corrected").mkdir(parents=True)
+    Path("recordings/r2/events_aligned").mkdir()
+    Path("list.txt").write_text("# all\nrecordings\nfilms\n")
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(interpolate, [*arguments, "-x", "2", "--method", "linear", "--format", "png"])
+
+
+def test_folders_and_lists_stand_for_what_is_in_them() -> None:
+    recordings, films = [f"recordings/r{k}" for k in range(3)], [f"films/f{k}" for k in range(2)]
+    assert sources_in("recordings") == recordings and sources_in("films") == films
+    assert sources_in("list.txt") == recordings + films
+    assert sources_in("recordings/r0") == ["recordings/r0"] and sources_in("films/f1") == ["films/f1"]
+
+
+def test_many_are_made_in_turn_or_shared_out_to_the_same_bytes() -> None:
+    result = run("list.txt", "-o", "one", "-q")
+    assert result.exit_code == 1 and "recordings/r2" in result.output
+    names = [f"{name}_x2" for name in ("r0", "r1", "f0", "f1")]
+    assert sorted(path.name for path in Path("one").iterdir()) == sorted(names)
+    result = run("list.txt", "-o", "two", "--jobs", "2", "--retries", "0", "--json")
+    found = json.loads(result.stdout)
+    assert result.exit_code == 1 and [each["state"] for each in found].count("done") == 4
+    assert {each["frames"] for each in found if each["state"] == "done"} == {5}
+    for path in Path("one").rglob("*.png"):
+        assert path.read_bytes() == (Path("two") / path.relative_to("one")).read_bytes(), path
+    assert run("films", "-o", "two").exit_code == 2
+    result = run("films", "-o", "two", "--resume")
+    assert result.exit_code == 0 and "2 of 2 done" in result.output and "5 frames" in result.output
