@@ -23,6 +23,8 @@ from matplotlib.figure import Figure
 from vid2ev import Dvs, DvsSpec, Events, Frame, load_sensor
 from vid2ev.physics.log_curve import curve_of, log_level
 from vid2ev.pictures.colours import GROUND, OFF, ON
+from vid2ev.sensors.course import Course as PixelCourse
+from vid2ev.sensors.course import course_of as course_of_pixel
 
 FRAMES_MS = np.arange(8) * 5.0
 LIGHT = np.array([0.2, 0.2, 0.62, 0.95, 0.9, 0.35, 0.17, 0.17])
@@ -56,13 +58,13 @@ def course_of(settings: Sequence[str] = ()) -> Course:
     spec = load_sensor("ideal", [*PIXEL, *settings])
     t_ms = np.arange(FRAMES_MS[0], FRAMES_MS[-1] + STEP_MS / 2, STEP_MS)
     light = np.interp(t_ms, FRAMES_MS, LIGHT)
-    inside = states(spec, t_ms, light)
+    inside = inside_of(spec, t_ms, light)
     curve = curve_of(spec.log_curve, spec.dark_level)
     return Course(
         t_ms,
         np.array([log_level(value, curve) for value in light]),
-        *(inside[:, k] for k in (0, 2, 3)),
-        states(spec, FRAMES_MS, LIGHT)[:, 0],
+        *(inside.filtered, inside.level_on, inside.level_off),
+        inside_of(spec, FRAMES_MS, LIGHT).filtered,
         sent=events(spec),
         crossings=events(spec.model_copy(update={"refractory_us": NO_REFRACTORY_US})),
         linear=events(spec.model_copy(update={"timing": "linear"})),
@@ -82,13 +84,9 @@ def events(spec: DvsSpec) -> Events:
     return Events.concatenate(list(Dvs(spec, (1, 1)).run(frames(FRAMES_MS, LIGHT))))
 
 
-def states(spec: DvsSpec, t_ms: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Filtered, signal, level_on and level_off [N, 4, nat] of the pixel after each frame."""
-    dvs, found = Dvs(spec, (1, 1)), []
-    for frame in frames(t_ms, light):
-        dvs.see(frame)
-        found.append(np.concatenate(dvs.inside(np.array([0]))))
-    return np.array(found)
+def inside_of(spec: DvsSpec, t_ms: np.ndarray, light: np.ndarray) -> PixelCourse:
+    """What the pixel has inside after each frame."""
+    return course_of_pixel(Dvs(spec, (1, 1)), frames(t_ms, light))
 
 
 def drawn(course: Course, refractory_ms: float) -> Figure:

@@ -61,8 +61,9 @@ FLOORS = {
     "split": 14,
     "cost": 14,
     "": 15,  # vid2ev/__init__.py: the public names
-    "commands": 16,
-    "__main__": 17,
+    "gui": 16,
+    "commands": 17,
+    "__main__": 18,
 }
 # Those of interp, which stands beside vid2ev and uses it, never the other way round.
 CLIENT_FLOORS = {

@@ -1,0 +1,178 @@
+"""Where the values of a page's panels are: a camera's sensor, a camera of the rig, a part of the scene, the options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from typing import Any
+
+from vid2ev.errors import UsageError
+from vid2ev.gui.controls import Control, controls_of
+from vid2ev.gui.scene_edit import PLACE, Thing, thing_named, value_of, with_value
+from vid2ev.gui.session import Session
+from vid2ev.gui.setup import Setup
+from vid2ev.rig.camera import Camera, Source
+from vid2ev.sensors.presets import Kind, load
+
+BARE = ("name", "kind", "sensor", "set", "rotation")  # of a camera: elsewhere on the page, or another way to say it
+
+
+class _Board:
+    def __init__(self, session: Session):
+        self.session = session
+
+    def origin(self, key: str) -> str:
+        """Nothing is known."""
+        return ""
+
+    def seen(self, key: str) -> Iterable[Any]:
+        """The base alone."""
+        return [self.base(key)]
+
+    def base(self, key: str) -> Any:
+        """What a reset brings back."""
+        raise NotImplementedError
+
+    def _change(self, make: Callable[[], Setup]) -> None:
+        if why := self.session.change(make):
+            raise UsageError(why)
+
+
+class SensorBoard(_Board):
+    """The sensor of a camera of the rig."""
+
+    def __init__(self, session: Session, camera: int):
+        super().__init__(session)
+        self.camera = camera
+
+    @property
+    def controls(self) -> tuple[Control, ...]:
+        """One for each value of its specification."""
+        return controls_of(self.session.setup.kind(self.camera).spec)
+
+    def value(self, key: str) -> Any:
+        """The value in use."""
+        return getattr(self.session.setup.spec(self.camera), key)
+
+    def base(self, key: str) -> Any:
+        """That of the preset."""
+        return getattr(self.session.setup.base(self.camera), key)
+
+    def origin(self, key: str) -> str:
+        """What the preset says of it."""
+        setup = self.session.setup
+        said = setup.sensor(self.camera).sources.get(key)
+        return f"{setup.preset(self.camera)}: {said}" if said else "default"
+
+    def seen(self, key: str) -> Iterable[Any]:
+        """The value of the preset, or if that is 0 those of all presets."""
+        known = [getattr(spec, key) for spec in _presets(self.session.setup.kind(self.camera))]
+        return [self.base(key)] if self.base(key) else known
+
+    def put(self, key: str, value: Any) -> None:
+        """Use a value."""
+        self._change(lambda: self.session.setup.with_sensor_value(self.camera, key, value))
+
+
+class CameraBoard(_Board):
+    """A camera of the rig; `None` for that which took the video."""
+
+    def __init__(self, session: Session, camera: int | None):
+        super().__init__(session)
+        self.camera = camera
+
+    @property
+    def controls(self) -> tuple[Control, ...]:
+        """One for each value that is not elsewhere on the page."""
+        return controls_of(Source if self.camera is None else Camera, without=BARE)
+
+    def value(self, key: str) -> Any:
+        """The value in use."""
+        rig = self.session.setup.rig
+        return getattr(rig.source if self.camera is None else rig.cameras[self.camera], key)
+
+    def base(self, key: str) -> Any:
+        """The default."""
+        return Camera.model_fields[key].default
+
+    def put(self, key: str, value: Any) -> None:
+        """Use a value."""
+        setup = self.session.setup
+        values = {key: value}
+        if key == "focal_px" and value is None:
+            values["centre_px"] = None
+        if self.camera is None:
+            self._change(lambda: setup.with_video_camera(values))
+        else:
+            self._change(lambda: setup.with_camera_values(self.camera or 0, values))
+
+
+class SceneBoard(_Board):
+    """A part of the scene, by its name."""
+
+    def __init__(self, session: Session, name: str):
+        super().__init__(session)
+        self.name = name
+
+    @property
+    def thing(self) -> Thing:
+        """The part as it is."""
+        return thing_named(self.session.setup.settled(), self.name)
+
+    @property
+    def controls(self) -> tuple[Control, ...]:
+        """Its place, and one for each of its values."""
+        thing = self.thing
+        place = ()
+        if thing.has_place:
+            from vid2ev.scenes.trajectory import Fixed
+
+            place = tuple(each for each in controls_of(Fixed) if each.key in PLACE)
+        return (*place, *controls_of(thing.model, without=("name", "rig")))
+
+    def value(self, key: str) -> Any:
+        """The value in use."""
+        return value_of(self.session.setup.settled(), self.name, key)
+
+    def base(self, key: str) -> Any:
+        """As the scene's file has it."""
+        return value_of(self.session.setup.with_scene(None).settled(), self.name, key)
+
+    def put(self, key: str, value: Any) -> None:
+        """Use a value."""
+        setup = self.session.setup
+        self._change(lambda: setup.with_scene(with_value(setup.settled(), self.name, key, value)))
+
+
+class OptionBoard(_Board):
+    """Options of the conversion."""
+
+    controls = tuple(Control(key, kind, "", *rest, optional=True) for key, kind, *rest in (
+        ("seed", "whole", "", "another seed is another camera of the same kind", None, 0),
+        ("depth", "word", "", "how far a video's scene is: plane:2.5, a map or a folder of maps"),
+        ("start", "number", "s", "begin at this second of the source's own clock"),
+        ("stop", "number", "s", "end there"),
+        ("slowdown", "number", "", "the footage plays so many times slower than the world went"),
+        ("fps", "number", "1/s", "frames per second, in place of the source's own times"),
+        ("crop", "word", "", "part of the picture: 640x480+0+60"),
+        ("size", "word", "", "pixels to bring it to: 346x260"),
+        ("upsample", "word", "", "light between frames: none, linear, flow or net"),
+        ("motion", "word", "", "of a camera over a photograph: pan, saccade, zoom"),
+    ))  # type: ignore[misc]  # fmt: skip
+
+    def value(self, key: str) -> Any:
+        """The value in use, None where it is left out."""
+        return self.session.setup.options.get(key)
+
+    def base(self, key: str) -> Any:
+        """Left out."""
+        return None
+
+    def put(self, key: str, value: Any) -> None:
+        """Use a value."""
+        self._change(lambda: self.session.setup.with_option(key, value))
+
+
+@lru_cache(maxsize=4)
+def _presets(kind: Kind) -> tuple[Any, ...]:
+    return tuple(load(kind, name) for name in kind.names())

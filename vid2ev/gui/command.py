@@ -1,0 +1,109 @@
+"""A setup as the command that does the same, as the options of `conversion.convert`, and as files.
+
+Cameras that stand where the source's own rig has them, or where there is none the video's, need no rig file: what is
+changed of their sensors is said by --sensor, --cis and --set.  Otherwise all of it is in a rig file, and a scene that
+was changed in a scene file; the command then names those.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vid2ev.gui.setup import PRESET, Setup, texts_of
+from vid2ev.rig.camera import Camera, Rig, default_rig
+from vid2ev.rig.rig_file import rig_text, write_text
+from vid2ev.toml_text import toml_text
+
+RIG, SCENE = "rig.toml", "scene.toml"
+FLAGS = {"seed", "depth", "start", "stop", "size", "crop", "slowdown", "fps", "transfer", "motion", "upsample"}
+
+
+@dataclass(frozen=True)
+class Command:
+    """`vid2ev convert` of a setup.
+
+    arguments  those after `vid2ev convert`
+    files      text of the files that they name, by name
+    """
+
+    arguments: tuple[str, ...]
+    files: Mapping[str, str]
+
+    def __str__(self) -> str:
+        return shlex.join(["vid2ev", "convert", *self.arguments])
+
+    def write(self, folder: Path, overwrite: bool = False) -> None:
+        """Write the files that the command names.  Raises UsageError where one is in the way, DataError where the disk
+        cannot take it."""
+        for name, text in self.files.items():
+            write_text(folder / name, text, overwrite)
+
+
+def command_of(setup: Setup, output: str | None = None) -> Command:
+    """The command of a setup, whose recording goes to `output`."""
+    files = {} if setup.scene is None else {SCENE: scene_text(setup)}
+    words = [SCENE if setup.scene is not None else setup.source]
+    if is_plain(setup):
+        words += _sensor_words(setup)
+    else:
+        files[RIG] = rig_text(setup.rig)
+        words += ["--rig", RIG]
+    for name, value in setup.options.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    return Command((*words, *(["-o", output] if output else [])), files)
+
+
+def options_of(setup: Setup, folder: Path) -> dict[str, Any]:
+    """The arguments of `conversion.convert` that mean a setup; files that they need are written to a folder."""
+    chosen: dict[str, Any] = {"video": setup.source} | dict(setup.options)
+    if setup.scene is not None:
+        chosen["video"] = str(folder / SCENE)
+        write_text(folder / SCENE, scene_text(setup), overwrite=True)
+    if not is_plain(setup):
+        return chosen | {"rig": setup.rig}
+    events, frames = _two(setup)
+    chosen |= {"sensor": events.sensor or PRESET, "overrides": texts_of(events.set)}
+    if frames is not None:
+        chosen |= {"cis": frames.sensor or PRESET}
+        chosen["overrides"] = [*chosen["overrides"], *texts_of(frames.set, "cis.")]
+    return chosen
+
+
+def is_plain(setup: Setup) -> bool:
+    """Whether options say all that there is to say of the cameras: an event camera in the place of the source's, and
+    perhaps a frame camera there."""
+    bare = tuple(each.model_copy(update={"sensor": None, "set": {}}) for each in setup.rig.cameras)
+    return any(Rig(source=setup.rig.source, cameras=bare) == default_rig(frames) for frames in (False, True)) and (
+        setup.own_rig or not setup.is_scene
+    )
+
+
+def sensor_text(setup: Setup, camera: int) -> str:
+    """The file of a camera's sensor, as --sensor and --cis take it, with every value in it."""
+    kind, spec, preset = setup.kind(camera), setup.spec(camera), setup.preset(camera)
+    changed = ", ".join(setup.rig.cameras[camera].set)
+    title = f"{preset}, with other {changed}" if changed else preset
+    return toml_text({"about": {"title": title}, kind.table: spec.model_dump(mode="json")})
+
+
+def scene_text(setup: Setup) -> str:
+    """The file of a scene, with every number settled."""
+    return toml_text(setup.settled().tables())
+
+
+def _sensor_words(setup: Setup) -> list[str]:
+    events, frames = _two(setup)
+    words = [] if events.sensor is None else ["--sensor", events.sensor]
+    if frames is not None:
+        words += ["--frames"] if frames.sensor is None else ["--cis", frames.sensor]
+    texts = [*texts_of(events.set), *texts_of(frames.set if frames else {}, "cis.")]
+    return words + [word for text in texts for word in ("--set", text)]
+
+
+def _two(setup: Setup) -> tuple[Camera, Camera | None]:
+    events, *frames = setup.rig.cameras
+    return events, frames[0] if frames else None

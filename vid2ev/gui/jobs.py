@@ -1,0 +1,103 @@
+"""Long work of a page, each in a process of its own, with progress; it can be cancelled, and ends with the page.
+
+A task is a function of `tell` and its arguments.  It calls `tell(done, of, text)` now and then, which raises
+`Cancelled` when nobody wants the work any more; what it returns is the result.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+from vid2ev.errors import Vid2evError
+
+GRACE_S = 3.0  # until work that does not hear is ended
+
+
+class Cancelled(Exception):
+    """Nobody wants the work any more."""
+
+
+class Progress(NamedTuple):
+    """How far: `done` of `of` (None if there is no telling), and a few words."""
+
+    done: float
+    of: float | None
+    text: str = ""
+
+
+class Done(NamedTuple):
+    """The end: what came out, or why not, in a sentence."""
+
+    result: Any = None
+    why_not: str | None = None
+
+
+Tell = Callable[[float, float | None, str], None]
+
+
+class Job:
+    """A task at work."""
+
+    def __init__(self, task: Callable[..., Any], **arguments: Any):
+        context = multiprocessing.get_context("spawn")
+        self._cancelled: Any = context.Event()
+        self._pipe, theirs = context.Pipe(duplex=False)
+        self._process = context.Process(target=_work, args=(task, theirs, self._cancelled, arguments), daemon=True)
+        self._process.start()
+        theirs.close()
+        self.ended = False
+
+    def news(self) -> Iterator[Progress | Done]:
+        """What has come since the last call; the last of all is Done."""
+        try:
+            while not self.ended and self._pipe.poll():
+                said = self._pipe.recv()
+                self.ended = isinstance(said, Done)
+                yield said
+        except (EOFError, OSError):
+            self.ended = True
+            yield Done(why_not="cancelled" if self._cancelled.is_set() else "the work's process has ended")
+
+    def cancel(self) -> None:
+        """Ask the task to end; it says when it has."""
+        self._cancelled.set()
+
+    def close(self) -> None:
+        """End the task, now if it does not hear."""
+        self.cancel()
+        self._process.join(timeout=GRACE_S)
+        if self._process.is_alive():
+            self._process.kill()
+        self.ended = True
+        self._pipe.close()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process is there."""
+        return self._process.is_alive()
+
+
+def _work(task: Callable[..., Any], pipe: Connection, cancelled: Any, arguments: dict[str, Any]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def tell(done: float, of: float | None, text: str = "") -> None:
+        if cancelled.is_set() or not multiprocessing.parent_process().is_alive():  # type: ignore[union-attr]
+            raise Cancelled
+        pipe.send(Progress(done, of, text))
+
+    try:
+        outcome = Done(task(tell, **arguments))
+    except Cancelled:
+        outcome = Done(why_not="cancelled")
+    except Vid2evError as error:
+        outcome = Done(why_not=str(error))
+    except Exception as error:  # what a page shows, whatever it was
+        outcome = Done(why_not=f"{type(error).__name__}: {error}")
+    try:
+        pipe.send(outcome)
+    except OSError:
+        return

@@ -1,0 +1,226 @@
+"""The light of a short part of a setup's source, as each of its cameras sees it, small enough to be looked at at once.
+
+A preview begins at an instant and takes as long as the slowest exposure asks for.  Cameras and source have at most
+`side` pixels along a side.  Of a scene the reference camera is made smaller, and it is rendered at even intervals, as
+densely as motion asks for there (`scenes.instants.rate_hz`), `MOST` times at most; of a video, what lies between its
+frames is made as for a conversion.  The light is kept as long as nothing changes that decides it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from vid2ev.errors import UsageError
+from vid2ev.gui.setup import Setup
+from vid2ev.instants import Instant, instants
+from vid2ev.mounts import Loaded, Mount, mounts_of
+from vid2ev.recipe import Recipe
+from vid2ev.rig.camera import ResolvedRig, Rig
+from vid2ev.scenes.instants import rate_hz
+from vid2ev.scenes.scene import Scene
+from vid2ev.scenes.source import SceneSource
+from vid2ev.scenes.world import World
+from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sources import open_source
+from vid2ev.sources.cut import Cut
+from vid2ev.sources.source import Source
+
+SIDE = 346  # px
+MOST = 48  # pictures of a scene
+LONGEST_S = 0.25
+MARGIN = 1.02
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """What the cameras see.
+
+    recipe     of the preview: its mounts are the cameras, made smaller
+    instants   the first at the beginning
+    sizes      of the cameras as they are converted [px]
+    notes      what a person should know of it, one sentence each
+    """
+
+    recipe: Recipe
+    instants: tuple[Instant, ...]
+    sizes: tuple[tuple[int, int], ...]
+    notes: tuple[str, ...]
+
+    def with_sensors(self, setup: Setup) -> Light:
+        """The same light before the sensors of another setup."""
+        sensors = sensors_of(setup)
+        mounts = [replace(mount, sensor=sensor) for mount, sensor in zip(self.recipe.mounts, sensors, strict=True)]
+        return replace(self, recipe=replace(self.recipe, mounts=tuple(mounts)))
+
+
+class LightTable:
+    """The light of the setup that was last asked for; `check` is called now and then while it is made."""
+
+    def __init__(self, check: Callable[[], None] = lambda: None):
+        self._check = check
+        self._key: Any = None
+        self._light: Light | None = None
+
+    def light(self, setup: Setup, start_s: float, length_s: float, side: int = SIDE) -> Light:
+        """From an instant [s] on, on the recording's clock, at least so long.  Raises UsageError, DataError."""
+        length_s = _lasting(setup, length_s)
+        key = (_without_sensors(setup), tuple(each.colour for each in sensors_of(setup)), start_s, length_s, side)
+        if not setup.is_scene:
+            key = (*key, _threshold(setup))  # (by which light between frames is made)
+        if self._light is None or key != self._key:
+            self._light = self._made(setup, start_s, length_s, side)
+            self._key = key
+        return self._light.with_sensors(setup)
+
+    def _made(self, setup: Setup, start_s: float, length_s: float, side: int) -> Light:
+        make = _of_scene if setup.is_scene else _of_video
+        recipe, sizes, notes = make(setup, start_s, length_s, side)
+        seen = []
+        with closing(instants(recipe)) as coming:
+            for instant in coming:
+                self._check()
+                seen.append(instant)
+        for size in dict.fromkeys(sizes):
+            these = [mount for mount, own in zip(recipe.mounts, sizes, strict=True) if own == size != mount.size]
+            if these:
+                names, (width, height) = ", ".join(mount.name for mount in these), these[0].size
+                notes.append(f"{names} shown with {width}x{height} of {size[0]}x{size[1]} pixels")
+        return Light(recipe, tuple(seen), tuple(sizes), tuple(notes))
+
+
+def duration_s(setup: Setup) -> float | None:
+    """How long a setup's source lasts, on the recording's clock; None if there is no telling.  Raises UsageError,
+    DataError."""
+    return setup.settled().scene.duration_s if setup.is_scene else _opened(setup).duration_expected_s
+
+
+def sensors_of(setup: Setup) -> list[Loaded]:
+    """The sensor of each camera."""
+    return [Loaded(setup.preset(k), setup.spec(k)) for k in range(len(setup.rig.cameras))]
+
+
+def smaller(size: tuple[int, int], side: int) -> tuple[int, int]:
+    """A size of the same shape with at most `side` pixels along each side."""
+    share = min(1.0, side / max(size))
+    return max(1, round(size[0] * share)), max(1, round(size[1] * share))
+
+
+def _lasting(setup: Setup, length_s: float) -> float:
+    """As long as asked, or as the slowest exposure takes."""
+    for camera, sensor in zip(setup.rig.cameras, sensors_of(setup), strict=True):
+        if isinstance(sensor.spec, CisSpec):
+            height = (camera.size or (0, 480))[1]
+            length_s = max(length_s, MARGIN * 1e-6 * sensor.spec.window_us(height))
+    return min(length_s, LONGEST_S)
+
+
+def _of_scene(
+    setup: Setup, start_s: float, length_s: float, side: int
+) -> tuple[Recipe, list[tuple[int, int]], list[str]]:
+    scene, sensors, notes = setup.settled(), sensors_of(setup), list[str]()
+    world = _world(scene, side)
+    whole = setup.rig.resolved(scene.camera.size, scene.camera.intrinsics)
+    rig = _smaller_rig(whole, world.intrinsics, side)
+    begin_s = min(max(start_s, 0.0), max(scene.scene.duration_s - length_s, 0.0))
+    end_s = min(begin_s + length_s, scene.scene.duration_s)
+    finer = max(view.intrinsics.focal_px[0] for view in rig.viewpoints) / world.intrinsics.focal_px[0]
+    asked = max(rate_hz(world, round(1e9 * t_s), max(finer, 1.0)) for t_s in (begin_s, (begin_s + end_s) / 2, end_s))
+    fps = min(max(asked, 2 / (end_s - begin_s)), MOST / (end_s - begin_s))
+    if asked > fps * 1.01:
+        notes.append(f"the scene is rendered {fps:.0f} times a second here, where motion and light ask for {asked:.0f}")
+    colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
+    source: Any = Cut(SceneSource(world, "scene", fps=fps, colour=colour), begin_s, end_s)
+    mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
+    return Recipe("scene", source, rig, mounts, upsample="none"), _sizes(whole), notes
+
+
+def _of_video(
+    setup: Setup, start_s: float, length_s: float, side: int
+) -> tuple[Recipe, list[tuple[int, int]], list[str]]:
+    source, options = _opened(setup), dict(setup.options)
+    slower = float(options.get("slowdown") or 1)
+    interval_s = _interval_s(source)
+    lasting_s = source.duration_expected_s or length_s
+    whole = setup.rig.resolved(source.size)
+    rig = _smaller_rig(whole, whole.source.scaled_to(smaller(source.size, side)), side).settled()
+    begin_s = min(start_s, max(lasting_s - length_s, 0.0))
+    cut = options.get("start") or 0.0
+    width, height = smaller(source.size, side)
+    stretched = "" if "size" in options and not str(options["size"]).endswith("!") else "!"
+    options |= {
+        "start": cut + slower * max(begin_s - interval_s, 0.0),
+        "stop": cut + slower * (begin_s + max(length_s, 1.5 * interval_s)),
+        "size": f"{width}x{height}{stretched}",
+    }
+    if source.size == (width, height) and "size" not in setup.options:
+        options.pop("size")
+    recipe = Recipe.of(setup.source, rig=rig, **options)
+    return replace(recipe, mounts=_with_sensors(recipe.mounts, setup)), _sizes(whole), []
+
+
+def _with_sensors(mounts: tuple[Mount, ...], setup: Setup) -> tuple[Mount, ...]:
+    return tuple(replace(mount, sensor=sensor) for mount, sensor in zip(mounts, sensors_of(setup), strict=True))
+
+
+def _smaller_rig(rig: ResolvedRig, source: Any, side: int) -> ResolvedRig:
+    views = [
+        replace(view, intrinsics=view.intrinsics.scaled_to(smaller(view.intrinsics.size, side)))
+        for view in rig.viewpoints
+    ]
+    return ResolvedRig(source, rig.source_assumed, tuple(views))
+
+
+def _sizes(rig: ResolvedRig) -> list[tuple[int, int]]:
+    return [view.intrinsics.size for view in rig.viewpoints]
+
+
+def _interval_s(source: Source) -> float:
+    frames, seconds = source.frames_expected, source.duration_expected_s
+    return seconds / (frames - 1) if frames and frames > 1 and seconds else 1 / 30
+
+
+def _seed(setup: Setup) -> int:
+    return int(setup.options.get("seed", 0))
+
+
+def _threshold(setup: Setup) -> float:
+    specs = [sensor.spec for sensor in sensors_of(setup)]
+    return min(
+        (min(each.threshold_on, each.threshold_off) for each in specs if not isinstance(each, CisSpec)), default=0
+    )
+
+
+def _without_sensors(setup: Setup) -> Any:
+    """What of a setup decides the light, comparable."""
+    bare = tuple(camera.model_copy(update={"sensor": None, "set": {}}) for camera in setup.rig.cameras)
+    scene = setup.settled() if setup.is_scene else None
+    return setup.source, Rig(source=setup.rig.source, cameras=bare), scene, tuple(setup.options.items())
+
+
+def _opened(setup: Setup) -> Source:
+    known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
+    options = tuple((name, setup.options[name]) for name in known if name in setup.options)
+    source = _source(setup.source, options)
+    if not source.rewindable:
+        raise UsageError(f"{setup.source} passes once and cannot be looked at here and there; give a file")
+    return source
+
+
+@lru_cache(maxsize=4)
+def _source(path: str, options: tuple[tuple[str, Any], ...]) -> Source:
+    return open_source(path, **dict(options))
+
+
+@lru_cache(maxsize=2)
+def _world(scene: Scene, side: int) -> World:
+    lens = scene.camera.intrinsics.scaled_to(smaller(scene.camera.size, side))
+    changes: dict[str, Any] = {"size": lens.size}
+    if scene.camera.focal_px is not None:
+        changes["focal_px"] = lens.focal_px
+    if scene.camera.centre_px is not None:
+        changes["centre_px"] = lens.centre_px
+    return World(scene.model_copy(update={"camera": scene.camera.model_copy(update=changes), "scene": scene.scene}))

@@ -1,0 +1,38 @@
+"""Files that a person opens: those of rigs, sensors and scenes, told apart by their tables."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+from vid2ev.errors import DataError
+from vid2ev.gui.setup import Setup
+from vid2ev.rig.rig_file import read_rig, write_text
+from vid2ev.scenes.scene_file import read_scene
+from vid2ev.sensors.presets import CIS, DVS, load
+
+
+def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
+    """The setup with what a file says: its rig, the sensor of all cameras of its kind, or its scene.
+
+    The text is kept in `folder` while it is read.  Raises UsageError, DataError.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name} is not valid TOML: {error}; correct that line") from error
+    path = folder / Path(name).name
+    write_text(path, text, overwrite=True)
+    if isinstance(tables.get("camera"), list):
+        return replace(setup, rig=read_rig(path), own_rig=False)
+    kinds = [kind for kind in (DVS, CIS) if kind.table in tables]
+    for kind in kinds:
+        spec = load(kind, path)
+        for number, camera in enumerate(setup.rig.cameras):
+            if camera.kind == kind.table:
+                setup = setup.with_spec(number, spec)
+    if kinds:
+        return setup
+    scene = read_scene(path).resolved()
+    return setup.with_scene(scene) if setup.is_scene else replace(setup, source="scene:room", scene=scene)

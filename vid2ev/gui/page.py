@@ -1,0 +1,76 @@
+"""The page: sources and controls on the left, what the cameras send on the right, and below it what that means."""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+
+from nicegui import ui
+
+from vid2ev.errors import UsageError
+from vid2ev.gui.pictures import Pictures
+from vid2ev.gui.result import Results
+from vid2ev.gui.session import Session
+from vid2ev.gui.settings import Settings
+from vid2ev.gui.setup import Setup
+from vid2ev.gui.theme import ACCENT, CSS
+
+TICK_S = 0.05
+
+
+def draw(setup: Setup) -> Session:
+    """Draw the page of a new session, whose work ends when the page is closed."""
+    session = Session(setup)
+    ui.add_css(CSS)
+    ui.colors(primary=ACCENT)
+    dark = ui.dark_mode(value=None)
+    with ui.element("div").classes("v-top"):
+        ui.label("vid2ev").classes("v-brand")
+        source = ui.label(setup.source).classes("v-source")
+        files = ui.row().classes("gap-2")
+        ui.button(icon="contrast", on_click=lambda: dark.set_value(not dark.value)).props("flat dense round").tooltip(
+            "light or dark"
+        )
+    with ui.element("div").classes("v-main"):
+        with ui.element("div").classes("v-card v-side"):
+            settings = Settings(session)
+        with ui.element("div").classes("v-right"):
+            with ui.element("div").classes("v-card"):
+                Pictures(session)
+            with ui.element("div").classes("v-card"):
+                results = Results(session, settings.select)
+    with files:
+        results.record.buttons()
+
+    def show(changed: Setup) -> None:
+        source.text = changed.source + (", changed" if changed.scene is not None else "")
+        settings.show()
+
+    session.on("setup", show)
+    ui.timer(TICK_S, session.tick)
+    ui.context.client.on_delete(session.close)
+    return session
+
+
+def serve(setup: Setup, host: str, port: int, show: bool) -> None:
+    """Serve the page until the program is interrupted; each page that is opened begins with this setup."""
+    from nicegui import app
+
+    from vid2ev.gui.guard import Guard
+
+    @ui.page("/", title="vid2ev")
+    def page() -> None:
+        draw(setup)
+
+    app.add_middleware(Guard, host=host)
+    where: dict[str, Any] = {"host": host, "port": port, "show": show}
+    ui.run(title="vid2ev", reload=False, show_welcome_message=False, reconnect_timeout=5, **where)
+
+
+def free_port(host: str, port: int) -> int:
+    """The port, or for 0 one that is free.  Raises UsageError for one that is taken, and for a host that is not."""
+    try:
+        with socket.create_server((host, port)) as taken:
+            return taken.getsockname()[1]
+    except OSError as error:
+        raise UsageError(f"{host}:{port} cannot be served ({error.strerror}); give another --port, or 0") from error

@@ -1,0 +1,107 @@
+"""What the cameras send at the instant that is looked at: pictures, the line of time, the pixel that is followed."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+from nicegui import ui
+
+from vid2ev.gui.preview import VIEWS, Answer
+from vid2ev.gui.session import Session
+
+WINDOWS_MS = {"5 ms": 0.005, "10 ms": 0.01, "30 ms": 0.03, "100 ms": 0.1}
+STEP_S = 0.001  # of the line of time
+
+
+class Pictures:
+    """The pictures of a session."""
+
+    def __init__(self, session: Session):
+        self._session = session
+        self._cards: list[tuple[Any, Any, Any]] = []
+        self._showing = False
+        with ui.element("div").classes("v-line"):
+            ui.toggle([*VIEWS], value="polarity", on_change=lambda e: session.look(view=e.value)).props(
+                "dense flat no-caps"
+            ).mark("view")
+            ui.space()
+            ui.toggle(
+                [*WINDOWS_MS], value="30 ms", on_change=lambda e: session.look(length_s=WINDOWS_MS[e.value])
+            ).props("dense flat no-caps").tooltip("how long events are gathered; longer where an exposure takes longer")
+        self._grid = ui.element("div").classes("v-pictures mt-3")
+        with ui.element("div").classes("v-line mt-2").style("flex-wrap: nowrap"):
+            self._play = ui.button(icon="play_arrow", on_click=self._played).props("flat round dense").mark("play")
+            self._time = ui.slider(min=0, max=1, step=STEP_S, value=0, on_change=self._scrubbed).props(
+                'data-key="time"'
+            )
+            self._said = ui.label("0.000 s").classes("v-muted").style("min-width: 110px; text-align: right")
+        self._status = ui.label().classes("v-muted v-status")
+        session.on("answer", self.show)
+        session.on("status", self._told)
+        self._playing = False
+
+    def show(self, answer: Answer) -> None:
+        """Show a preview, and while it plays ask for the next."""
+        if [card[0].props["data-camera"] for card in self._cards] != [shown.name for shown in answer.cameras]:
+            self._make(answer)
+        for (image, caption, _), shown in zip(self._cards, answer.cameras, strict=True):
+            image.set_source(f"data:image/png;base64,{base64.b64encode(shown.picture).decode()}")
+            caption.text = shown.caption
+        self._marked()
+        self._showing = True
+        lasting_s = answer.duration_s or answer.span_s[1]
+        self._time.props(f"max={max(lasting_s, STEP_S):.3f}")
+        self._time.props["max"] = max(lasting_s, STEP_S)
+        self._time.value = self._session.request.start_s
+        self._said.text = f"{self._session.request.start_s:.3f} of {lasting_s:.3g} s"
+        self._showing = False
+        if self._playing and answer.number == self._session.request.number:
+            later_s = self._session.request.start_s + self._session.request.length_s
+            self._session.look(start_s=0.0 if later_s >= lasting_s else round(later_s, 3))
+
+    def _make(self, answer: Answer) -> None:
+        self._grid.clear()
+        self._cards = []
+        with self._grid:
+            for number, shown in enumerate(answer.cameras):
+                with ui.element("div").classes("v-camera"):
+                    with ui.element("div").classes("v-line"):
+                        ui.label(shown.name).classes("text-sm font-medium")
+                        caption = ui.label().classes("v-muted")
+                    image = ui.interactive_image(on_mouse=lambda e, k=number: self._clicked(k, e), cross=False)
+                    image.props(f'data-camera="{shown.name}"').classes("mt-1")
+                    self._cards.append((image, caption, shown.kind))
+
+    def _clicked(self, camera: int, event: Any) -> None:
+        if self._cards[camera][2] == "dvs":
+            self._session.look(pixel=(camera, int(event.image_x), int(event.image_y)))
+            self._marked()
+
+    def _marked(self) -> None:
+        pixel = self._session.request.pixel
+        for number, (image, *_) in enumerate(self._cards):
+            here = pixel is not None and pixel[0] == number
+            image.content = _cross(pixel[1], pixel[2]) if here and pixel else ""
+
+    def _scrubbed(self, event: Any) -> None:
+        if not self._showing:
+            self._session.look(start_s=round(float(event.value), 3))
+            self._said.text = f"{event.value:.3f} s"
+
+    def _played(self) -> None:
+        self._playing = not self._playing
+        self._play.props(f"icon={'pause' if self._playing else 'play_arrow'}")
+        if self._playing:
+            self._session.look()
+
+    def _told(self, status: str) -> None:
+        self._status.text = status
+
+
+def _cross(x: int, y: int) -> str:
+    """A mark around a pixel, in the picture's own coordinates."""
+    return (
+        f'<circle cx="{x + 0.5}" cy="{y + 0.5}" r="5" fill="none" stroke="white" stroke-width="1.4"/>'
+        f'<circle cx="{x + 0.5}" cy="{y + 0.5}" r="5" fill="none" stroke="black" stroke-width="0.5"/>'
+    )

@@ -1,0 +1,173 @@
+"""A preview: what each camera of a setup sends within a short time, as pictures and numbers.
+
+Its sensors begin when the preview begins, so that what an event camera remembers of the time before is left out.  All
+else is as in a conversion: the same light, sensors, seeds and views.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vid2ev.compare.statistics import Gathering, Statistics
+from vid2ev.gui.light import SIDE, Light, LightTable, duration_s
+from vid2ev.gui.setup import Setup
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.mounts import Mount
+from vid2ev.plan.plan import TOLERANCE, Plan
+from vid2ev.plan.recordings import Look
+from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.course import Course, course_of
+from vid2ev.sensors.tiles import usable_cores
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+from vid2ev.views.requests import parse_representation
+
+VIEWS = {"polarity": "counts", "event frame": "frame:2", "time surface": "time-surface:10ms", "light": "light"}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be shown: from `start_s` on, for `length_s` or as long as an exposure takes.
+
+    view    one of `VIEWS`
+    pixel   the number of a camera and x, y, whose course is asked for, as pixels of the picture
+    number  by which the answer is known
+    """
+
+    setup: Setup
+    start_s: float = 0.0
+    length_s: float = 0.03
+    view: str = "polarity"
+    pixel: tuple[int, int, int] | None = None
+    number: int = 0
+    side: int = SIDE
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What one camera sends: `picture` is a PNG; `statistics` are those of events, None of frame cameras."""
+
+    name: str
+    kind: str
+    size: tuple[int, int]
+    picture: bytes
+    caption: str
+    statistics: Statistics | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A preview; `course` is that of the pixel, `duration_s` how long the whole source lasts."""
+
+    number: int
+    span_s: tuple[float, float]
+    duration_s: float | None
+    cameras: tuple[Shown, ...]
+    course: Course | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plans:
+    """The plans of the preview's cameras, by name, for the light of the preview."""
+
+    number: int
+    plans: dict[str, Plan] = field(default_factory=dict)
+
+
+class Previewer:
+    """Makes previews; `check` is called now and then, and may raise."""
+
+    def __init__(self, check: Callable[[], None] = lambda: None):
+        self._check = check
+        self._table = LightTable(check)
+        self._threads = usable_cores()
+
+    def answer(self, request: Request) -> Answer:
+        """The preview that is asked for.  Raises UsageError, DataError."""
+        light = self._light(request)
+        notes = list(light.notes)
+        cameras = []
+        for number, mount in enumerate(light.recipe.mounts):
+            self._check()
+            frames = [instant.frames[number] for instant in light.instants]
+            make = self._events if mount.kind == "dvs" else self._frame
+            cameras.append(make(mount, frames, request, notes))
+        ends = light.instants[0].t_ns, light.instants[-1].t_ns
+        return Answer(
+            request.number,
+            (1e-9 * ends[0], 1e-9 * ends[1]),
+            duration_s(request.setup),
+            tuple(cameras),
+            self._course(light, request),
+            tuple(notes),
+        )
+
+    def plans(self, request: Request) -> Plans:
+        """What of its sensors the light of the preview calls for.  Raises UsageError, DataError."""
+        light = self._light(request)
+        look = Look(light.recipe, self._threads)
+        for instant in light.instants:
+            self._check()
+            look.see(instant)
+        return Plans(request.number, look.plans("auto", TOLERANCE))
+
+    def _light(self, request: Request) -> Light:
+        return self._table.light(request.setup, request.start_s, request.length_s, request.side)
+
+    def _events(self, mount: Mount, frames: list[Frame], request: Request, notes: list[str]) -> Shown:
+        dvs = mount.dvs(threads=self._threads)
+        events = Events.concatenate(list(dvs.run(frames)))
+        span_us = frames[0].t_ns // 1000, max(frames[-1].t_ns // 1000, int(events.t[-1]) if len(events) else 0)
+        gathering = Gathering(mount.size)
+        gathering.add(events)
+        found = gathering.statistics(span_us)
+        picture = _lit(frames[-1].light) if request.view == "light" else _drawn(events, mount, request.view, span_us)
+        caption = f"{len(events):,} events" + (
+            "" if found.rate_hz is None else f", {found.rate_hz:.3g} per pixel and s"
+        )
+        return Shown(mount.name, mount.kind, mount.size, _png(picture), caption, found)
+
+    def _frame(self, mount: Mount, frames: list[Frame], request: Request, notes: list[str]) -> Shown:
+        spec = mount.sensor.spec
+        assert isinstance(spec, CisSpec)
+        exposures = list(mount.cis(self._threads).run(frames))
+        caption = f"{spec.exposure_us / 1000:g} ms, {spec.frame_rate_hz:g} frames a second"
+        if not exposures:
+            notes.append(f"{mount.name} has no frame here: an exposure takes longer than the preview")
+            return Shown(
+                mount.name, mount.kind, mount.size, _png(_lit(frames[-1].light)), f"light; no frame of {caption}"
+            )
+        return Shown(mount.name, mount.kind, mount.size, _png(spec.picture_codes()[exposures[-1].codes]), caption)
+
+    def _course(self, light: Light, request: Request) -> Course | None:
+        if request.pixel is None or request.pixel[0] >= len(light.recipe.mounts):
+            return None
+        number, x, y = request.pixel
+        mount = light.recipe.mounts[number]
+        if mount.kind != "dvs" or x >= mount.size[0] or y >= mount.size[1]:
+            return None
+        frames = [instant.frames[number] for instant in light.instants]
+        return course_of(mount.dvs(threads=self._threads), frames, (x, y))
+
+
+def _drawn(events: Events, mount: Mount, view: str, span_us: tuple[int, int]) -> np.ndarray:
+    shown = parse_representation(VIEWS[view])(mount.size)
+    shown.add(events, *span_us)
+    return shown.picture(shown.take(span_us[1]))
+
+
+def _lit(light: Any) -> np.ndarray:
+    return srgb_codes(np.asarray(light))
+
+
+def _png(picture: np.ndarray) -> bytes:
+    """R'G'B' or gray uint8 as PNG."""
+    done, coded = cv2.imencode(".png", picture[..., ::-1] if picture.ndim == 3 else picture)
+    assert done
+    return coded.tobytes()

@@ -1,0 +1,162 @@
+"""The command of a setup, its files, and its conversion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from vid2ev.conversion import default_directory
+from vid2ev.errors import Vid2evError
+from vid2ev.gui.command import RIG, SCENE, command_of, scene_text, sensor_text
+from vid2ev.gui.jobs import Done, Job, Progress
+from vid2ev.gui.loading import loaded
+from vid2ev.gui.session import Session
+from vid2ev.gui.setup import Setup
+from vid2ev.gui.tasks import converted
+from vid2ev.rig.rig_file import rig_text, write_text
+
+
+class Record:
+    """Where a setup becomes a recording; `open_tab` brings it to the front."""
+
+    def __init__(self, session: Session, open_tab: Any):
+        self._session, self._open_tab = session, open_tab
+        self._job: Job | None = None
+        with ui.element("div").classes("v-line"):
+            ui.label("The command that does the same").classes("v-muted")
+            ui.space()
+            ui.button("Copy", icon="content_copy", on_click=self._copied).props("flat dense size=sm")
+        self._command = ui.label().classes("v-command").props('data-key="command"')
+        self._needs = ui.label().classes("v-muted")
+        with ui.element("div").classes("v-line mt-3"):
+            self._where = (
+                ui.input("Folder", on_change=lambda _: self.show()).props('dense data-key="output"').classes("grow")
+            )
+            self._over = ui.switch("replace").props("dense").tooltip("replace a recording that is there")
+            self._go = ui.button("Convert", on_click=self.convert).props("unelevated dense")
+            self._stop = ui.button("Cancel", on_click=self._cancelled).props("flat dense")
+        self._bar = ui.linear_progress(value=0, show_value=False).props("rounded size=6px").classes("mt-3")
+        self._said = ui.label().classes("v-muted").props('data-key="said"')
+        self._busy(False)
+        self._source = ""
+        session.on("setup", lambda _: self.show())
+        self.show()
+
+    def buttons(self) -> None:
+        """What stands at the top of the page: open and save files, convert."""
+        session = self._session
+        with ui.button("Load").props("flat dense").tooltip("a sensor, rig or scene file"), ui.menu():
+            ui.upload(on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file").props(
+                'accept=".toml" flat data-key="load"'
+            )
+        with ui.button("Save").props("flat dense data-key=save"), ui.menu():
+            for number, camera in enumerate(session.setup.rig.cameras):
+                ui.menu_item(
+                    f"sensor of {camera.name}",
+                    lambda k=number: self._save(f"{self._name(k)}.toml", lambda s, k=k: sensor_text(s, k)),
+                )
+            ui.menu_item("rig", lambda: self._save(RIG, lambda setup: rig_text(setup.rig)))
+            ui.menu_item("scene", lambda: self._save(SCENE, scene_text))
+        ui.button("Convert", on_click=self.convert).props('unelevated dense data-key="convert"')
+
+    def show(self) -> None:
+        """Show the command."""
+        setup = self._session.setup
+        if setup.source != self._source:
+            self._source = setup.source
+            self._where.value = str(default_directory(setup.source))
+        command = command_of(
+            setup, None if self._where.value == str(default_directory(setup.source)) else self._where.value
+        )
+        self._command.text = str(command)
+        names = " and ".join(command.files)
+        self._needs.set_visibility(bool(names))
+        self._needs.text = (
+            f"with {names} beside it: Save writes {'them' if len(command.files) > 1 else 'it'}" if names else ""
+        )
+
+    def convert(self) -> None:
+        """Begin the conversion."""
+        if self._job is not None:
+            return
+        self._open_tab()
+        self._said.text = "beginning"
+        self._bar.value = 0
+        self._busy(True)
+        self._job = self._session.start(
+            converted, self._heard, self._ended,
+            setup=self._session.setup, directory=self._where.value, overwrite=self._over.value,
+        )  # fmt: skip
+
+    def _heard(self, said: Progress) -> None:
+        self._bar.value = round(said.done / said.of, 3) if said.of else 0
+        self._said.text = said.text
+
+    def _ended(self, done: Done) -> None:
+        self._job = None
+        self._busy(False)
+        if done.why_not is not None:
+            self._said.text = done.why_not
+            return
+        results = done.result.get("results", {"": done.result})
+        parts = [f"{name} {_count(result)}".strip() for name, result in results.items()]
+        self._said.text = f"{Path(self._where.value).absolute()}: {', '.join(parts)}"
+        self._bar.value = 1
+
+    def _busy(self, busy: bool) -> None:
+        self._go.set_enabled(not busy)
+        self._stop.set_visibility(busy)
+        self._bar.set_visibility(busy)
+
+    def _cancelled(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+            self._said.text = "cancelling"
+
+    def _copied(self) -> None:
+        ui.clipboard.write(self._command.text)
+        ui.notify("copied", type="info", position="bottom-right")
+
+    async def _uploaded(self, event: Any) -> None:
+        text = await event.file.text()
+        if why := self._session.change(
+            lambda: loaded(self._session.setup, text, event.file.name, self._session.folder)
+        ):
+            ui.notify(why, type="negative", multi_line=True, timeout=0, close_button=True)
+
+    def _name(self, camera: int) -> str:
+        return f"{self._session.setup.rig.cameras[camera].name}_sensor"
+
+    def _save(self, name: str, text: Any) -> None:
+        setup = self._session.setup
+        if name == SCENE and not setup.is_scene:
+            ui.notify("a video has no scene to save", position="bottom-right")
+            return
+        self._ask_where(name, setup, text)
+
+    def _ask_where(self, name: str, setup: Setup, text: Any) -> None:
+        """Ask for the place, then write the file, or say why not."""
+
+        def write() -> None:
+            try:
+                write_text(Path(where.value), text(setup), over.value)
+            except Vid2evError as error:
+                why.text = str(error)
+                return
+            dialog.close()
+            ui.notify(f"{where.value} is written", position="bottom-right")
+
+        with ui.dialog(value=True) as dialog, ui.card().classes("v-card"):
+            where = ui.input("File", value=name).classes("w-80")
+            over = ui.switch("replace").props("dense")
+            why = ui.label().classes("v-error")
+            with ui.row():
+                ui.button("Save", on_click=write).props("unelevated dense")
+                ui.button("Cancel", on_click=dialog.close).props("flat dense")
+
+
+def _count(result: dict[str, Any]) -> str:
+    counts = result["counts"]
+    return f"{counts['events']:,} events" if "events" in counts else f"{counts.get('exposures', 0):,} frames"

@@ -1,0 +1,130 @@
+"""A session: one page's setup, what it looks at, and the work that goes on for it.  Nothing is shared between pages."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from vid2ev.errors import Vid2evError
+from vid2ev.gui.jobs import Done, Job, Progress
+from vid2ev.gui.preview import Answer, Plans, Request
+from vid2ev.gui.setup import Setup
+from vid2ev.gui.worker import Refused, Worker
+
+DEBOUNCE_S = 0.06  # without a change, before a preview is asked for
+SLOW_S = 1.5  # after which a page says that it waits
+
+Hear = Callable[[Any], None]
+
+
+class Session:
+    """What belongs to one page.  `change` and `look` say what a person does, `tick` is called often and says what came.
+
+    The last setup that could be meant is kept: a change that is refused changes nothing.
+    """
+
+    def __init__(self, setup: Setup):
+        self.request = Request(setup)
+        self.answer: Answer | None = None
+        self.plans: Plans | None = None
+        self.status = ""
+        self.folder = Path(tempfile.mkdtemp(prefix="vid2ev-gui-"))
+        self._worker: Worker | None = None
+        self._heard: dict[str, list[Hear]] = {"setup": [], "answer": [], "plans": [], "status": []}
+        self._changed_s: float | None = time.monotonic()
+        self._asked_s = 0.0
+        self._jobs: dict[Job, tuple[Hear, Hear]] = {}
+
+    @property
+    def setup(self) -> Setup:
+        """The last good setup."""
+        return self.request.setup
+
+    def on(self, what: str, hear: Hear) -> None:
+        """Call `hear` with each new setup, answer, plans or status."""
+        self._heard[what].append(hear)
+
+    def change(self, make: Callable[[], Setup]) -> str | None:
+        """Take up the setup that `make` makes; if that is refused, why."""
+        try:
+            setup = make()
+        except (Vid2evError, ValueError) as error:
+            return str(error)
+        if setup != self.setup:
+            self.look(setup=setup)
+            self._say("setup", setup)
+        return None
+
+    def look(self, **what: Any) -> None:
+        """Ask for another preview: other fields of the request."""
+        self.request = replace(self.request, number=self.request.number + 1, **what)
+        self._changed_s = time.monotonic()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a preview is on its way."""
+        return self._changed_s is not None or (self._worker is not None and self._worker.busy)
+
+    def tick(self) -> None:
+        """Send what was asked for, hand on what came."""
+        now_s = time.monotonic()
+        if self._changed_s is not None and now_s - self._changed_s >= DEBOUNCE_S:
+            self._changed_s, self._asked_s = None, now_s
+            if self._worker is None or not self._worker.alive:
+                self._worker = Worker()
+            self._worker.ask(self.request)
+        for reply in self._worker.replies() if self._worker else ():
+            self._take(reply)
+        if self._worker and self._worker.busy and self._asked_s and now_s - self._asked_s > SLOW_S:
+            self._tell("working; sensors with other effects are compiled once, which takes up to half a minute")
+        for job, (hear, end) in [*self._jobs.items()]:
+            for said in job.news():
+                (end if isinstance(said, Done) else hear)(said)
+                if isinstance(said, Done):
+                    del self._jobs[job]
+                    job.close()
+
+    def start(
+        self, task: Callable[..., Any], hear: Callable[[Progress], None], end: Callable[[Done], None], **arguments: Any
+    ) -> Job:
+        """Begin long work; `hear` is told of its progress, `end` of its end."""
+        job = Job(task, **arguments)
+        self._jobs[job] = (hear, end)
+        return job
+
+    def close(self) -> None:
+        """End all work."""
+        for job in self._jobs:
+            job.close()
+        self._jobs.clear()
+        if self._worker:
+            self._worker.close()
+            self._worker = None
+        for file in self.folder.glob("*"):
+            file.unlink(missing_ok=True)
+        self.folder.rmdir()
+
+    def _take(self, reply: Answer | Plans | Refused) -> None:
+        if isinstance(reply, Answer):
+            self.answer, self._asked_s = reply, 0.0
+            self._say("answer", reply)
+            self._tell("; ".join(reply.notes))
+        elif isinstance(reply, Plans):
+            self.plans = reply
+            self._say("plans", reply)
+        else:
+            self._asked_s = 0.0
+            self._tell(reply.why)
+
+    def _tell(self, status: str) -> None:
+        if status != self.status:
+            self.status = status
+            self._say("status", status)
+
+    def _say(self, what: str, value: Any) -> None:
+        for hear in self._heard[what]:
+            hear(value)

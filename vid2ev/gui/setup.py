@@ -1,0 +1,170 @@
+"""A setup: what a page is about to convert - a source, a rig of cameras with their sensors, perhaps a changed scene.
+
+A setup is frozen; what a person does makes another one, or is refused with one sentence.  Everything in it is what
+files and the command line say, so that a setup is a command and a command is a setup (`gui.command`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from vid2ev.errors import UsageError
+from vid2ev.rig.camera import Camera, Rig, Source, default_rig
+from vid2ev.rig.rig_file import complaint, read_rig
+from vid2ev.scenes.scene import Scene
+from vid2ev.scenes.scene_file import read_scene
+from vid2ev.scenes.source import Request, parse_request, rig_of_scene
+from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile, load, read_sensor
+from vid2ev.sources import SCENE_PREFIX, is_scene
+from vid2ev.toml_text import toml_value
+
+PRESET = "paper"  # of cameras that name no sensor
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is converted, and with what.
+
+    source    as on the command line: a video, or scene:NAME
+    rig       the cameras; each camera's sensor is a preset (or file) and what is changed of it
+    own_rig   whether `rig` is what the command line takes without --rig
+    scene     of scenes: what was made of it, every number settled; None where it is as its file says
+    options   other options of `convert` by name, such as seed, depth, start and stop
+    """
+
+    source: str
+    rig: Rig
+    own_rig: bool = True
+    scene: Scene | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_scene(self) -> bool:
+        """Whether the source is a scene."""
+        return is_scene(self.source)
+
+    @property
+    def request(self) -> Request:
+        """Of a scene: its name, seed and settings."""
+        return parse_request(self.source.removeprefix(SCENE_PREFIX))
+
+    def settled(self) -> Scene:
+        """The scene with every number settled: as it was changed, or else as its file says."""
+        return self.scene or _settled(self.request.name, tuple(self.request.settings), self.request.seed)
+
+    def sensor(self, camera: int) -> SensorFile:
+        """The preset, or file, of a camera's sensor, with the source of each of its numbers."""
+        return _read(self.preset(camera), self.kind(camera))
+
+    def kind(self, camera: int) -> Kind:
+        """Event sensor or frame sensor."""
+        return DVS if self.rig.cameras[camera].kind == "dvs" else CIS
+
+    def preset(self, camera: int) -> str:
+        """The name of a camera's sensor."""
+        return self.rig.cameras[camera].sensor or PRESET
+
+    def spec(self, camera: int) -> Any:
+        """The specification of a camera's sensor, `DvsSpec` or `CisSpec`."""
+        return spec_of(self.kind(camera), self.preset(camera), self.rig.cameras[camera].set)
+
+    def base(self, camera: int) -> Any:
+        """The specification that it has before anything is changed."""
+        return spec_of(self.kind(camera), self.preset(camera), {})
+
+    def with_sensor_value(self, camera: int, key: str, value: Any) -> Setup:
+        """A value of a camera's sensor.  Raises UsageError for one that cannot be."""
+        changes = {**self.rig.cameras[camera].set, key: _plain(value)}
+        changed = spec_of(self.kind(camera), self.preset(camera), changes)
+        base = self.base(camera)
+        kept = {
+            name: _plain(getattr(changed, name)) for name in changes if getattr(changed, name) != getattr(base, name)
+        }
+        return self.with_camera_values(camera, {"set": kept})
+
+    def with_preset(self, camera: int, name: str) -> Setup:
+        """Another sensor for a camera, as it comes.  Raises UsageError, DataError."""
+        spec_of(self.kind(camera), name, {})
+        return self.with_camera_values(camera, {"sensor": None if name == PRESET else name, "set": {}})
+
+    def with_spec(self, camera: int, spec: Any) -> Setup:
+        """A camera's sensor as a whole, said by what differs from its preset."""
+        base = self.base(camera)
+        changes = {key: _plain(value) for key, value in spec if value != getattr(base, key)}
+        return self.with_camera_values(camera, {"set": changes})
+
+    def with_camera_values(self, camera: int, values: Mapping[str, Any]) -> Setup:
+        """Values of a camera of the rig.  Raises UsageError for what cannot be."""
+        before = self.rig.cameras[camera]
+        table = {key: value for key, value in (before.model_dump() | values).items() if value is not None}
+        changed = _made(Camera, table, f"camera {before.name}")
+        cameras = tuple(changed if k == camera else each for k, each in enumerate(self.rig.cameras))
+        return self.with_rig(cameras, own="sensor" in values or "set" in values)
+
+    def with_video_camera(self, values: Mapping[str, Any]) -> Setup:
+        """Values of the camera that took the video.  Raises UsageError for what cannot be."""
+        table = {key: value for key, value in (self.rig.source.model_dump() | values).items() if value is not None}
+        return replace(self, rig=Rig(source=_made(Source, table, "[source]"), cameras=self.rig.cameras), own_rig=False)
+
+    def with_rig(self, cameras: tuple[Camera, ...], own: bool = False) -> Setup:
+        """Other cameras; `own` says that they stand where they stood.  Raises UsageError for what cannot be."""
+        try:
+            rig = Rig(source=self.rig.source, cameras=cameras)
+        except ValidationError as error:
+            raise UsageError(f"rig: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from error
+        return replace(self, rig=rig, own_rig=self.own_rig and own)
+
+    def with_scene(self, scene: Scene | None) -> Setup:
+        """Another scene in the place of the settled one; None for that of its file."""
+        return replace(self, scene=scene)
+
+    def with_option(self, name: str, value: Any) -> Setup:
+        """An option of `convert`; None takes it back."""
+        options = {key: kept for key, kept in self.options.items() if key != name}
+        return replace(self, options=options if value is None else options | {name: value})
+
+
+def setup_of(source: str, rig: str | None = None) -> Setup:
+    """The setup of a source, with the cameras of a rig file, or those that it has without one, with a frame camera
+    beside the event camera of the default.  Raises UsageError, DataError."""
+    if rig is not None:
+        return Setup(source, read_rig(rig), own_rig=False)
+    named = rig_of_scene(source.removeprefix(SCENE_PREFIX)) if is_scene(source) else None
+    return Setup(source, read_rig(named) if named else default_rig(frames=True))
+
+
+def texts_of(changes: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Changes as `key=value` texts."""
+    return [f"{prefix}{key}={toml_value(value)}" for key, value in changes.items()]
+
+
+def spec_of(kind: Kind, name: str, changes: Mapping[str, Any]) -> Any:
+    """The specification of a sensor and changes to it.  Raises UsageError, DataError."""
+    return load(kind, name, texts_of(changes))
+
+
+@lru_cache(maxsize=16)
+def _settled(name: str, settings: tuple[str, ...], seed: int) -> Scene:
+    return read_scene(name, settings).resolved(seed)
+
+
+@lru_cache(maxsize=32)
+def _read(name: str, kind: Kind) -> SensorFile:
+    return read_sensor(name, kind)
+
+
+def _made(model: type[BaseModel], table: Mapping[str, Any], where: str) -> Any:
+    try:
+        return model(**table)
+    except ValidationError as error:
+        raise UsageError(complaint(error, model, table, where)) from error
+
+
+def _plain(value: Any) -> Any:
+    """As TOML has it."""
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,84 @@
+"""What a page has done for it (`gui.jobs`): conversions, plans of whole clips, the cost of accuracy, statistics."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from vid2ev.gui.command import options_of
+from vid2ev.gui.jobs import Tell
+from vid2ev.gui.setup import Setup
+
+EVERY_S = 0.1  # a report, at most
+
+
+def converted(tell: Tell, setup: Setup, directory: str, overwrite: bool = False) -> dict[str, Any]:
+    """The manifest of the recording of a setup; cancelled work leaves what it would leave on the command line."""
+    from vid2ev.conversion import convert
+    from vid2ev.recipe import Recipe
+    from vid2ev.recorder import Progress
+
+    told_s = 0.0
+
+    def report(recipe: Recipe, done: Progress) -> None:
+        nonlocal told_s
+        if time.monotonic() - told_s > EVERY_S:
+            told_s = time.monotonic()
+            tell(done.frames, recipe.source.frames_expected, f"{done.frames} frames, {done.events:,} events")
+
+    tell(0, None, "opening the source")
+    with tempfile.TemporaryDirectory() as folder:
+        options = options_of(setup, Path(folder))
+        return convert(options.pop("video"), directory, overwrite=overwrite, report=report, **options)
+
+
+def planned(tell: Tell, setup: Setup) -> dict[str, Any]:
+    """The plan of each camera for the whole clip, by its name."""
+    from contextlib import closing
+
+    from vid2ev.instants import instants
+    from vid2ev.plan.plan import TOLERANCE
+    from vid2ev.plan.recordings import Look
+    from vid2ev.recipe import Recipe
+    from vid2ev.sensors.tiles import usable_cores
+
+    tell(0, None, "opening the source")
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = Recipe.of(**options_of(setup, Path(folder)))
+        look, seen = Look(recipe, usable_cores()), 0
+        with closing(instants(recipe)) as coming:
+            for instant in coming:
+                look.see(instant)
+                seen += instant.original
+                tell(seen, recipe.source.frames_expected, f"{seen} frames")
+    return look.plans("auto", TOLERANCE)
+
+
+def costed(tell: Tell, setup: Setup, repeats: int = 1, duration_s: float | None = None) -> dict[str, Any]:
+    """What `vid2ev cost` says of a setup, as its JSON has it."""
+    from vid2ev.cost.measure import measured
+
+    with tempfile.TemporaryDirectory() as folder:
+        options = options_of(setup, Path(folder))
+        found = measured(
+            options.pop("video"), given=[*setup.options], repeats=repeats, duration_s=duration_s,
+            report=lambda done, count, name="": tell(done, count, name), **options,
+        )  # fmt: skip
+    return found.describe()
+
+
+def gathered(tell: Tell, path: str) -> Any:
+    """The statistics of a recording or an event file."""
+    from vid2ev.compare.statistics import Gathering
+    from vid2ev.formats import open_events, survey
+
+    recording = survey(open_events(path))
+    gathering, seen = Gathering(recording.size), 0
+    for events in recording.blocks():
+        gathering.add(events)
+        seen += len(events)
+        tell(seen, recording.count, f"{seen:,} events")
+    start_us = recording.start_us
+    return gathering.statistics((start_us, start_us + recording.duration_us))

@@ -1,0 +1,44 @@
+"""The course of a pixel: what it saw, what it had inside, and what it sent, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
+
+
+class Course(NamedTuple):
+    """A pixel at N frames, and its events.
+
+    t_ns       int64 [N]
+    light      float64 [N]; 1 is white
+    filtered, signal, level_on, level_off   float64 [N, nat], as in `sensors.inside.Inside`, after each frame
+    events     those of the pixel
+    """
+
+    t_ns: np.ndarray
+    light: np.ndarray
+    filtered: np.ndarray
+    signal: np.ndarray
+    level_on: np.ndarray
+    level_off: np.ndarray
+    events: Events
+
+
+def course_of(dvs: Dvs, frames: Iterable[Frame], pixel: tuple[int, int] = (0, 0)) -> Course:
+    """The course of a pixel (x, y) of a sensor over frames of luminance, which the sensor sees as it does."""
+    x, y = pixel
+    place = np.array([y * dvs.size[0] + x], np.int64)
+    instants, rows, sent = [], [], []
+    for frame in frames:
+        events = dvs.see(frame)
+        sent.append(events.select((events.x == x) & (events.y == y)))
+        instants.append(frame.t_ns)
+        rows.append([float(frame.light[y, x]), *(float(column[0]) for column in dvs.inside(place))])
+    columns = np.array(rows, np.float64).reshape(-1, 5).T
+    return Course(np.array(instants, np.int64), *columns, Events.concatenate(sent))
