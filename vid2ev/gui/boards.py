@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.gui.controls import Control, controls_of
-from vid2ev.gui.scene_edit import PLACE, Thing, thing_named, value_of, with_value
+from vid2ev.gui.scene_edit import PLACE, Thing, thing_named, value_of, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.rig.camera import Camera, Source
@@ -18,8 +18,12 @@ BARE = ("name", "kind", "sensor", "set", "rotation")  # of a camera: elsewhere o
 
 
 class _Board:
+    """Values that are refused wait for others, with which they may be possible: a model of distortion, say, for its
+    coefficients."""
+
     def __init__(self, session: Session):
         self.session = session
+        self.waiting: dict[str, Any] = {}
 
     def origin(self, key: str) -> str:
         """Nothing is known."""
@@ -33,8 +37,19 @@ class _Board:
         """What a reset brings back."""
         raise NotImplementedError
 
-    def _change(self, make: Callable[[], Setup]) -> None:
-        if why := self.session.change(make):
+    def changed(self, values: Mapping[str, Any]) -> Setup:
+        """The setup with these values.  Raises UsageError for what cannot be."""
+        raise NotImplementedError
+
+    def put(self, key: str, value: Any) -> None:
+        """Use a value, alone or with those that wait.  Raises UsageError for what cannot be."""
+        self.waiting.pop(key, None)
+        waiting, self.waiting = self.waiting, {}
+        if waiting and self.session.change(lambda: self.changed(waiting | {key: value})) is None:
+            return
+        self.waiting = waiting
+        if why := self.session.change(lambda: self.changed({key: value})):
+            self.waiting[key] = value
             raise UsageError(why)
 
 
@@ -69,9 +84,9 @@ class SensorBoard(_Board):
         known = [getattr(spec, key) for spec in _presets(self.session.setup.kind(self.camera))]
         return [self.base(key)] if self.base(key) else known
 
-    def put(self, key: str, value: Any) -> None:
-        """Use a value."""
-        self._change(lambda: self.session.setup.with_sensor_value(self.camera, key, value))
+    def changed(self, values: Mapping[str, Any]) -> Setup:
+        """The setup with these values."""
+        return self.session.setup.with_sensor_values(self.camera, values)
 
 
 class CameraBoard(_Board):
@@ -95,16 +110,10 @@ class CameraBoard(_Board):
         """The default."""
         return Camera.model_fields[key].default
 
-    def put(self, key: str, value: Any) -> None:
-        """Use a value."""
+    def changed(self, values: Mapping[str, Any]) -> Setup:
+        """The setup with these values."""
         setup = self.session.setup
-        values = {key: value}
-        if key == "focal_px" and value is None:
-            values["centre_px"] = None
-        if self.camera is None:
-            self._change(lambda: setup.with_video_camera(values))
-        else:
-            self._change(lambda: setup.with_camera_values(self.camera or 0, values))
+        return setup.with_video_camera(values) if self.camera is None else setup.with_camera_values(self.camera, values)
 
 
 class SceneBoard(_Board):
@@ -138,10 +147,10 @@ class SceneBoard(_Board):
         """As the scene's file has it."""
         return value_of(self.session.setup.with_scene(None).settled(), self.name, key)
 
-    def put(self, key: str, value: Any) -> None:
-        """Use a value."""
+    def changed(self, values: Mapping[str, Any]) -> Setup:
+        """The setup with these values."""
         setup = self.session.setup
-        self._change(lambda: setup.with_scene(with_value(setup.settled(), self.name, key, value)))
+        return setup.with_scene(with_values(setup.settled(), self.name, values))
 
 
 class OptionBoard(_Board):
@@ -168,9 +177,12 @@ class OptionBoard(_Board):
         """Left out."""
         return None
 
-    def put(self, key: str, value: Any) -> None:
-        """Use a value."""
-        self._change(lambda: self.session.setup.with_option(key, value))
+    def changed(self, values: Mapping[str, Any]) -> Setup:
+        """The setup with these values."""
+        setup = self.session.setup
+        for key, value in values.items():
+            setup = setup.with_option(key, value)
+        return setup
 
 
 @lru_cache(maxsize=4)

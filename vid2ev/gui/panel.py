@@ -17,7 +17,9 @@ from vid2ev.gui.controls import Control, reach
 
 
 class Board(Protocol):
-    """Where the values of a panel are."""
+    """Where the values of a panel are; those that were refused are `waiting`."""
+
+    waiting: dict[str, Any]
 
     def value(self, key: str) -> Any:
         """The value in use."""
@@ -86,7 +88,9 @@ class Row:
         self.show()
 
     def show(self) -> None:
-        """Show the value in use."""
+        """Show the value in use; what was entered and refused stays, with its reason."""
+        if self.control.key in self.board.waiting:
+            return
         value = self.board.value(self.control.key)
         shown = self.control.shown(value)
         parts = shown if self.control.kind == "vector" and shown is not None else [shown] * len(self._fields)
@@ -100,6 +104,7 @@ class Row:
 
     def reset(self) -> None:
         """Bring the value back."""
+        self.board.waiting.pop(self.control.key, None)
         self._put(self.board.base(self.control.key))
         self.show()
 
@@ -160,6 +165,7 @@ class Row:
 
     def _put(self, value: Any) -> None:
         if value == self.board.value(self.control.key):
+            self.board.waiting.pop(self.control.key, None)
             self._say(None)
             return
         try:

@@ -6,7 +6,7 @@ a trajectory is moved as a whole, by a `fixed` motion before all others: that is
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
@@ -15,6 +15,7 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.complaints import sentence
 from vid2ev.scenes.scene import Camera, LightSource, Object, Scene, Setting
+from vid2ev.scenes.scene_file import frozen
 from vid2ev.scenes.trajectory import Fixed, pose_of
 
 PLACE = ("position_m", "rotation_deg")  # of the fixed motion that comes first
@@ -50,20 +51,20 @@ def thing_named(scene: Scene, name: str) -> Thing:
     return next((thing for thing in things if thing.name == name), things[0])
 
 
-def with_value(scene: Scene, name: str, key: str, value: Any) -> Scene:
-    """The scene with a value of a part, or with another place of it; None takes a value back.
+def with_values(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    """The scene with values of a part, its place among them; None takes a value back.
 
     Raises UsageError, in a sentence, for what cannot be.
     """
-    if key in PLACE:
-        place = _first(thing_named(scene, name)) | {key: value}
-        return with_place(scene, name, place["position_m"], place["rotation_deg"])
     tables = scene.tables()
     table = _table(tables, name)
-    if value is None:
-        table.pop(key, None)
-    else:
-        table[key] = value
+    for key in values.keys() - {*PLACE}:
+        if values[key] is None:
+            table.pop(key, None)
+        else:
+            table[key] = values[key]
+    if here := {key: values[key] for key in PLACE if key in values}:
+        _put_first(table, _first(thing_named(scene, name)) | here)
     return _scene_of(tables)
 
 
@@ -82,18 +83,13 @@ def value_of(scene: Scene, name: str, key: str) -> Any:
 
 def with_place(scene: Scene, name: str, position_m: Any, rotation_deg: Any) -> Scene:
     """The scene with a part in another place.  Raises UsageError for what is none."""
-    tables = scene.tables()
-    table = _table(tables, name)
-    motions = table.get("trajectory", [])
-    first = {"kind": "fixed", "position_m": list(position_m), "rotation_deg": list(rotation_deg)}
-    table["trajectory"] = [first, *(motions[1:] if motions and motions[0]["kind"] == "fixed" else motions)]
-    return _scene_of(tables)
+    return with_values(scene, name, {"position_m": position_m, "rotation_deg": rotation_deg})
 
 
 def moved(scene: Scene, name: str, way_m: Any) -> Scene:
     """The scene with a part moved by a way in the world [m]."""
     place = _first(thing_named(scene, name))
-    position = [round(here + step, 4) for here, step in zip(place["position_m"], way_m, strict=True)]
+    position = [round(here + step, 6) for here, step in zip(place["position_m"], way_m, strict=True)]
     return with_place(scene, name, position, place["rotation_deg"])
 
 
@@ -109,6 +105,12 @@ def _first(thing: Thing) -> dict[str, Any]:
     return dict.fromkeys(PLACE, NOWHERE)
 
 
+def _put_first(table: dict[str, Any], place: Mapping[str, Any]) -> None:
+    motions = table.get("trajectory", [])
+    later = motions[1:] if motions and motions[0]["kind"] == "fixed" else motions
+    table["trajectory"] = [{"kind": "fixed", **place}, *later]
+
+
 def _table(tables: dict[str, Any], name: str) -> dict[str, Any]:
     kind, _, own = name.partition(".")
     if not own:
@@ -118,8 +120,6 @@ def _table(tables: dict[str, Any], name: str) -> dict[str, Any]:
 
 def _scene_of(tables: dict[str, Any]) -> Scene:
     try:
-        return Scene.model_validate_json(json.dumps(tables))
+        return Scene.model_validate(frozen(tables))
     except ValidationError as error:
         raise UsageError(sentence(error, tables, "scene", Scene)) from error
-    except ValueError as error:  # (what JSON does not know, as an infinite number)
-        raise UsageError(f"scene: {error}") from error

@@ -77,9 +77,9 @@ class Setup:
         """The specification that it has before anything is changed."""
         return spec_of(self.kind(camera), self.preset(camera), {})
 
-    def with_sensor_value(self, camera: int, key: str, value: Any) -> Setup:
-        """A value of a camera's sensor.  Raises UsageError for one that cannot be."""
-        changes = {**self.rig.cameras[camera].set, key: _plain(value)}
+    def with_sensor_values(self, camera: int, values: Mapping[str, Any]) -> Setup:
+        """Values of a camera's sensor.  Raises UsageError for what cannot be."""
+        changes = {**self.rig.cameras[camera].set, **{key: _plain(value) for key, value in values.items()}}
         changed = spec_of(self.kind(camera), self.preset(camera), changes)
         base = self.base(camera)
         kept = {
@@ -145,12 +145,17 @@ def texts_of(changes: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 def spec_of(kind: Kind, name: str, changes: Mapping[str, Any]) -> Any:
     """The specification of a sensor and changes to it.  Raises UsageError, DataError."""
-    return load(kind, name, texts_of(changes))
+    return _loaded(kind, name, tuple(texts_of(changes)))
 
 
 @lru_cache(maxsize=16)
 def _settled(name: str, settings: tuple[str, ...], seed: int) -> Scene:
     return read_scene(name, settings).resolved(seed)
+
+
+@lru_cache(maxsize=64)
+def _loaded(kind: Kind, name: str, texts: tuple[str, ...]) -> Any:
+    return load(kind, name, texts)
 
 
 @lru_cache(maxsize=32)

@@ -62,7 +62,7 @@ class SceneFile:
             raise UsageError(f"{self.name}: {error}") from error
         self._find_files(tables, chance)
         try:
-            return Scene.model_validate(_frozen(tables))
+            return Scene.model_validate(frozen(tables))
         except ValidationError as error:
             raise UsageError(sentence(error, tables, self.name, Scene)) from error
 
@@ -110,11 +110,11 @@ class SceneFile:
         return str(file)
 
 
-def _frozen(node: Any) -> Any:
+def frozen(node: Any) -> Any:
     """A tree with tuples in the place of lists."""
     if isinstance(node, Mapping):
-        return {key: _frozen(value) for key, value in node.items()}
-    return tuple(map(_frozen, node)) if isinstance(node, list) else node
+        return {key: frozen(value) for key, value in node.items()}
+    return tuple(map(frozen, node)) if isinstance(node, list) else node
 
 
 def _one_of(folder: Path, u: float, where: str) -> Path:

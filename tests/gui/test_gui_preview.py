@@ -1,0 +1,143 @@
+"""Previews are what a conversion makes of the same light; long work ends when it is told to."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vid2ev.errors import UsageError
+from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
+from vid2ev.gui.jobs import Done, Job, Progress, Tell
+from vid2ev.gui.light import LightTable, smaller
+from vid2ev.gui.preview import VIEWS, Previewer, Request
+from vid2ev.gui.session import Session
+from vid2ev.gui.setup import Setup, setup_of
+from vid2ev.stream.events import Events
+
+SMALL = "scene:spinning-shapes,size=64x48"
+
+
+@pytest.fixture(scope="module")
+def previewer() -> Previewer:
+    return Previewer()
+
+
+@pytest.fixture
+def setup() -> Setup:
+    return setup_of(SMALL).with_preset(0, "ideal")
+
+
+def test_light_is_made_again_only_where_something_changed_that_decides_it(setup: Setup) -> None:
+    table = LightTable()
+    light = table.light(setup, 0.5, 0.01)
+    other = table.light(setup.with_sensor_values(0, {"threshold_on": 0.4}), 0.5, 0.01)
+    assert other.instants is light.instants and other.recipe.mounts[0].sensor.spec.threshold_on == 0.4
+    assert table.light(setup, 0.6, 0.01).instants is not light.instants
+    turned = setup.with_camera_values(0, {"rotation_deg": (0.0, 5.0, 0.0)})
+    assert not np.array_equal(
+        table.light(turned, 0.6, 0.01).instants[0].frames[0].light, light.instants[0].frames[0].light
+    )
+
+
+def test_a_preview_shows_the_events_that_the_sensor_sends(previewer: Previewer, setup: Setup) -> None:
+    answer = previewer.answer(Request(setup, 0.5, 0.01, pixel=(0, 30, 20)))
+    light = previewer._light(Request(setup, 0.5, 0.01))
+    mount = light.recipe.mounts[0]
+    events = Events.concatenate(list(mount.dvs().run(instant.frames[0] for instant in light.instants)))
+    shown = answer.cameras[0]
+    assert shown.statistics is not None and shown.statistics.events == len(events) > 100
+    assert shown.size == (64, 48) and answer.duration_s == 2.0 and answer.notes == ()
+    assert answer.course is not None
+    assert answer.course.events.t.tolist() == events.t[(events.x == 30) & (events.y == 20)].tolist()
+    assert np.all(answer.course.level_on - answer.course.level_off == pytest.approx(0.3))
+    assert len(course_chart(answer.course)["series"]) == 7
+    assert statistics_rows({"dvs": shown.statistics})[3] == ["events", f"{len(events):,}"]
+    assert interval_chart({"dvs": shown.statistics})["series"][0]["name"] == "dvs"
+
+
+def test_every_view_is_a_picture_and_the_slowest_exposure_is_in_it(previewer: Previewer, setup: Setup) -> None:
+    pictures = {previewer.answer(Request(setup, 0.5, 0.01, view=view)).cameras[0].picture for view in VIEWS}
+    assert len(pictures) == len(VIEWS) and all(picture.startswith(b"\x89PNG") for picture in pictures)
+    answer = previewer.answer(Request(setup.with_sensor_values(1, {"exposure_us": 40e3}), 0.5, 0.01))
+    assert answer.span_s[1] - answer.span_s[0] > 0.04 and "no frame" not in answer.cameras[1].caption
+    answer = previewer.answer(Request(setup.with_sensor_values(1, {"exposure_us": 1e6}), 0.5, 0.01))
+    assert "cis has no frame here: an exposure takes longer than the preview" in answer.notes
+
+
+def test_large_sources_are_shown_smaller_and_that_is_said(previewer: Previewer) -> None:
+    answer = previewer.answer(Request(setup_of("scene:spinning-shapes").with_preset(0, "ideal"), 0.5, 0.005, side=40))
+    assert answer.cameras[0].size == (40, 30) and answer.notes[0] == "dvs, cis shown with 40x30 of 640x480 pixels"
+    assert smaller((3000, 20), 300) == (300, 2) and smaller((10, 20), 300) == (10, 20)
+
+
+def test_videos_are_seen_from_where_the_cameras_are(previewer: Previewer) -> None:
+    clip = Path(__file__).parents[2] / "examples" / "demo.mp4"
+    setup = setup_of(str(clip)).with_preset(0, "ideal").with_option("upsample", "linear")
+    straight = previewer.answer(Request(setup, 0.3, 0.02, side=80))
+    turned = setup.with_camera_values(0, {"rotation_deg": (0.0, 0.0, 20.0)})
+    assert previewer.answer(Request(turned, 0.3, 0.02, side=80)).cameras[0].picture != straight.cameras[0].picture
+    assert straight.cameras[0].statistics is not None and straight.cameras[0].statistics.events > 50
+    with pytest.raises(UsageError, match="how far the scene is was not said; add --depth"):
+        previewer.answer(Request(setup.with_camera_values(0, {"translation_mm": (30.0, 0.0, 0.0)}), 0.3, 0.02, side=80))
+
+
+def test_the_cost_of_accuracy_is_drawn_with_its_front() -> None:
+    rows = [{"name": name, "time": time, "distance": distance, "front": front} for name, time, distance, front in (
+        ("fast", 1.0, 0.3, True), ("slow", 2.0, 0.01, True), ("worse", 2.5, 0.4, False))]  # fmt: skip
+    found = {"settings": rows, "reference": rows[1] | {"name": "reference", "front": False}, "recommended": "slow"}
+    line, points = cost_chart(found)["series"]
+    assert line["data"] == [[1.0, 0.3], [2.0, 0.01]] and len(points["data"]) == 4
+
+
+def counted(tell: Tell, to: int, folder: str) -> int:
+    """A task that can be cancelled."""
+    for k in range(to):
+        tell(k, to, "counting")
+        time.sleep(0.01)
+    (Path(folder) / "done").touch()
+    return to
+
+
+def refused(tell: Tell) -> None:
+    """A task that is refused."""
+    raise UsageError("value 3: expected 2; give 2")
+
+
+def finish(job: Job, cancel_after: int | None = None) -> tuple[list[Progress], Done]:
+    told: list[Progress] = []
+    for _ in range(3000):
+        for said in job.news():
+            if isinstance(said, Done):
+                return told, said
+            told.append(said)
+            if cancel_after is not None and len(told) > cancel_after:
+                job.cancel()
+        time.sleep(0.02)
+    raise AssertionError("the job did not end")
+
+
+def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(tmp_path: Path) -> None:
+    whole, broken, wrong = Job(counted, to=5, folder=str(tmp_path)), Job(counted, to=10**5, folder="/"), Job(refused)
+    told, end = finish(whole)
+    assert end == Done(5) and [said.done for said in told] == [0, 1, 2, 3, 4] and (tmp_path / "done").exists()
+    assert finish(broken, cancel_after=2)[1].why_not == "cancelled"
+    assert finish(wrong)[1].why_not == "value 3: expected 2; give 2"
+    for job in (whole, broken, wrong):
+        job.close()
+        assert not job.alive
+
+
+def test_a_session_keeps_the_last_good_setup_and_leaves_nothing_behind(setup: Setup) -> None:
+    one, other = Session(setup), Session(setup)
+    assert one.change(lambda: setup.with_sensor_values(0, {"threshold_on": 0.0}))
+    assert one.setup == setup
+    assert one.change(lambda: setup.with_sensor_values(0, {"threshold_on": 0.5})) is None
+    assert one.setup.spec(0).threshold_on == 0.5 and other.setup == setup
+    job = one.start(counted, lambda said: None, lambda said: None, to=10**5, folder="/")
+    one.close()
+    other.close()
+    assert not job.alive and not os.path.exists(one.folder)

@@ -1,0 +1,110 @@
+"""A setup, its command, its options and its files say the same."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vid2ev.commands.convert import convert
+from vid2ev.errors import UsageError
+from vid2ev.gui.command import command_of, options_of, sensor_text
+from vid2ev.gui.loading import loaded
+from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
+from vid2ev.gui.setup import Setup, setup_of
+from vid2ev.outputs import Outputs
+from vid2ev.recipe import Recipe
+from vid2ev.rig.camera import Camera
+from vid2ev.scenes.scene_file import read_scene, scene_names
+
+SMALL = "scene:spinning-shapes,size=32x24,duration_s=0.02"
+
+
+def changed(setup: Setup) -> Setup:
+    setup = setup.with_preset(0, "davis346").with_sensor_values(0, {"threshold_on": 0.3})
+    setup = setup.with_sensor_values(0, {"shading": (0.1, -0.2)}).with_sensor_values(1, {"exposure_us": 700.0})
+    return setup.with_option("seed", 7)
+
+
+def moved_camera(setup: Setup) -> Setup:
+    return changed(setup).with_camera_values(1, {"translation_mm": (15.0, 0.0, 0.0), "fov_deg": 40.0})
+
+
+def other_scene(setup: Setup) -> Setup:
+    return moved_camera(setup).with_scene(with_values(setup.settled(), "scene", {"ambient": (0.2, 0.3, 0.4)}))
+
+
+def parsed(setup: Setup, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the recipe would be by the command, given to the shell in a folder that holds its files."""
+    command = command_of(setup)
+    command.write(folder)
+    monkeypatch.chdir(folder)
+    context = convert.make_context("convert", shlex.split(str(command))[2:])
+    options = dict(context.params)
+    (video,) = options.pop("videos")
+    Outputs.taken_from(options)
+    for name in ("output", "dry_run", "verbose", "quiet", "as_json", "budget", "threads", "device", "skip", "overwrite",
+                 "resume", "effects", "tolerance"):  # fmt: skip
+        options.pop(name)
+    return Recipe.of(video, **options).describe()
+
+
+@pytest.mark.parametrize("change", [lambda setup: setup, changed, moved_camera, other_scene])
+def test_the_command_is_what_the_page_converts(change: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    setup = change(setup_of(SMALL))
+    shell, page = tmp_path / "shell", tmp_path / "page"
+    shell.mkdir()
+    page.mkdir()
+    said = parsed(setup, shell, monkeypatch)
+    made = Recipe.of(**options_of(setup, page)).describe()
+    for source in (said["source"], made["source"]):
+        source["path"] = Path(source["path"]).name
+        source.pop("changed_ns", None)
+    assert said == made
+    for number, camera in enumerate(setup.rig.cameras):
+        assert said["cameras"][camera.name]["parameters"] == setup.spec(number).model_dump(mode="json")
+
+
+def test_a_value_that_cannot_be_is_refused_and_one_that_is_the_presets_is_no_change() -> None:
+    setup = setup_of(SMALL)
+    with pytest.raises(
+        UsageError, match=r"threshold_on = -1.0 in sensor paper is impossible: it must be greater than 0"
+    ):
+        setup.with_sensor_values(0, {"threshold_on": -1.0})
+    with pytest.raises(UsageError, match=r"camera cis: fov_deg = 400.0 is impossible"):
+        setup.with_camera_values(1, {"fov_deg": 400.0})
+    with pytest.raises(UsageError, match=r"scene.duration_s = -1.0 is impossible"):
+        with_values(setup.settled(), "scene", {"duration_s": -1.0})
+    with pytest.raises(UsageError, match="two cameras are called dvs"):
+        setup.with_rig((*setup.rig.cameras, Camera(name="dvs", kind="dvs")))
+    other = setup.with_sensor_values(0, {"threshold_on": 0.2})
+    assert other.rig.cameras[0].set == {"threshold_on": 0.2}
+    assert other.with_sensor_values(0, {"threshold_on": 0.15}) == setup
+
+
+def test_files_that_are_saved_and_loaded_are_the_setup(tmp_path: Path) -> None:
+    setup = other_scene(setup_of(SMALL))
+    other = setup_of(SMALL)
+    for name, text in command_of(setup).files.items():
+        other = loaded(other, text, name, tmp_path)
+    assert [other.spec(k) for k in (0, 1)] == [setup.spec(k) for k in (0, 1)]
+    assert other.rig == setup.rig and other.settled() == setup.settled()
+    with_sensor = loaded(setup_of(SMALL), sensor_text(setup, 0), "camera.toml", tmp_path)
+    assert with_sensor.spec(0) == setup.spec(0) and with_sensor.spec(1) == setup_of(SMALL).spec(1)
+    with pytest.raises(OSError, match=r"bad.toml is not valid TOML"):
+        loaded(setup, "[dvs", "bad.toml", tmp_path)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_things_of_each_scene_are_moved_by_as_much_as_was_asked(name: str) -> None:
+    scene = read_scene(name).resolved(1)
+    for thing in (f"objects.{scene.objects[0].name}", "camera"):
+        before = pose_at(thing_named(scene, thing), 0.3)
+        after = pose_at(thing_named(moved(scene, thing, (0.1, -0.2, 0.3)), thing), 0.3)
+        looks = "look-at" in {motion.kind for motion in thing_named(scene, thing).values.trajectory}
+        assert after.rotation == pytest.approx(before.rotation, abs=1.0 if looks else 1e-9)
+        assert after.translation_m - before.translation_m == pytest.approx([0.1, -0.2, 0.3], abs=2e-3 if looks else 2e-6)
+    there = with_place(scene, "camera", (1, 2, 3), (0, 90, 0))
+    assert value_of(there, "camera", "position_m") == (1, 2, 3)
