@@ -105,6 +105,8 @@ def test_things_of_each_scene_are_moved_by_as_much_as_was_asked(name: str) -> No
         after = pose_at(thing_named(moved(scene, thing, (0.1, -0.2, 0.3)), thing), 0.3)
         looks = "look-at" in {motion.kind for motion in thing_named(scene, thing).values.trajectory}
         assert after.rotation == pytest.approx(before.rotation, abs=1.0 if looks else 1e-9)
-        assert after.translation_m - before.translation_m == pytest.approx([0.1, -0.2, 0.3], abs=2e-3 if looks else 2e-6)
+        assert after.translation_m - before.translation_m == pytest.approx(
+            [0.1, -0.2, 0.3], abs=2e-3 if looks else 2e-6
+        )
     there = with_place(scene, "camera", (1, 2, 3), (0, 90, 0))
     assert value_of(there, "camera", "position_m") == (1, 2, 3)

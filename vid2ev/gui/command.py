@@ -77,9 +77,8 @@ def is_plain(setup: Setup) -> bool:
     """Whether options say all that there is to say of the cameras: an event camera in the place of the source's, and
     perhaps a frame camera there."""
     bare = tuple(each.model_copy(update={"sensor": None, "set": {}}) for each in setup.rig.cameras)
-    return any(Rig(source=setup.rig.source, cameras=bare) == default_rig(frames) for frames in (False, True)) and (
-        setup.own_rig or not setup.is_scene
-    )
+    default = any(Rig(source=setup.rig.source, cameras=bare) == default_rig(frames) for frames in (False, True))
+    return default and not (setup.is_scene and setup.settled().scene.rig)
 
 
 def sensor_text(setup: Setup, camera: int) -> str:

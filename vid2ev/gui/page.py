@@ -16,6 +16,7 @@ from vid2ev.gui.setup import Setup
 from vid2ev.gui.theme import ACCENT, CSS
 
 TICK_S = 0.05
+GONE_S = 10  # without its page, after which a session is ended
 
 
 def draw(setup: Setup) -> Session:
@@ -59,12 +60,15 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
     from vid2ev.gui.guard import Guard
 
     @ui.page("/", title="vid2ev")
-    def page() -> None:
-        draw(setup)
+    async def page() -> None:
+        await ui.context.client.connected()
+        kept = app.storage.tab  # (of one tab of the browser: what was set up there is there again after a reload)
+        session = draw(kept.get("setup", setup))
+        session.on("setup", lambda changed: kept.update(setup=changed))
 
     app.add_middleware(Guard, host=host)
     where: dict[str, Any] = {"host": host, "port": port, "show": show}
-    ui.run(title="vid2ev", reload=False, show_welcome_message=False, reconnect_timeout=5, **where)
+    ui.run(title="vid2ev", reload=False, show_welcome_message=False, reconnect_timeout=GONE_S, **where)
 
 
 def free_port(host: str, port: int) -> int:

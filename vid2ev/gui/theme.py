@@ -64,6 +64,8 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-line .q-select { font-size: 13px; } .v-line .q-select .q-field__control { min-height: 30px; height: 30px; }
 @media (max-width: 900px) {
   .v-main { grid-template-columns: minmax(0, 1fr); padding: 12px; gap: 12px; } .v-right { order: -1; }
-  .v-side { max-height: none; } .v-top { padding: 8px 12px; } .v-camera { max-width: none; }
+  .v-side { max-height: none; } .v-top { padding: 8px 12px; gap: 4px; }
+  .v-top .q-btn--dense.q-btn--rectangle { padding: 2px 6px; }
+  .v-source { min-width: 40px; margin-left: 8px; } .v-camera { max-width: none; }
 }
 """

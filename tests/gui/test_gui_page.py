@@ -1,0 +1,245 @@
+"""The page in a real browser: what is entered there is what is previewed, saved and converted."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vid2ev.gui.controls import Control, controls_of
+from vid2ev.rig.camera import Camera
+from vid2ev.rig.rig_file import read_rig
+from vid2ev.scenes.scene import Object
+from vid2ev.scenes.scene_file import read_scene
+from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.presets import CIS, DVS, load
+from vid2ev.sensors.spec import DvsSpec
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = "from vid2ev.commands.gui import gui; gui()"
+SCENE = "scene:spinning-shapes,size=48x36,duration_s=0.2"
+RIG = "".join(f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\nsensor = "ideal"\n' for kind in ("dvs", "cis"))
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+PATIENT_MS = 120_000
+
+pytest.importorskip("nicegui", reason="the extra gui is not installed")
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path, subprocess.Popen]]:
+    folder = tmp_path_factory.mktemp("served")
+    (folder / "given.toml").write_text(RIG)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NICEGUI_STORAGE_PATH": str(folder / "storage")}
+    environment = {name: value for name, value in environment.items() if not name.startswith("PYTEST")}
+    log = open(folder / "log", "w")  # noqa: SIM115
+    program = [sys.executable, "-c", PROGRAM, SCENE, "--rig", "given.toml", "--port", str(port), "--no-browser"]
+    served = subprocess.Popen(program, cwd=folder, env=environment, stdout=log, stderr=log)
+    for _ in range(600):
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                break
+        assert served.poll() is None, (folder / "log").read_text()
+        time.sleep(0.1)
+    yield f"http://127.0.0.1:{port}", folder, served
+    served.terminate()
+    served.wait()
+    log.close()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+def opened(browser: Any, address: tuple[str, Path, subprocess.Popen], **look: Any) -> tuple[Any, list[str]]:
+    """A new window on the page, and what goes wrong in it."""
+    page = browser.new_context(viewport={"width": 1360, "height": 900}, **look).new_page()
+    page.set_default_timeout(PATIENT_MS)
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    page.goto(address[0])
+    page.wait_for_selector('[data-key="dvs.threshold_on"]')
+    return page, wrong
+
+
+def enter(page: Any, name: str, control: Control, value: Any) -> None:
+    """Set a control as a person does."""
+    row = page.locator(f'[data-key="{name}.{control.key}"]')
+    if control.kind == "switch":
+        row.locator(".q-toggle").click()
+        return
+    if control.kind == "choice":
+        row.locator(".q-select").click()
+        page.locator(".q-menu .q-item", has_text=re.compile(rf"^{value}$")).click()
+        return
+    shown = control.shown(value)
+    for field, part in zip(
+        row.locator(".v-value input").all(), shown if isinstance(shown, list) else [shown], strict=True
+    ):
+        field.fill(str(part))
+    row.locator(".v-value input").last.blur()
+
+
+def other(control: Control, value: Any, spec: Any) -> Any:
+    """A value that is another, and can be."""
+    if control.kind == "switch":
+        return not value
+    if control.kind == "choice":
+        return next(choice for choice in control.choices if choice != value)
+    if control.kind == "vector":
+        return tuple(type(part)(part + 1) for part in value or (1.0,) * control.places)
+    if control.kind == "toml":
+        return {"gamma": 1.8, "shading": (0.1, -0.2)}[control.key]
+    if control.kind == "whole":
+        return value + 1 if control.high is None or value < control.high else value - 1
+    tried = (float(f"{value * 1.25 + step:.6g}") for step in (0.0, 0.01, 1.0, -0.01))
+    return next(one for one in tried if one != value and _can_be(spec, control.key, one))
+
+
+def _can_be(spec: Any, key: str, value: Any) -> bool:
+    try:
+        type(spec)(**(spec.model_dump() | {key: value}))
+    except ValueError:
+        return False
+    return True
+
+
+def command(page: Any) -> str:
+    page.locator(".v-right .q-tab", has_text="Record").click()
+    return page.locator('[data-key="command"]').inner_text()
+
+
+def wait_for(what: Any, seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def children(process: subprocess.Popen) -> list[str]:
+    """The working processes of the page's program; those that only watch others are not among them."""
+    listed = subprocess.run(["ps", "-o", "args=", "--ppid", str(process.pid)], capture_output=True, text=True).stdout
+    return [line for line in listed.splitlines() if "spawn_main" in line]
+
+
+def test_a_change_is_seen_a_bad_one_is_refused_and_two_tabs_do_not_mix(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    second, _ = opened(browser, address)
+    picture = page.locator('[data-camera="dvs"] img')
+    page.wait_for_selector('[data-camera="dvs"] img[src^=data]')
+    before = picture.get_attribute("src")
+    threshold = controls_of(DvsSpec)[[control.key for control in controls_of(DvsSpec)].index("threshold_on")]
+    enter(page, "dvs", threshold, 0.6)
+    wait_for(lambda: picture.get_attribute("src") != before)
+    enter(page, "dvs", threshold, -1.0)
+    refused = page.locator('[data-key="dvs.threshold_on"] .v-error')
+    wait_for(
+        lambda: "threshold_on = -1.0 in sensor ideal is impossible: it must be greater than 0" in refused.inner_text()
+    )
+    wait_for(lambda: "--set threshold_on=0.6" in command(page))
+    page.locator('[data-key="dvs.threshold_on"] .v-reset').click()
+    wait_for(lambda: not refused.is_visible())
+    assert command(second) == f"vid2ev convert {SCENE} --sensor ideal --cis ideal"
+    picture.click()
+    page.locator(".v-right .q-tab", has_text="Pixel").click()
+    page.wait_for_selector(".nicegui-echart canvas")
+    assert wrong == []
+    wait_for(lambda: len(children(address[2])) == 2)
+    for each in (page, second):
+        each.context.close()
+    wait_for(lambda: not children(address[2]))
+
+
+def test_the_page_is_served_to_this_machine_alone(address: Any) -> None:
+    host, port = address[0].removeprefix("http://").split(":")
+    for name, status in ((f"127.0.0.1:{port}", b"200"), ("evil.example", b"403")):
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(f"GET / HTTP/1.1\r\nHost: {name}\r\nConnection: close\r\n\r\n".encode())
+            assert link.recv(64).split()[1] == status
+
+
+@pytest.mark.slow
+def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    expected = {}
+    for name, kind, spec in (("dvs", DVS, DvsSpec), ("cis", CIS, CisSpec)):
+        base = load(kind, "ideal")
+        page.locator(".v-side .q-btn-group .q-btn", has_text=name).first.click()
+        page.wait_for_selector(f'[data-key="{name}.shading"]')
+        values = {}
+        for control in controls_of(spec):
+            values[control.key] = other(control, getattr(base, control.key), base)
+            enter(page, name, control, values[control.key])
+        expected[name] = spec(**values)
+    page.locator(".v-side .q-tab", has_text="Camera").click()
+    page.wait_for_selector('[data-key="rig.dvs.translation_mm"]')
+    rig = {"size": (40, 30), "fov_deg": 50.0, "distortion_model": "radtan", "distortion": (0.1, 0.0, 0.0, 0.0),
+           "rotation_deg": (0.0, 1.0, 0.0), "translation_mm": (5.0, 0.0, 1.0), "clock_offset_us": 50, "seed": 3}  # fmt: skip
+    for control in controls_of(Camera):
+        if control.key in rig:
+            enter(page, "rig.dvs", control, rig[control.key])
+    page.locator(".v-side .q-tab", has_text="Scene").click()
+    page.wait_for_selector('[data-key="scene.duration_s"]')
+    from vid2ev.scenes.scene import Setting
+
+    settled = read_scene("spinning-shapes", ["camera.size=[48, 36]", "duration_s=0.2"]).resolved(0)
+    setting = {}
+    for control in controls_of(Setting, without=("rig",)):
+        value = getattr(settled.scene, control.key)
+        given = {"environment": "hubble", "duration_s": 0.05}.get(control.key)
+        setting[control.key] = given or other(control, value, settled.scene)
+        enter(page, "scene", control, setting[control.key])
+    page.locator('[data-key="part"]').click()
+    thing = settled.objects[0].name
+    page.locator(".q-menu .q-item", has_text=re.compile(rf"^objects.{thing}$")).click()
+    page.wait_for_selector(f'[data-key="objects.{thing}.specular"]')
+    for key, value in (("specular", 0.5), ("position_m", (0.1, 0.2, 1.5))):
+        control = next(each for each in [*controls_of(Object), *_place()] if each.key == key)
+        enter(page, f"objects.{thing}", control, value)
+    wait_for(lambda: "scene.toml --rig rig.toml" in command(page))
+    for item in ("rig", "scene"):
+        page.locator("[data-key=save]").click()
+        page.locator(".q-menu .q-item", has_text=re.compile(rf"^{item}$")).click()
+        page.locator(".q-dialog button", has_text="Save").click()
+        wait_for(lambda item=item: (address[1] / f"{item}.toml").exists())
+    saved = read_rig(address[1] / "rig.toml")
+    for camera, kind in zip(saved.cameras, (DVS, CIS), strict=True):
+        changes = [f"{key}={json.dumps(value)}" for key, value in camera.set.items()]
+        assert load(kind, camera.sensor, changes) == expected[camera.name]
+    assert {key: getattr(saved.cameras[0], key) for key in rig} == rig
+    scene = read_scene(address[1] / "scene.toml").resolved()
+    assert scene.scene.model_dump(exclude={"rig"}) == {key: value for key, value in setting.items()}
+    assert scene.objects[0].specular == 0.5 and scene.objects[0].trajectory[0].position_m == (0.1, 0.2, 1.5)
+    page.locator("[data-key=convert]").click()
+    said = page.locator('[data-key="said"]')
+    wait_for(lambda: "events" in said.inner_text() and "_events:" in said.inner_text(), 280)
+    manifest = json.loads((address[1] / "spinning-shapes_events" / "manifest.json").read_text())
+    for name, spec in expected.items():
+        assert manifest["cameras"][name]["parameters"] == spec.model_dump(mode="json")
+    assert wrong == []
+    page.context.close()
+
+
+def _place() -> tuple[Control, ...]:
+    from vid2ev.scenes.trajectory import Fixed
+
+    return controls_of(Fixed)
