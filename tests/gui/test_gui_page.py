@@ -187,13 +187,14 @@ def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser:
         page.wait_for_selector(f'[data-key="{name}.shading"]')
         values = {}
         for control in controls_of(spec):
-            values[control.key] = other(control, getattr(base, control.key), base)
+            values[control.key] = other(control, getattr(base, control.key), base.model_copy(update=values))
             enter(page, name, control, values[control.key])
         expected[name] = spec(**values)
     page.locator(".v-side .q-tab", has_text="Camera").click()
     page.wait_for_selector('[data-key="rig.dvs.translation_mm"]')
     rig = {"size": (40, 30), "fov_deg": 50.0, "distortion_model": "radtan", "distortion": (0.1, 0.0, 0.0, 0.0),
-           "rotation_deg": (0.0, 1.0, 0.0), "translation_mm": (5.0, 0.0, 1.0), "clock_offset_us": 50, "seed": 3}  # fmt: skip
+           "rotation_deg": (0.0, 1.0, 0.0), "translation_mm": (5.0, 0.0, 1.0), "clock_offset_us": 50,
+           "seed": 3}  # fmt: skip
     for control in controls_of(Camera):
         if control.key in rig:
             enter(page, "rig.dvs", control, rig[control.key])

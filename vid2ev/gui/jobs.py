@@ -72,6 +72,7 @@ class Job:
         self._process.join(timeout=GRACE_S)
         if self._process.is_alive():
             self._process.kill()
+            self._process.join()
         self.ended = True
         self._pipe.close()
 
@@ -83,6 +84,7 @@ class Job:
 
 def _work(task: Callable[..., Any], pipe: Connection, cancelled: Any, arguments: dict[str, Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: cancelled.set())  # (the end of the program: leave nothing half done)
 
     def tell(done: float, of: float | None, text: str = "") -> None:
         if cancelled.is_set() or not multiprocessing.parent_process().is_alive():  # type: ignore[union-attr]

@@ -8,6 +8,7 @@ frames is made as for a conversion.  The light is kept as long as nothing change
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ SIDE = 346  # px
 MOST = 48  # pictures of a scene
 LONGEST_S = 0.25
 MARGIN = 1.02
+SHARE = 0.25  # of an interval: less than that does not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +135,9 @@ def _of_scene(
     if asked > fps * 1.01:
         notes.append(f"the scene is rendered {fps:.0f} times a second here, where motion and light ask for {asked:.0f}")
     colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
-    source: Any = Cut(SceneSource(world, "scene", fps=fps, colour=colour), begin_s, end_s)
+    first, last = math.floor(begin_s * fps + SHARE), math.ceil(end_s * fps - SHARE)  # (instants are k / fps)
+    whole_scene = SceneSource(world, "scene", fps=fps, colour=colour)
+    source: Any = Cut(whole_scene, max(first - SHARE, 0) / fps, (last + SHARE) / fps)
     mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
     return Recipe("scene", source, rig, mounts, upsample="none"), _sizes(whole), notes
 

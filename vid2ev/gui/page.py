@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from threading import Thread
 from typing import Any
 
 from nicegui import ui
@@ -49,7 +50,7 @@ def draw(setup: Setup) -> Session:
 
     session.on("setup", show)
     ui.timer(TICK_S, session.tick)
-    ui.context.client.on_delete(session.close)
+    ui.context.client.on_delete(lambda: Thread(target=session.close).start())  # (other pages do not wait for it)
     return session
 
 

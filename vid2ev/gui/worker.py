@@ -72,6 +72,7 @@ class Worker:
         self._process.join(timeout=1)
         if self._process.is_alive():
             self._process.kill()
+            self._process.join()
 
     @property
     def alive(self) -> bool:
