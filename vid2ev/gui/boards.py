@@ -17,6 +17,21 @@ from vid2ev.sensors.presets import Kind, load
 BARE = ("name", "kind", "sensor", "set", "rotation")  # of a camera: elsewhere on the page, or another way to say it
 
 
+WORDS = {  # options of the conversion
+    "depth": "how far a video's scene is: plane:2.5, a map or a folder of maps",
+    "crop": "part of the picture: 640x480+0+60",
+    "size": "pixels to bring it to: 346x260",
+    "upsample": "light between frames: none, linear, flow or net",
+    "motion": "of a camera over a photograph: pan, saccade, zoom",
+}
+NUMBERS = {
+    "start": ("s", "begin at this second of the source's own clock"),
+    "stop": ("s", "end there"),
+    "slowdown": ("", "the footage plays so many times slower than the world went"),
+    "fps": ("1/s", "frames per second, in place of the source's own times"),
+}
+
+
 class _Board:
     """Values that are refused wait for others, with which they may be possible: a model of distortion, say, for its
     coefficients."""
@@ -132,7 +147,7 @@ class SceneBoard(_Board):
     def controls(self) -> tuple[Control, ...]:
         """Its place, and one for each of its values."""
         thing = self.thing
-        place = ()
+        place: tuple[Control, ...] = ()
         if thing.has_place:
             from vid2ev.scenes.trajectory import Fixed
 
@@ -156,18 +171,11 @@ class SceneBoard(_Board):
 class OptionBoard(_Board):
     """Options of the conversion."""
 
-    controls = tuple(Control(key, kind, "", *rest, optional=True) for key, kind, *rest in (
-        ("seed", "whole", "", "another seed is another camera of the same kind", None, 0),
-        ("depth", "word", "", "how far a video's scene is: plane:2.5, a map or a folder of maps"),
-        ("start", "number", "s", "begin at this second of the source's own clock"),
-        ("stop", "number", "s", "end there"),
-        ("slowdown", "number", "", "the footage plays so many times slower than the world went"),
-        ("fps", "number", "1/s", "frames per second, in place of the source's own times"),
-        ("crop", "word", "", "part of the picture: 640x480+0+60"),
-        ("size", "word", "", "pixels to bring it to: 346x260"),
-        ("upsample", "word", "", "light between frames: none, linear, flow or net"),
-        ("motion", "word", "", "of a camera over a photograph: pan, saccade, zoom"),
-    ))  # type: ignore[misc]  # fmt: skip
+    controls = (
+        *(Control(key, "word", "", "", meaning, optional=True) for key, meaning in WORDS.items()),
+        *(Control(key, "number", "", unit, meaning, optional=True) for key, (unit, meaning) in NUMBERS.items()),
+        Control("seed", "whole", "", "", "another seed is another camera of the same kind", low=0, optional=True),
+    )
 
     def value(self, key: str) -> Any:
         """The value in use, None where it is left out."""

@@ -45,7 +45,15 @@ def course_chart(course: Course | None) -> dict[str, Any]:
             {"left": 64, "right": 16, "top": 32, "height": 62},
             {"left": 64, "right": 16, "top": 118, "bottom": 42},
         ],
-        "legend": {"top": 0, "right": 0, "textStyle": TEXT, "itemWidth": 14, "itemHeight": 8, "icon": "roundRect"},
+        "legend": {
+            "data": ["light", "filtered", "signal", "ON level", "OFF level"],
+            "top": 0,
+            "right": 0,
+            "textStyle": TEXT,
+            "itemWidth": 14,
+            "itemHeight": 8,
+            "icon": "roundRect",
+        },
         "tooltip": {"trigger": "axis"},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "xAxis": [

@@ -70,7 +70,7 @@ class LightTable:
     def light(self, setup: Setup, start_s: float, length_s: float, side: int = SIDE) -> Light:
         """From an instant [s] on, on the recording's clock, at least so long.  Raises UsageError, DataError."""
         length_s = _lasting(setup, length_s)
-        key = (_without_sensors(setup), tuple(each.colour for each in sensors_of(setup)), start_s, length_s, side)
+        key: Any = (_without_sensors(setup), tuple(each.colour for each in sensors_of(setup)), start_s, length_s, side)
         if not setup.is_scene:
             key = (*key, _threshold(setup))  # (by which light between frames is made)
         if self._light is None or key != self._key:

@@ -30,9 +30,8 @@ def draw(setup: Setup) -> Session:
         ui.label("vid2ev").classes("v-brand")
         source = ui.label(setup.source).classes("v-source")
         files = ui.row().classes("gap-2")
-        ui.button(icon="contrast", on_click=lambda: dark.set_value(not dark.value)).props("flat dense round").tooltip(
-            "light or dark"
-        )
+        turn = ui.button(icon="contrast", on_click=lambda: dark.set_value(not dark.value))
+        turn.props('flat dense round title="light or dark"')
     with ui.element("div").classes("v-main"):
         with ui.element("div").classes("v-card v-side"):
             settings = Settings(session)
@@ -63,6 +62,8 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
     @ui.page("/", title="vid2ev")
     async def page() -> None:
         await ui.context.client.connected()
+        if not ui.context.client.has_socket_connection:
+            return
         kept = app.storage.tab  # (of one tab of the browser: what was set up there is there again after a reload)
         session = draw(kept.get("setup", setup))
         session.on("setup", lambda changed: kept.update(setup=changed))

@@ -76,15 +76,10 @@ class Row:
                 self._slider.classes("v-slider")
             with ui.element("div").classes("v-value" if span else "v-value v-wide"):
                 self._fields = self._drawn()
-            with (
-                ui.button(icon="undo", on_click=self.reset)
-                .props("flat dense round size=xs")
-                .classes("v-reset") as self._back
-            ):
-                ui.tooltip("reset")
+            self._back = ui.button(icon="undo", on_click=self.reset).classes("v-reset")
+            self._back.props('flat dense round size=xs title="reset"')
             self._error = ui.label().classes("v-error")
-        with label:
-            ui.tooltip(self._help()).classes("v-help")
+        label.props["title"] = self._help()
         self.show()
 
     def show(self) -> None:

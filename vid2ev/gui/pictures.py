@@ -28,7 +28,7 @@ class Pictures:
             ui.space()
             ui.toggle(
                 [*WINDOWS_MS], value="30 ms", on_change=lambda e: session.look(length_s=WINDOWS_MS[e.value])
-            ).props("dense flat no-caps").tooltip("how long events are gathered; longer where an exposure takes longer")
+            ).props('dense flat no-caps title="how long events are gathered; longer where an exposure takes longer"')
         self._grid = ui.element("div").classes("v-pictures mt-3")
         with ui.element("div").classes("v-line mt-2").style("flex-wrap: nowrap"):
             self._play = ui.button(icon="play_arrow", on_click=self._played).props("flat round dense").mark("play")

@@ -34,7 +34,7 @@ class Record:
             self._where = (
                 ui.input("Folder", on_change=lambda _: self.show()).props('dense data-key="output"').classes("grow")
             )
-            self._over = ui.switch("replace").props("dense").tooltip("replace a recording that is there")
+            self._over = ui.switch("replace").props('dense title="replace a recording that is there"')
             self._go = ui.button("Convert", on_click=self.convert).props("unelevated dense")
             self._stop = ui.button("Cancel", on_click=self._cancelled).props("flat dense")
         self._bar = ui.linear_progress(value=0, show_value=False).props("rounded size=6px").classes("mt-3")
@@ -47,7 +47,7 @@ class Record:
     def buttons(self) -> None:
         """What stands at the top of the page: open and save files, convert."""
         session = self._session
-        with ui.button("Load").props("flat dense").tooltip("a sensor, rig or scene file"), ui.menu():
+        with ui.button("Load").props('flat dense title="a sensor, rig or scene file"'), ui.menu():
             ui.upload(on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file").props(
                 'accept=".toml" flat data-key="load"'
             )

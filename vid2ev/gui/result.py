@@ -57,7 +57,11 @@ class Results:
                 self.record = Record(session, lambda: self._tabs.set_value("Record"))
         session.on("answer", self._answered)
         session.on("plans", lambda plans: self._show_plans(plans.plans))
-        session.on("setup", lambda _: self._stage and self._stage.show())
+        session.on("setup", self._set_up)
+
+    def _set_up(self, _: Any) -> None:
+        if self._stage is not None:
+            self._stage.show()
 
     def _opened(self, name: str) -> None:
         if name == "World" and self._stage is None:

@@ -33,7 +33,7 @@ class Settings:
             for name in ("Source", "Sensor", "Camera", "Scene"):
                 ui.tab(name)
         with ui.tab_panels(self._tabs, value="Sensor").classes("w-full").props("keep-alive"):
-            with ui.tab_panel("Source"):
+            with _panel("Source"):
                 self._draw_source()
             self._places = {name: _panel(name) for name in ("Sensor", "Camera", "Scene")}
         self.show()
@@ -51,6 +51,7 @@ class Settings:
         names = [thing.name for thing in things_of(setup.settled())] if setup.is_scene else []
         if (shape, names) != self._drawn:
             self._drawn = (shape, names)
+            self._entered.value = setup.source
             self._draw()
         for panel in self._panels:
             panel.show()
@@ -74,11 +75,8 @@ class Settings:
                 )
         ui.label("Video, folder of images, or a scene with its seed").classes("v-group")
         with ui.element("div").classes("v-line").style("flex-wrap: nowrap"):
-            entered = (
-                ui.input(value=session.setup.source, placeholder="clip.mp4, scene:room,seed=3")
-                .props("dense")
-                .classes("grow")
-            )
+            entered = self._entered = ui.input(value=session.setup.source, placeholder="clip.mp4, scene:room,seed=3")
+            entered.classes("grow").props("dense")
             entered.props('data-key="source"').on("keydown.enter", lambda: self._open(entered.value))
             ui.button("Open", on_click=lambda: self._open(entered.value)).props("flat dense")
         self._why = ui.label().classes("v-error")
@@ -121,7 +119,7 @@ class Settings:
             ui.select(
                 presets, value=setup.preset(number),
                 on_change=lambda e: self._session.change(lambda: self._session.setup.with_preset(number, e.value)),
-            ).props(f'dense options-dense data-preset="{names[number]}"').tooltip("preset")  # fmt: skip
+            ).props(f'dense options-dense title="preset" data-preset="{names[number]}"')  # fmt: skip
         ui.label(str(setup.sensor(number).about.get("title", ""))).classes("v-muted mt-1")
         board = SensorBoard(self._session, number)
         panel = Panel(names[number], board.controls, board, grouped=True)
@@ -136,17 +134,16 @@ class Settings:
                 "dense flat no-caps"
             )
             ui.space()
-            with ui.button(icon="add").props("flat dense round"), ui.menu():
-                ui.menu_item("event camera", lambda: self._add("dvs"))
-                ui.menu_item("frame camera", lambda: self._add("cis"))
             if names[place] != VIDEO and len(setup.rig.cameras) > 1:
-                ui.button(icon="remove", on_click=lambda: self._remove(place)).props("flat dense round").tooltip(
-                    "remove"
-                )
+                ui.button("Remove", on_click=lambda: self._remove(place)).props("flat dense")
         board = CameraBoard(self._session, None if names[place] == VIDEO else place)
         panel = Panel(f"rig.{names[place]}", board.controls, board, grouped=True)
         self._panels.append(panel)
-        ui.button("Reset all", on_click=panel.reset).props("flat dense").classes("mt-2")
+        with ui.element("div").classes("v-line mt-2"):
+            ui.button("Reset all", on_click=panel.reset).props("flat dense")
+            ui.space()
+            ui.button("DVS", icon="add", on_click=lambda: self._add("dvs")).props("flat dense")
+            ui.button("CIS", icon="add", on_click=lambda: self._add("cis")).props("flat dense")
 
     def _draw_scene(self, setup: Setup) -> None:
         if not setup.is_scene:

@@ -101,14 +101,14 @@ class Setup:
     def with_camera_values(self, camera: int, values: Mapping[str, Any]) -> Setup:
         """Values of a camera of the rig.  Raises UsageError for what cannot be."""
         before = self.rig.cameras[camera]
-        table = {key: value for key, value in (before.model_dump() | values).items() if value is not None}
+        table = {key: value for key, value in {**before.model_dump(), **values}.items() if value is not None}
         changed = _made(Camera, table, f"camera {before.name}")
         cameras = tuple(changed if k == camera else each for k, each in enumerate(self.rig.cameras))
         return self.with_rig(cameras, own="sensor" in values or "set" in values)
 
     def with_video_camera(self, values: Mapping[str, Any]) -> Setup:
         """Values of the camera that took the video.  Raises UsageError for what cannot be."""
-        table = {key: value for key, value in (self.rig.source.model_dump() | values).items() if value is not None}
+        table = {key: value for key, value in {**self.rig.source.model_dump(), **values}.items() if value is not None}
         return replace(self, rig=Rig(source=_made(Source, table, "[source]"), cameras=self.rig.cameras), own_rig=False)
 
     def with_rig(self, cameras: tuple[Camera, ...], own: bool = False) -> Setup:

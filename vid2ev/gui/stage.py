@@ -65,7 +65,7 @@ class Stage:
     def look(self) -> None:
         """Look over the shoulder of the reference camera."""
         pose = next((pose for name, pose in self._poses.items() if name in ("camera", "source")), IDENTITY)
-        away = [np.linalg.norm(other.translation_m - pose.translation_m) for other in self._poses.values()]
+        away = [float(np.linalg.norm(other.translation_m - pose.translation_m)) for other in self._poses.values()]
         far_m = float(np.median([way for way in away if way > NEAR_M] or [2.0]))
         eye, target = pose.apply(far_m * np.array([0.5, -0.45, -0.55])), pose.apply(far_m * np.array([0.0, 0, 0.8]))
         (x, y, z), (to_x, to_y, to_z) = TO_VIEW @ eye, TO_VIEW @ target
@@ -80,6 +80,7 @@ class Stage:
         assert isinstance(values, Object)
         x, y, z = values.size_m
         turn = np.eye(3)
+        shape: Any
         if values.kind == "sphere":
             shape = self._scene.sphere(0.5).scale(x, y, z)
         elif values.kind == "cylinder":

@@ -64,7 +64,7 @@ def costed(tell: Tell, setup: Setup, repeats: int = 1, duration_s: float | None 
         options = options_of(setup, Path(folder))
         found = measured(
             options.pop("video"), given=[*setup.options], repeats=repeats, duration_s=duration_s,
-            report=lambda done, count, name="": tell(done, count, name), **options,
+            report=tell, **options,
         )  # fmt: skip
     return found.describe()
 

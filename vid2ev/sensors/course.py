@@ -40,5 +40,6 @@ def course_of(dvs: Dvs, frames: Iterable[Frame], pixel: tuple[int, int] = (0, 0)
         sent.append(events.select((events.x == x) & (events.y == y)))
         instants.append(frame.t_ns)
         rows.append([float(frame.light[y, x]), *(float(column[0]) for column in dvs.inside(place))])
-    columns = np.array(rows, np.float64).reshape(-1, 5).T
-    return Course(np.array(instants, np.int64), *columns, Events.concatenate(sent))
+    light, filtered, signal, level_on, level_off = np.array(rows, np.float64).reshape(-1, 5).T
+    t_ns = np.array(instants, np.int64)
+    return Course(t_ns, light, filtered, signal, level_on, level_off, Events.concatenate(sent))
