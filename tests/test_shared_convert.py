@@ -94,6 +94,21 @@ def test_a_program_that_is_killed_leaves_what_the_next_one_finishes() -> None:
     assert same_bytes("killed", ["c0", "c1", "c2", "c3"])
 
 
+@pytest.mark.slow
+def test_control_c_ends_it_with_130_and_one_line() -> None:
+    arguments = ["convert", "synthetic:moving-edge,size=64x48,fps=100,duration_s=1000", "clips", "-o", "stopped"]
+    child = subprocess.Popen(
+        [sys.executable, "-m", "vid2ev", *arguments, "--jobs", "2", *QUICK],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    while not list(Path().glob("stopped/*_events")) and child.poll() is None:
+        time.sleep(0.05)
+    os.killpg(child.pid, signal.SIGINT)  # (as a terminal does: the workers hear it, too)
+    _, said = child.communicate()
+    lines = [line for line in said.splitlines() if "broken.mp4" not in line]
+    assert child.returncode == 130 and len(lines) == 1 and lines[0].startswith("interrupted"), said
+
+
 def _held(folder: Path) -> bool:
     """Whether a process still writes one of the recordings."""
     import fcntl

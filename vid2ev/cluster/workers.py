@@ -65,6 +65,7 @@ class Workers:
             return
         from distributed import Client
 
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # (what matters of it is said in a sentence)
         try:
             client = Client(self.scheduler, timeout=REACHED_S)
         except ValueError as error:
@@ -87,7 +88,7 @@ class Workers:
         with dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries}):
             cluster = LocalCluster(
                 n_workers=self.jobs, threads_per_worker=1, memory_limit=memory, host="127.0.0.1",
-                dashboard_address=None, silence_logs=logging.CRITICAL, env=threads,
+                dashboard_address=None, silence_logs=logging.CRITICAL, env=threads, preload="vid2ev.cluster.deaf",
             )  # fmt: skip
         with cluster, Client(cluster) as client:
             yield client
