@@ -88,8 +88,7 @@ def enter(page: Any, name: str, control: Control, value: Any) -> None:
         row.locator(".q-toggle").click()
         return
     if control.kind == "choice":
-        row.locator(".q-select").click()
-        page.locator(".q-menu .q-item", has_text=re.compile(rf"^{value}$")).click()
+        choose(page, row.locator(".q-select"), value)
         return
     shown = control.shown(value)
     for field, part in zip(
@@ -97,6 +96,19 @@ def enter(page: Any, name: str, control: Control, value: Any) -> None:
     ):
         field.fill(str(part))
     row.locator(".v-value input").last.blur()
+
+
+def choose(page: Any, opener: Any, name: str) -> None:
+    """Open a menu and click an item; what else changes on the page may close it, then it is opened again."""
+    item = page.locator(".q-menu .q-item:visible", has_text=re.compile(rf"^{name}$"))
+    for _ in range(8):
+        opener.click()
+        try:
+            item.first.click(timeout=5000)
+            return
+        except playwright.TimeoutError:
+            page.keyboard.press("Escape")
+    raise AssertionError(f"no menu with {name}")
 
 
 def other(control: Control, value: Any, spec: Any) -> Any:
@@ -209,17 +221,15 @@ def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser:
         given = {"environment": "hubble", "duration_s": 0.05}.get(control.key)
         setting[control.key] = given or other(control, value, settled.scene)
         enter(page, "scene", control, setting[control.key])
-    page.locator('[data-key="part"]').click()
     thing = settled.objects[0].name
-    page.locator(".q-menu .q-item", has_text=re.compile(rf"^objects.{thing}$")).click()
+    choose(page, page.locator('.q-select:has([data-key="part"]), .q-select[data-key="part"]').first, f"objects.{thing}")
     page.wait_for_selector(f'[data-key="objects.{thing}.specular"]')
     for key, value in (("specular", 0.5), ("position_m", (0.1, 0.2, 1.5))):
         control = next(each for each in [*controls_of(Object), *_place()] if each.key == key)
         enter(page, f"objects.{thing}", control, value)
     wait_for(lambda: "scene.toml --rig rig.toml" in command(page))
     for item in ("rig", "scene"):
-        page.locator("[data-key=save]").click()
-        page.locator(".q-menu .q-item", has_text=re.compile(rf"^{item}$")).click()
+        choose(page, page.locator("[data-key=save]"), item)
         page.locator(".q-dialog button", has_text="Save").click()
         wait_for(lambda item=item: (address[1] / f"{item}.toml").exists())
     saved = read_rig(address[1] / "rig.toml")

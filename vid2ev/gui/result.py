@@ -29,7 +29,7 @@ class Results:
         with ui.tabs(on_change=lambda e: self._opened(e.value)).props("dense align=left no-caps") as self._tabs:
             for name in TABS:
                 ui.tab(name)
-        with ui.tab_panels(self._tabs, value="Pixel").classes("w-full").props("keep-alive"):
+        with ui.tab_panels(self._tabs, value="Pixel", animated=False).classes("w-full").props("keep-alive"):
             with ui.tab_panel("Pixel"):
                 self._followed = ui.label("Click a pixel of an event camera to follow it.").classes("v-muted")
                 self._course = ui.echart(course_chart(None)).classes("w-full").style("height: 330px")

@@ -32,7 +32,7 @@ class Settings:
         with ui.tabs().props("dense align=left no-caps").classes("w-full") as self._tabs:
             for name in ("Source", "Sensor", "Camera", "Scene"):
                 ui.tab(name)
-        with ui.tab_panels(self._tabs, value="Sensor").classes("w-full").props("keep-alive"):
+        with ui.tab_panels(self._tabs, value="Sensor", animated=False).classes("w-full").props("keep-alive"):
             with _panel("Source"):
                 self._draw_source()
             self._places = {name: _panel(name) for name in ("Sensor", "Camera", "Scene")}

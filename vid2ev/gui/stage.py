@@ -22,7 +22,7 @@ UPRIGHT = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # cylinders of the vie
 THIN_M = 0.004
 GROUND = "#101218"  # of every picture of events
 NEAR_M = 0.2
-LARGE_M = 4.0  # what is larger is seen through
+LARGE_M = 4.0  # what is larger is seen through, and stays where it is when the view is turned
 CAMERAS = "cameras."
 
 
@@ -87,7 +87,8 @@ class Stage:
             shape, turn = self._scene.cylinder(0.5, 0.5, 1, 24).scale(x, z, y), UPRIGHT
         else:
             shape = self._scene.box(x, y, max(z, THIN_M), wireframe=values.kind == "mesh")
-        self._put(thing.name, shape.material(_tone(values), 0.25 if max(x, y, z) > LARGE_M else 1.0), pose, turn)
+        large = max(x, y, z) > LARGE_M
+        self._put(thing.name, shape.material(_tone(values), 0.25 if large else 1.0), pose, turn, held=large)
 
     def _draw_camera(self, name: str, lens: Intrinsics, pose: Pose, colour: str, label: str | None) -> None:
         width, height = lens.size
@@ -104,10 +105,10 @@ class Stage:
         else:
             self._poses[name] = pose
 
-    def _put(self, name: str, shape: Any, pose: Pose, turn: np.ndarray) -> None:
+    def _put(self, name: str, shape: Any, pose: Pose, turn: np.ndarray, held: bool = False) -> None:
         self._poses[name] = pose
         shape.with_name(name).move(*(TO_VIEW @ pose.translation_m).tolist())
-        shape.rotate_R((TO_VIEW @ pose.rotation @ turn).tolist()).draggable()
+        shape.rotate_R((TO_VIEW @ pose.rotation @ turn).tolist()).draggable(not held)
 
     def _clicked(self, event: Any) -> None:
         named = [hit.object_name for hit in event.hits if hit.object_name]
