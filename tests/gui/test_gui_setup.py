@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import shlex
+import socket
 from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from vid2ev.commands.convert import convert
+from vid2ev.commands.gui import gui
 from vid2ev.errors import UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text
 from vid2ev.gui.loading import loaded
@@ -110,3 +113,22 @@ def test_things_of_each_scene_are_moved_by_as_much_as_was_asked(name: str) -> No
         )
     there = with_place(scene, "camera", (1, 2, 3), (0, 90, 0))
     assert value_of(there, "camera", "position_m") == (1, 2, 3)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_each_scene_can_be_converted_as_it_comes(name: str, tmp_path: Path) -> None:
+    setup = setup_of(f"scene:{name},size=32x24,duration_s=0.01")
+    recipe = Recipe.of(**options_of(setup, tmp_path))
+    assert [mount.kind for mount in recipe.mounts] == ["dvs", "cis"]
+    assert str(command_of(setup)).startswith(f"vid2ev convert scene:{name},size=32x24")
+
+
+def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("importlib.util.find_spec", lambda name: None)
+        refused = CliRunner().invoke(gui, [SMALL]).exception
+    assert isinstance(refused, UsageError) and "pip install 'vid2ev[gui]'" in str(refused)
+    pytest.importorskip("nicegui", reason="the extra gui is not installed")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        refused = CliRunner().invoke(gui, [SMALL, "--port", str(taken.getsockname()[1])]).exception
+    assert isinstance(refused, UsageError) and "give another --port, or 0" in str(refused)

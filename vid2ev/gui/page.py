@@ -25,12 +25,12 @@ def draw(setup: Setup) -> Session:
     session = Session(setup)
     ui.add_css(CSS)
     ui.colors(primary=ACCENT)
-    dark = ui.dark_mode(value=None)
+    ui.dark_mode(value=None)
     with ui.element("div").classes("v-top"):
         ui.label("vid2ev").classes("v-brand")
         source = ui.label(setup.source).classes("v-source")
         files = ui.row().classes("gap-2")
-        turn = ui.button(icon="contrast", on_click=lambda: dark.set_value(not dark.value))
+        turn = ui.button(icon="contrast", on_click=lambda: ui.run_javascript("Quasar.Dark.toggle()"))
         turn.props('flat dense round title="light or dark"')
     with ui.element("div").classes("v-main"):
         with ui.element("div").classes("v-card v-side"):

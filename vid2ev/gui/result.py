@@ -196,4 +196,4 @@ def _cells(row: dict[str, Any]) -> list[str]:
 def _cost_cells(row: dict[str, Any]) -> list[str]:
     timing = row.get("timing_us")
     figures = [f"{row[key]:.2g}" if row.get(key) is not None else "–" for key in ("time", "distance", "count_error")]
-    return [row["name"], *figures, f"{timing[0]} us" if timing else "–", " ".join(row["arguments"])]
+    return [row["name"], *figures, f"{timing[0]} us" if timing else "–", row["arguments"]]
