@@ -25,6 +25,11 @@ def waits(tell: Tell, name: str, seconds: float) -> str:
     return name
 
 
+def gives_its_process(tell: Tell) -> int:
+    """Where it was done."""
+    return os.getpid()
+
+
 def fails_once(tell: Tell) -> int:
     """A disk that is full for a moment."""
     if (count := tried("fails_once")) == 1:

@@ -100,6 +100,8 @@ def _as_they_come(
                     continue
                 error = _of_deaths(name, client, lives.pids[name])
             yield Outcome(name, error=_said(name, error))
+        elif future.status in ("lost", "pending"):  # (its worker died with the result, and Dask has it made again)
+            coming.add(future)
         else:
             raise DataError(
                 f"the scheduler{f' at {workers.scheduler}' if workers.scheduler else ''} is gone; what is done is kept,"
