@@ -25,12 +25,16 @@ def draw(setup: Setup) -> Session:
     session = Session(setup)
     ui.add_css(CSS)
     ui.colors(primary=ACCENT)
-    ui.dark_mode(value=None)
+    dark = ui.dark_mode(value=None)
+
+    async def turn_over() -> None:
+        dark.value = not await ui.run_javascript("Quasar.Dark.isActive", timeout=5)
+
     with ui.element("div").classes("v-top"):
         ui.label("vid2ev").classes("v-brand")
         source = ui.label(setup.source).classes("v-source")
         files = ui.row().classes("gap-2")
-        turn = ui.button(icon="contrast", on_click=lambda: ui.run_javascript("Quasar.Dark.toggle()"))
+        turn = ui.button(icon="contrast", on_click=turn_over)
         turn.props('flat dense round title="light or dark"')
     with ui.element("div").classes("v-main"):
         with ui.element("div").classes("v-card v-side"):

@@ -57,7 +57,7 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-table { width: 100%; border-collapse: collapse; font-size: 12.5px; }
 .v-table th { text-align: left; font-weight: 500; color: var(--muted); padding: 4px 10px 4px 0; white-space: nowrap; }
 .v-table td { padding: 4px 10px 4px 0; border-top: 1px solid var(--line); vertical-align: top; }
-.v-scroll { overflow-x: auto; width: 100%; }
+.v-scroll { overflow-x: auto; width: 100%; } .v-scroll .v-table { min-width: 560px; }
 .q-tab { min-height: 36px; padding: 0 12px; text-transform: none; } .q-tab__label { font-size: 13px; }
 .q-tab-panels { background: transparent !important; } .q-tab-panel { padding: 12px 0 0; }
 .q-btn { text-transform: none; font-weight: 500; } .q-btn--dense.q-btn--rectangle { padding: 2px 10px; }
