@@ -114,6 +114,7 @@ def test_what_cannot_be_split_is_refused(clip: str, tmp_path: Path, options: dic
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_command_splits_among_its_workers(clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     options = [clip, "--fps", "50", "--upsample", "none", "--no-preview"]

@@ -181,7 +181,7 @@ def test_light_of_another_type_is_other_light():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["intel_bottle-detection.mp4", "nasa_13013.mp4"])
-@pytest.mark.parametrize("sensor", ["ideal", "paper", "v2e-noisy"])
+@pytest.mark.parametrize("sensor", ["ideal", "paper", pytest.param("v2e-noisy", marks=pytest.mark.slow)])
 def test_real_clips(name, sensor):
     if not (VIDEOS / name).exists():
         pytest.skip(f"needs {name} in ../shared/data/videos")

@@ -22,8 +22,10 @@ PIXEL = (24, 16)
         ("ideal", []),
         ("paper", ["refractory_us=0"]),
         ("v2e-clean", []),
-        ("v2e-noisy", ["shot_rate_hz=0", "refractory_us=0"]),
-        ("paper", ["photoreceptor_noise=0.02", "refractory_us=0", "leak_rate_hz=5"]),
+        pytest.param("v2e-noisy", ["shot_rate_hz=0", "refractory_us=0"], marks=pytest.mark.slow),
+        pytest.param(
+            "paper", ["photoreceptor_noise=0.02", "refractory_us=0", "leak_rate_hz=5"], marks=pytest.mark.slow
+        ),
     ],
 )
 def test_the_signal_stays_between_the_levels_and_events_are_those_of_the_pixel(

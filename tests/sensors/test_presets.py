@@ -185,8 +185,11 @@ def test_a_folder_named_like_a_sensor_file_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "shortest_us", "longest_us"),
-    [("davis346", 20, 20), ("prophesee-gen31", 40, 200), ("prophesee-gen41", 20, 150), ("imx636", 0, 100)],
-)
+    [
+        pytest.param("davis346", 20, 20, marks=pytest.mark.slow),  # (a pixel of its own, compiled for 20 s)
+        ("prophesee-gen31", 40, 200), ("prophesee-gen41", 20, 150), ("imx636", 0, 100),
+    ],
+)  # fmt: skip
 def test_a_camera_in_bright_light_has_its_published_latency(name: str, shortest_us: int, longest_us: int) -> None:
     """The first event after the light doubles at once; published latencies as cited in the presets."""
     certain = ["random_phase=false", "mismatch=0", "crossing_noise=0", "hot_probability=0", "shot_rate_hz=0"]
