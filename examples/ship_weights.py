@@ -46,17 +46,20 @@ def _card(
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
+    total = clips["scenes"] + clips["photographs"] + clips["videos"] + clips["recordings"]
+    trained_on = [Path(name).name for name in clips["video_files"]]
     lines = [
         f"# {job['network']}, {job['size']}",
         "",
         f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
-        f" seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of {job['samples']['size']} x"
-        f" {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16 bits. Versions: torch"
+        f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
+        f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16 bits. Versions: torch"
         f" {versions['torch']}, lightning {versions['lightning']}.",
         "",
-        "- **Data**: simulated only, made while training: "
-        f"{clips['scenes']:.0%} rendered scenes ({', '.join(clips['scene_names'])}), {clips['photographs']:.0%}"
-        f" photographs in motion ({', '.join(clips['textures'])}); frames between key frames to rebuild:"
+        "- **Data**: events simulated while training, of "
+        f"{clips['scenes'] / total:.0%} rendered scenes ({', '.join(clips['scene_names'])}), "
+        f"{clips['photographs'] / total:.0%} photographs in motion ({', '.join(clips['textures'])}) and "
+        f"{clips['videos'] / total:.0%} real videos ({', '.join(trained_on) or 'none'}); frames made of each key frame:"
         f" {', '.join(f'x{k}' for k in clips['multiples'])};"
         f" thresholds {clips['sensors']['threshold'][0]} to {clips['sensors']['threshold'][1]} nat.",
         f"- **Validated on, never trained on**: {job['validation']['clips']} clips of scenes and photographs that"
