@@ -53,8 +53,8 @@ def _card(
         "",
         f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
         f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
-        f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16 bits."
-        f" Versions: torch {versions['torch']}, lightning {versions['lightning']}.",
+        f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16"
+        f" bits. Versions: torch {versions['torch']}, lightning {versions['lightning']}.",
         "",
         "- **Data**: events simulated while training, of "
         f"{clips['scenes'] / total:.0%} rendered scenes ({', '.join(clips['scene_names'])}), "
