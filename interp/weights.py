@@ -17,6 +17,7 @@ from torch import nn
 from interp.blocks.frozen import Frozen
 from interp.networks import NETWORKS, make
 from vid2ev.errors import DataError, UsageError
+from vid2ev.untrusted import json_of
 
 WRAPPERS = ("module.", "_orig_mod.")
 
@@ -42,9 +43,17 @@ def load(path: Path) -> nn.Module:
     """The network of a file, as in use.  Raises DataError for a file that does not hold one."""
     name, spec, tensors = _read(path)
     try:
-        network = make(name, **spec)
-    except (UsageError, TypeError) as error:
-        raise DataError(f"{path} is of another version of its network ({error}); train it again") from error
+        with torch.device("meta"):  # (without memory: options in a file may ask for any amount of it)
+            shapes = {key: tensor.shape for key, tensor in make(name, **spec).state_dict().items()}
+        if shapes == {key: tensor.shape for key, tensor in tensors.items()}:
+            network = make(name, **spec)
+        else:
+            raise _another(path, shapes, tensors)
+    except DataError:
+        raise
+    except Exception as error:  # (of options; of torch, for sizes that cannot be)
+        said = (str(error).splitlines() or [type(error).__name__])[0][:200]
+        raise DataError(f"{path} is of another version of its network ({said}); train it again") from error
     _fill(network, tensors, path)
     return network.eval()
 
@@ -70,10 +79,10 @@ def _read(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
         raise DataError(f"{path} cannot be read as weights ({error}); give a file that training has written") from error
     name = metadata.get("network", "")
     try:
-        spec = json.loads(metadata.get("spec", ""))
+        spec = json_of(metadata.get("spec", ""))
     except ValueError:
         spec = None
-    if name not in NETWORKS or not isinstance(spec, dict):
+    if name not in NETWORKS or not isinstance(spec, dict) or ("size" in spec and not isinstance(spec["size"], str)):
         raise DataError(f"{path} does not say which network its weights are of; give a file that training has written")
     return name, spec, tensors
 
@@ -86,11 +95,25 @@ def _in_order(file: bytes) -> bytes:
     return len(padded).to_bytes(8, "little") + padded + file[8 + length :]
 
 
+def _another(path: Path, shapes: Mapping[str, torch.Size], tensors: Mapping[str, torch.Tensor]) -> DataError:
+    """What is to be said of weights that are not those of the network that the file names."""
+    key = next(key for key in [*shapes, *tensors] if key not in tensors or tensors[key].shape != shapes.get(key))
+    wanted, found = (list(of) if of is not None else "nothing" for of in (shapes.get(key), _shape(tensors.get(key))))
+    return DataError(
+        f"{path} holds the weights of another network ({key[:80]} is {found}, expected {wanted}); give those"
+        " of this one"
+    )
+
+
+def _shape(tensor: torch.Tensor | None) -> torch.Size | None:
+    return None if tensor is None else tensor.shape
+
+
 def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
     try:
         module.load_state_dict(tensors)
     except RuntimeError as error:
-        first = str(error).splitlines()[1].strip()
+        first = str(error).splitlines()[-1].strip()[:200]
         raise DataError(f"{path} holds the weights of another network ({first}); give those of this one") from error
 
 

@@ -27,6 +27,7 @@ FLOORS = {
     "toml_text": 0,
     "cluster": 1,
     "requests": 1,
+    "untrusted": 1,
     "kernel_cache": 0,
     "kernel_flags": 0,
     "kernel_extending": 0,

@@ -5,6 +5,7 @@ The public names load what they need on first use, so that `import vid2ev` is qu
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +61,11 @@ _HOME = {
 }
 
 __all__ = ["__version__", *_HOME]
+
+# OpenCV reads this once, when it is loaded: pictures of more pixels than `vid2ev.untrusted` allows are refused before
+# there is memory for them (16 bytes for a pixel).
+_MEGABYTES = os.environ.get("VID2EV_LARGEST_MB", "")
+os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(int(_MEGABYTES if _MEGABYTES.isdecimal() else 4096) << 16))
 
 
 def __getattr__(name: str) -> Any:

@@ -26,6 +26,7 @@ from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
 from vid2ev.tracks.truth import TruthTrack, truth_files
+from vid2ev.untrusted import json_of
 
 
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
@@ -66,7 +67,20 @@ class Progress:
 def progress_of(folder: Folder) -> Progress:
     """How far the recording of a folder is, at its last checkpoint."""
     saved = folder.saved()
-    return Progress(**json.loads(str(saved["progress"]))) if saved else Progress()
+    with folder.taking_up():
+        return Progress(**checked(json_of(str(saved["progress"])))) if saved else Progress()
+
+
+def checked(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of a `Progress`, each of the kind that it has there.  Raises TypeError, ValueError."""
+    fresh = asdict(Progress())
+    if values.keys() != fresh.keys() or any(type(values[key]) is not type(value) for key, value in fresh.items()):
+        raise TypeError("progress of another kind")
+    if any(isinstance(value, int | float) and not abs(value) < 1 << 62 for value in values.values()):
+        raise ValueError("progress beyond all numbers")
+    if not all(type(cut) is int for cut in values["cuts_us"]) or not all(type(t) is str for t in values["warnings"]):
+        raise TypeError("progress of another kind")
+    return values
 
 
 class Recorder:
@@ -105,9 +119,12 @@ class Recorder:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
         saved = self.folder.saved()
         if saved:
-            for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
-                name = f"track{mount.number}."
-                track.restore({key.removeprefix(name): array for key, array in saved.items() if key.startswith(name)})
+            with self.folder.taking_up():
+                for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
+                    name = f"track{mount.number}."
+                    track.restore(
+                        {key.removeprefix(name): array for key, array in saved.items() if key.startswith(name)}
+                    )
             self.done = progress_of(self.folder)
 
     def begin(self, instant: Instant) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from typing import Any
 
 from vid2ev.errors import UsageError
+from vid2ev.toml_text import parsed_toml
 
 
 def names_in(texts: str | Sequence[str]) -> tuple[str, ...]:
@@ -28,8 +28,8 @@ def setting(text: str, example: str) -> tuple[str, Any]:
 
 def _value(text: str) -> Any:
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        parsed = parsed_toml(f"value = {text}")
+    except ValueError:
         parsed = {}
     if list(parsed) == ["value"]:
         return parsed["value"]

@@ -1,4 +1,4 @@
-"""Tables as TOML text, which `tomllib` reads back as they were.
+"""Tables as TOML text, and back.
 
 Lists of tables become [[headings]], tables within them stand on their line.  Source: TOML 1.0.0, toml.io.
 """
@@ -7,8 +7,19 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from collections.abc import Mapping
 from typing import Any
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """The tables of a text.  Raises ValueError, in one line, for what is none, or nested too deeply."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    except ValueError as error:  # (numbers of thousands of digits are ValueErrors of their own)
+        raise ValueError(str(error).splitlines()[0]) from error
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.untrusted import json_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,10 +74,26 @@ def read_clip(path: Path) -> Clip:
     """
     try:
         record = np.load(path, mmap_mode="r", allow_pickle=False)
-        about = json.loads(bytes(record["about"].item()))
+        about = json_of(bytes(record["about"].item()))
         gap_us, contrast = int(record["gap_us"]), tuple(float(value) for value in record["contrast"])
-        return Clip(record["truth"], record["keys"], record["off_on"], contrast, gap_us, about)  # type: ignore[arg-type]
+        clip = Clip(record["truth"], record["keys"], record["off_on"], contrast, gap_us, about)  # type: ignore[arg-type]
+        _check(clip)
+        return clip
     except FileNotFoundError:
         raise
-    except (ValueError, IndexError, KeyError, EOFError, OSError) as error:
-        raise DataError(f"{path} is no clip ({error}); remove it, and it is made again") from error
+    except Exception as error:  # (numpy has a dozen of its own for damaged headers)
+        said = (str(error).splitlines() or [type(error).__name__])[0][:150]
+        raise DataError(f"{path} is no clip ({said}); remove it, and it is made again") from error
+
+
+def _check(clip: Clip) -> None:
+    """Raise ValueError for what no clip is."""
+    truth, keys, off_on = clip.truth, clip.keys, clip.off_on
+    codes = truth.dtype in (np.uint8, np.float16) and keys.dtype == off_on.dtype == np.uint8
+    if not codes or [truth.ndim, keys.ndim, off_on.ndim] != [4, 4, 4] or 0 in (*truth.shape, *off_on.shape):
+        raise ValueError(f"{truth.dtype} {list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}")
+    alike = keys.shape == (2, *truth.shape[1:]) and truth.shape[3] == 3 and len(truth) > 1 and len(off_on) == 2
+    if not alike or off_on.shape[3] > truth.shape[2] or clip.gap_us <= 0 or not isinstance(clip.about, dict):
+        raise ValueError(f"{list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}, {clip.gap_us} us")
+    if len(clip.contrast) != 2 or not all(0 < value < 100 for value in clip.contrast):
+        raise ValueError(f"contrasts {clip.contrast}")

@@ -179,7 +179,7 @@ def _publish(made_in: Path, directory: Path, facts: dict[str, Any]) -> None:
     for name, text in ((FACTS, json.dumps(facts, indent=2)), ("README.md", card_text(facts))):
         with whole_file(made_in / name) as file:
             file.write(f"{text.rstrip()}\n".encode())
-    (made_in / "job.json").unlink()
+    (made_in / "job.json").unlink(missing_ok=True)
     (made_in / "lock").unlink(missing_ok=True)
     made_in.rename(directory)
     sync(directory.absolute().parent)
@@ -187,8 +187,11 @@ def _publish(made_in: Path, directory: Path, facts: dict[str, Any]) -> None:
 
 def _begin(path: Path, job: dict[str, Any], directory: Path) -> None:
     """Note what is made; what was begun must be the same."""
+    if not path.exists() and (path.parent / FACTS).exists():  # (killed just before all was put in its place)
+        path = path.parent / FACTS
     if path.exists():
-        if changed := difference(read_manifest(path), job):
+        earlier = read_manifest(path)
+        if changed := difference({key: earlier.get(key) for key in job}, job):
             raise UsageError(f"{directory} was begun with {changed}; --resume needs the options it was begun with")
         return
     with whole_file(path) as file:

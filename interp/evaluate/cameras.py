@@ -9,18 +9,22 @@ small.  Of a video with maps of depth it stays unknown.
 from __future__ import annotations
 
 import math
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from interp.data.layouts.own import Own
+from interp.data.layouts.own import MANIFEST, Own
 from interp.evaluate.group import Cameras
 from vid2ev import open_source
 from vid2ev.errors import Vid2evError
-from vid2ev.recording.exposures import TIMESTAMPS
-from vid2ev.recording.manifest import read_manifest
+from vid2ev.recording.exposures import TIMESTAMPS, read_spans
+from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.rig.depth import plane_of
+from vid2ev.scenes.scene_file import scene_names
 from vid2ev.scenes.source import SceneSource
+from vid2ev.untrusted import beside
 
 ACROSS_PX = 80  # of the small picture
 
@@ -29,20 +33,23 @@ class CamerasOf:
     """The cameras of a recording, at any time of it."""
 
     def __init__(self, recording: Own):
-        self._manifest = read_manifest(recording.folder)
-        opened = np.loadtxt(recording.keys_folder / TIMESTAMPS, dtype=np.int64, ndmin=2)
+        self._path = recording.folder / MANIFEST
+        self._manifest = read_manifest(self._path)
+        opened = read_spans(recording.keys_folder / TIMESTAMPS)
         self._exposure_us = float(np.median(opened[:, 1] - opened[:, 0]))
-        placed = {each["name"]: each for each in self._manifest.get("rig", {}).get("cameras", [])}
-        self._pair = (placed.get(recording.keys_folder.parent.name), placed.get(recording.events_folder.name))
         self._world: Any = None
         self._plane_m: float | None = None
-        if self._apart_m > 0:
-            self._plane_m = plane_of(self._manifest.get("depth"))
-            self._world = _world(self._manifest["source"]) if self._plane_m is None else None
+        with as_stated(self._path):
+            placed = {each["name"]: each for each in self._manifest.get("rig", {}).get("cameras", [])}
+            self._pair = (placed.get(recording.keys_folder.parent.name), placed.get(recording.events_folder.name))
+            if self._apart_m > 0:
+                self._plane_m = plane_of(self._manifest.get("depth"))
+                self._world = _world(self._path, self._manifest["source"]) if self._plane_m is None else None
 
     def at(self, t_us: int) -> Cameras:
-        """What is known at a time."""
-        return Cameras(self._exposure_us, self._disparity_px(t_us), self._offset_us)
+        """What is known at a time.  Raises DataError for a manifest that does not say what it should."""
+        with as_stated(self._path):
+            return Cameras(self._exposure_us, self._disparity_px(t_us), self._offset_us)
 
     @property
     def _apart_m(self) -> float:
@@ -73,11 +80,15 @@ class CamerasOf:
         return focal_px * self._apart_m * float((1 / depth_m).mean())
 
 
-def _world(source: dict[str, Any]) -> Any:
-    """The world of a scene, as the manifest names it; None of anything else, and of one that is not there any more."""
+def _world(manifest: Path, source: dict[str, Any]) -> Any:
+    """The world of a scene, as the manifest names it; None of anything else, of one that is not there any more, and of
+    one that is neither predefined nor beside the manifest (`vid2ev.untrusted`)."""
     if source.get("kind") != "scene" or "slowdown" in source.get("edits", {}):
         return None
+    name = source["path"].removeprefix("scene:").partition(",")[0]
     try:
+        if name not in scene_names():
+            beside(manifest, os.path.abspath(name))
         opened = open_source(source["path"])
     except Vid2evError:
         return None

@@ -11,16 +11,19 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 import os
+import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import lock, whole_file, writing
-from vid2ev.recording.manifest import difference
+from vid2ev.recording.manifest import as_stated, difference
+from vid2ev.untrusted import json_of, read_text
 
 JOB = "job.json"
 KEPT = "kept"
@@ -43,10 +46,11 @@ class KeptRows:
             with writing(path):
                 os.truncate(path, len(whole) + bool(whole))
         try:
-            lines = [json.loads(line) for line in whole.splitlines()]
-            return {line["group"]: [row_of(values) for values in line["rows"]] for line in lines}
+            lines = [json_of(line) for line in whole.splitlines()]
+            return {operator.index(line["group"]): [row_of(values) for values in line["rows"]] for line in lines}
         except (ValueError, TypeError, KeyError) as error:
-            raise DataError(f"{path} cannot be read ({error}); remove it, and it is made again") from error
+            said = str(error)[:200].replace("\n", " ")
+            raise DataError(f"{path} cannot be read ({said}); remove it, and it is made again") from error
 
     def add(self, sequence: str, method: str, group: int, rows: Sequence[Row]) -> None:
         """The rows of a group are done."""
@@ -59,9 +63,16 @@ class KeptRows:
                 os.fsync(file.fileno())
 
     def about(self, sequence: str) -> dict[str, Any] | None:
-        """What is known of a sequence all groups of which are done for some methods; None before."""
+        """What is known of a sequence all groups of which are done for some methods; None before.  Raises DataError."""
         path = self.folder / KEPT / sequence / ABOUT
-        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+        if not path.exists():
+            return None
+        found = _read(path, f"remove {path.parent}, and it is made again")
+        with as_stated(path):
+            operator.index(found["groups"])
+            for number in dict(found["missing"]).values():
+                operator.index(number)
+        return found
 
     def finish(self, sequence: str, about: Mapping[str, Any]) -> None:
         """A sequence is done; `about` says for which methods."""
@@ -111,10 +122,21 @@ class Kept(KeptRows):
 
 def read_job(folder: Path) -> dict[str, Any]:
     """The job of an evaluation.  Raises DataError."""
+    remedy = f"remove {folder} and evaluate again"
+    found = _read(folder / JOB, remedy)
+    if not isinstance(found.get("methods"), dict):
+        raise DataError(f"{folder / JOB} names no methods; {remedy}")
+    return found
+
+
+def _read(path: Path, remedy: str) -> dict[str, Any]:
     try:
-        return json.loads((folder / JOB).read_text(encoding="utf-8"))
+        found = json_of(read_text(path))
     except (OSError, ValueError) as error:
-        raise DataError(f"{folder / JOB} cannot be read ({error}); remove {folder} and evaluate again") from error
+        raise DataError(f"{path} cannot be read ({str(error)[:200]}); {remedy}") from error
+    if not isinstance(found, dict):
+        raise DataError(f"{path} holds no names with values; {remedy}")
+    return found
 
 
 def values_of(row: Row) -> list[Any]:
@@ -128,7 +150,12 @@ def row_of(values: Sequence[Any]) -> Row:
     if len(values) != len(names):
         raise TypeError(f"{len(values)} values, expected {len(names)}")
     known: list[Any] = [math.nan if value is None else value for value in values]
-    return Row(**dict(zip(names, known, strict=True)))
+    row = Row(**dict(zip(names, known, strict=True)))
+    for name, kind in get_type_hints(Row).items():
+        value = getattr(row, name)
+        if not isinstance(value, (int, float) if kind is float else kind) or isinstance(value, bool):
+            raise TypeError(f"{name} = {reprlib.repr(value)}")
+    return row
 
 
 def _line(facts: Mapping[str, Any]) -> bytes:

@@ -5,6 +5,7 @@
         job.json         what is made; only the same is ever continued
         done.jsonl       a line for each stretch whose frames are all there: their times, and remarks
         frames/          000000.png ..., each written as a whole
+        whole/           frames/ with all that belongs to it, about to be renamed
         pieces/          of a film: 000000-000128.mp4 ..., made of frames that are then removed
 
 A folder is `frames`, renamed; a film is its pieces, one after the other, without encoding them again.  A stretch that
@@ -15,24 +16,30 @@ a method has to remember of the stretches before is kept beside (`keep`).
 from __future__ import annotations
 
 import json
+import operator
 import os
+import re
+import reprlib
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Literal, Self
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.pictures.film import join_films, write_film
-from vid2ev.recording.disk import lock, sync, whole_file, writing
+from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
-from vid2ev.recording.manifest import is_of_job, read_manifest, write_manifest
+from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
+from vid2ev.untrusted import json_of, read_arrays
 
 Kind = Literal["mp4", "png", "exr"]
 PIECE = 128  # pictures
+LATEST_US = 1 << 60
 REMEDY = "make room or access there, or choose another place with -o"
 
 
@@ -42,6 +49,7 @@ class Shelf:
     kind     mp4, a film; png or exr, a folder
     job      what decides the frames, for JSON
     write    writes light or codes to a path, of EXR; None: PNG of the codes
+    line     what the line of a stretch has beside its times: int or str
     Raises UsageError where `output` is taken, or was begun with another job, DataError where it cannot be written.
     """
 
@@ -55,6 +63,7 @@ class Shelf:
         overwrite: bool = False,
         resume: bool = False,
         write: Callable[[Path, np.ndarray], None] = write_codes,
+        line: Mapping[str, type] = MappingProxyType({}),
     ):
         self.output, self.kind, self.rate = output, kind, rate
         self.job = json.loads(json.dumps(job))
@@ -62,7 +71,9 @@ class Shelf:
         self.partial = output.with_name(f"{output.name}.partial")
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds all done
         self.done: list[dict[str, Any]] = []
+        self._line = line
         self._write, self._frames, self._pieces = write, self.partial / "frames", self.partial / "pieces"
+        self._whole = self.partial / "whole"
         self._lock: int | None = None
         self._begun = False
 
@@ -124,8 +135,26 @@ class Shelf:
         path = self._memory(len(self.done))
         if not path.exists():
             return {}
-        with np.load(path, allow_pickle=False) as arrays:
-            return dict(arrays)
+        try:
+            return read_arrays(path)
+        except DataError:
+            raise
+        except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own)
+            said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+            raise DataError(f"{path} cannot be read ({said}); --overwrite starts again") from error
+
+    @contextmanager
+    def remembering(self) -> Iterator[None]:
+        """What a method cannot take up of what was kept for it becomes one sentence: DataError."""
+        try:
+            yield
+        except (Vid2evError, OSError):
+            raise
+        except Exception as error:  # (the networks are those of others, and what they remember is of any shape)
+            said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+            raise DataError(
+                f"{self._memory(len(self.done))} does not fit what is asked for ({said}); --overwrite starts again"
+            ) from error
 
     def publish(self, manifest: Mapping[str, Any]) -> None:
         """Put folder or film in its place, with its manifest."""
@@ -144,15 +173,20 @@ class Shelf:
                 write_manifest(self._frames / "manifest.json", manifest)
                 for name in ("timestamps.txt", "manifest.json"):
                     sync(self._frames / name)
-                if self.output.exists():
-                    self.output.rename(self.partial / "replaced")
-                self._frames.rename(self.output)
+                self._frames.rename(self._whole)
+                shutil.rmtree(self.partial / "replaced", ignore_errors=True)
+                put_in_place(self._whole, self.output, self.partial / "replaced")
             sync(self.output.absolute().parent)
             self.done = []
 
     def _begin(self) -> None:
         """Take up what is there, find all finished, or start."""
         job, made = self.partial / "job.json", manifest_of(self.output, self.kind)
+        made_in = self._whole / "manifest.json"
+        if self.resume and job.exists() and not self._frames.exists() and made_in.exists():
+            about_to_be_put, wanted = read_manifest(made_in), self.job
+            if not difference({key: about_to_be_put.get(key) for key in wanted}, wanted):
+                self._whole.rename(self._frames)
         if self.resume and job.exists() and self._frames.exists() and self._is_same(job):
             self._take_up()
             return
@@ -170,7 +204,8 @@ class Shelf:
     def _take_up(self) -> None:
         journal = self.partial / "done.jsonl"
         lines = journal.read_bytes().split(b"\n")[:-1] if journal.exists() else []  # (the rest was cut off in writing)
-        self.done = [json.loads(line) for line in lines]
+        with as_stated(journal):
+            self.done = [_line_of(line, self._line) for line in lines]
         with whole_file(journal) as file:
             file.write(b"".join(line + b"\n" for line in lines))
         encoded = max([stop for *_, stop in self._found()], default=0)
@@ -200,14 +235,27 @@ class Shelf:
 
     def _found(self) -> list[tuple[Path, int, int]]:
         """The pieces, in order, each with the number of its first frame and of the one after its last."""
-        found = [(path, path.stem.split("-")) for path in self._pieces.glob("*.mp4")]
-        return sorted([(path, int(first), int(stop)) for path, (first, stop) in found], key=lambda piece: piece[1])
+        named = ((path, re.fullmatch(r"(\d{6,12})-(\d{6,12})", path.stem)) for path in self._pieces.glob("*.mp4"))
+        return sorted([(path, int(of[1]), int(of[2])) for path, of in named if of], key=lambda piece: piece[1])
 
     def _path(self, number: int) -> Path:
         return self._frames / f"{number:06d}.{'exr' if self.kind == 'exr' else 'png'}"
 
     def _memory(self, count: int) -> Path:
         return self.partial / f"memory-{count}.npz"
+
+
+def _line_of(text: bytes, wanted: Mapping[str, type]) -> dict[str, Any]:
+    """A line of the journal.  Raises KeyError, TypeError, ValueError for what is none."""
+    line = json_of(text)
+    numbers = [*map(operator.index, line["t_us"])]
+    for key, kind in wanted.items():
+        if type(line[key]) is not kind:
+            raise TypeError(f"{key} = {reprlib.repr(line[key])}")
+        numbers += [line[key]] if kind is int else []
+    if any(abs(number) >= LATEST_US for number in numbers):
+        raise ValueError("times beyond all clocks")
+    return line
 
 
 def kind_of(output: Path | None, asked: str | None) -> Kind:

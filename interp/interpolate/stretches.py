@@ -59,7 +59,7 @@ def stretches(take: Take, grid: Grid, zero_us: int | None, start: int = 0, look:
                 kind = CUT if cut else UNRELATED if cuts.unrelated else ""
                 yield Stretch(number - 1, earlier, key, instants, kind)
         before = key, frame
-    if before is not None and before[0].known and zero_us is not None:
+    if before is not None and before[0].known and zero_us is not None and number >= start:
         yield Stretch(number, before[0], None, grid.at(number, before[0].t_us, zero_us))
 
 

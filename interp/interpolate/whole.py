@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from vid2ev.recording.manifest import machine, sha256, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8
+LINE = {"key_us": int, "remark": str, "shot": int}  # of each stretch
 
 
 def interpolate(
@@ -88,7 +90,7 @@ def interpolate(
         "format": pictures.describe(),
         "film_rate": str(rate) if kind == "mp4" else None,
     }
-    with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write) as shelf:
+    with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write, line=LINE) as shelf:
         if shelf.finished:
             return shelf.finished
         started, there = time.perf_counter(), shelf.count
@@ -187,8 +189,10 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
     take, zero_us = ready.take, shelf.done[0]["key_us"] if shelf.done else None
     ready.fill.shot = shelf.done[-1]["shot"] if shelf.done else 0
     keepers: dict[str, Fill | After] = {"fill": ready.fill} | ({"after": ready.after} if ready.after else {})
-    for name, keeper in keepers.items():
-        keeper.remember(_of(name, shelf.memory()))
+    memory = shelf.memory()
+    with shelf.remembering():
+        for name, keeper in keepers.items():
+            keeper.remember(_of(name, memory))
     gaps, done = take.gaps_expected, shelf.count
     total = None if gaps is None else ready.grid.count(gaps, round(10**6 * gaps / take.rate))
     if report:
@@ -196,16 +200,17 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
     for stretch in ready.stretches(zero_us, len(shelf.done)):
         remark, made = ready.work(stretch)
         times = []
-        with shelf.writing():
+        with shelf.writing(), shelf.remembering() if memory else nullcontext():
             for frame in made:
                 shelf.put(frame.instant.number, pictures.picture(frame))
                 times.append(frame.instant.t_us)
                 done += 1
                 if report:
                     report(done, total)
-            memory = {f"{name}.{key}": array for name, each in keepers.items() for key, array in each.memory().items()}
+            made_of = {f"{name}.{key}": array for name, each in keepers.items() for key, array in each.memory().items()}
             line = {"key_us": stretch.first.t_us, "t_us": times, "remark": remark, "shot": ready.fill.shot}
-            shelf.stretch(line, memory)
+            shelf.stretch(line, made_of)
+            memory = {}  # (from here on it is what this run has made)
     if not shelf.count:
         raise DataError(f"{take.name} holds no frame; give another part of it")
 

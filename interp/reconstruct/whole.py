@@ -156,7 +156,8 @@ def _make(
 ) -> None:
     """Make what is not there yet."""
     if shelf.done:
-        made_by.remember(shelf.memory())
+        with shelf.remembering():
+            made_by.remember(shelf.memory())
     times: list[int] = []
     number = shelf.count
     for seen in slices(made_by, recording, slicing, skip=shelf.count):

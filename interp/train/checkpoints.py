@@ -7,8 +7,8 @@ kind of processor, with the same number of threads.
 
 from __future__ import annotations
 
-import pickle
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,10 @@ from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
+from interp.train.run_folder import MOST_STEPS
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import whole_file, writing
+from vid2ev.untrusted import check_bytes
 
 
 class WholeFiles(TorchCheckpointIO):
@@ -27,7 +29,10 @@ class WholeFiles(TorchCheckpointIO):
     def save_checkpoint(self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any = None) -> None:
         """Write a checkpoint; raises DataError where that cannot be."""
         with writing(Path(path), "make room or access there, then --resume"), whole_file(Path(path)) as file:
-            torch.save(checkpoint, file)
+            try:
+                torch.save(checkpoint, file)
+            except RuntimeError as error:  # (of the library, for whatever the disk says)
+                raise OSError("the disk does not take it") from error
 
     def load_checkpoint(self, path: str | Path, map_location: Any = None, weights_only: bool | None = None) -> Any:
         """Read a checkpoint; raises DataError for a file that is none, or not whole."""
@@ -37,13 +42,21 @@ class WholeFiles(TorchCheckpointIO):
 def read_checkpoint(path: Path) -> dict[str, Any]:
     """A checkpoint, on the CPU; raises DataError for a file that is none, or not whole."""
     try:
+        with zipfile.ZipFile(path) as archive:
+            # (torch packs without compressing: what claims to be larger than it is was made to fill the memory)
+            stored = sum(info.file_size for info in archive.infolist())
+            if stored > path.stat().st_size:
+                check_bytes(path, stored)
         found = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, EOFError, ValueError, RuntimeError, KeyError, pickle.UnpicklingError) as error:
-        reason = str(error).strip().split("\n")[0] or type(error).__name__
+    except DataError:
+        raise
+    except Exception as error:  # (torch, its reader of plain data and zipfile have a dozen of their own)
+        reason = (str(error).strip().split("\n")[0] or type(error).__name__)[:200]
         raise DataError(
             f"{path} is no whole checkpoint ({reason}); copy the run again, or start another with -o"
         ) from error
-    if not isinstance(found, dict) or "global_step" not in found:
+    step = found.get("global_step") if isinstance(found, dict) else None
+    if type(step) is not int or not 0 <= step < MOST_STEPS or not isinstance(found.get("state_dict"), dict):
         raise DataError(f"{path} is no checkpoint of `vid2ev train`; copy the run again, or start another with -o")
     return found
 

@@ -17,6 +17,7 @@ No path stands in it, so it can be carried anywhere.
 from __future__ import annotations
 
 import json
+import operator
 import os
 import shutil
 from collections.abc import Mapping
@@ -25,9 +26,11 @@ from typing import Any
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import lock, whole_file, writing
-from vid2ev.recording.manifest import difference, machine, versions
+from vid2ev.recording.manifest import as_stated, difference, machine, versions
+from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
+MOST_STEPS = 1 << 40
 
 
 class RunFolder:
@@ -46,6 +49,8 @@ class RunFolder:
         with writing(path, "make room or access there, or choose another folder with -o"):
             path.mkdir(parents=True, exist_ok=True)
             self._lock: int | None = lock(path)
+            for left in path.glob("*.new"):  # (of files that were being written when a session was killed)
+                left.unlink()
             if not resume:
                 self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
 
@@ -86,7 +91,11 @@ class RunFolder:
         if not file.exists():
             return None
         found = read_json(file)
-        return int(found["steps"]), int(found["level"])
+        with as_stated(file):
+            steps, level = operator.index(found["steps"]), operator.index(found["level"])
+            if not 0 < steps < MOST_STEPS or not 0 <= level < MOST_STEPS:
+                raise ValueError(f"{steps} steps, level {level}")
+        return steps, level
 
     def fix(self, steps: int, level: int) -> None:
         """Write them down, once and for all."""
@@ -96,7 +105,14 @@ class RunFolder:
     def baselines(self) -> dict[str, dict[str, dict[str, float]]]:
         """Scores of methods without training: method, group of clips, score; empty until they are measured."""
         file = self.path / "baselines.json"
-        return read_json(file) if file.exists() else {}
+        if not file.exists():
+            return {}
+        found = read_json(file)
+        with as_stated(file):
+            return {
+                method: {group: {score: float(number) for score, number in of.items()} for group, of in table.items()}
+                for method, table in found.items()
+            }
 
     def write_baselines(self, tables: Mapping[str, Any]) -> None:
         """Keep them."""
@@ -109,7 +125,9 @@ class RunFolder:
         if not resume:
             if begun:
                 raise UsageError(f"{self.path} holds a run; --resume goes on with it, -o chooses another folder")
-            if self.path.is_dir() and any(child.name != "lock" for child in self.path.iterdir()):
+            # (what a run leaves that is killed before it has begun is no reason not to begin)
+            ours = ("lock", "run.json.new")
+            if self.path.is_dir() and any(child.name not in ours for child in self.path.iterdir()):
                 raise UsageError(f"{self.path} holds files that are no run; choose another folder with -o")
             return
         changed = difference(begun_job(self.path), job)
@@ -127,13 +145,19 @@ def begun_job(path: Path) -> dict[str, Any]:
     """The job of a run that was begun; raises UsageError if there is none."""
     if not (path / "run.json").exists():
         raise UsageError(f"{path} holds no run to go on with; leave --resume out, or name the run's folder with -o")
-    return read_json(path / "run.json")["job"]
+    job = read_json(path / "run.json").get("job")
+    if not isinstance(job, dict):
+        raise DataError(f"{path / 'run.json'} does not say what is trained; copy the run again, or start another")
+    return job
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """A file of a run; raises DataError where it cannot be read."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json_of(read_text(path))
     except (OSError, ValueError) as error:
-        raise DataError(f"{path} cannot be read as JSON ({error}); copy the run again, or start another") from error
+        said = str(error)[:200].replace("\n", " ")
+        raise DataError(f"{path} cannot be read as JSON ({said}); copy the run again, or start another") from error
+    if not isinstance(found, dict):
+        raise DataError(f"{path} holds no names with values; copy the run again, or start another")
     return found

@@ -98,6 +98,28 @@ def test_what_was_cut_off_in_writing_does_not_count(tmp_path: Path) -> None:
     assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
 
 
+@pytest.mark.parametrize("moment", ["publish", "put_in_place"])
+def test_killed_when_all_is_made_nothing_is_made_twice(
+    tmp_path: Path, moment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The instant after the last frame is done is one like all others; what is replaced stays until then."""
+    source = recording(tmp_path / "in", moving(4))
+    interpolate(source, tmp_path / "once", multiple=3)
+    interpolate(source, tmp_path / "twice", multiple=2)
+    old = bytes_of(tmp_path / "twice")
+
+    def kill(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(shelf.Shelf if moment == "publish" else shelf, moment, kill)
+        interpolate(source, tmp_path / "twice", multiple=3, overwrite=True)
+    assert bytes_of(tmp_path / "twice") == old
+    told = interpolate(source, tmp_path / "twice", multiple=3, overwrite=True, resume=True)
+    assert told["frames"] == 10 and bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
+    assert not (tmp_path / "twice.partial").exists()
+
+
 @pytest.mark.parametrize("name", ["out", "out.mp4"])
 def test_killed_while_it_is_put_in_place_it_is_there_or_goes_on(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch

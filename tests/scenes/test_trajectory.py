@@ -13,14 +13,14 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
 
 from vid2ev.rig.pose import Pose
-from vid2ev.scenes.scene_file import _frozen
+from vid2ev.scenes.scene_file import frozen
 from vid2ev.scenes.trajectory import Trajectory, pose_of
 
 PARTS = TypeAdapter(Trajectory)
 
 
 def trajectory(*motions: dict[str, Any]) -> Any:
-    return PARTS.validate_python(_frozen(list(motions)))
+    return PARTS.validate_python(frozen(list(motions)))
 
 
 def derivatives(path: Any, t_s: float, step_s: float = 1e-3) -> list[np.ndarray]:

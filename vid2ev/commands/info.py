@@ -29,15 +29,16 @@ def info(file: str, as_json: bool, **options: Any) -> None:
 
     path = Path(file)
     if (path / "manifest.json").is_file():
-        from vid2ev.recording.manifest import read_manifest
+        from vid2ev.recording.manifest import as_stated, read_manifest
 
         found = read_manifest(path)
-        facts = [
-            *summary.result_facts(found),
-            *summary.recipe_facts(found),
-            *summary.file_facts(path),
-            *summary.speed_facts(found),
-        ]
+        with as_stated(path / "manifest.json"):
+            facts = [
+                *summary.result_facts(found),
+                *summary.recipe_facts(found),
+                *summary.file_facts(path),
+                *summary.speed_facts(found),
+            ]
     elif (path / "metadata.yaml").is_file() or (path.is_file() and recognise(path)):  # (a folder of ROS 2, a file)
         found = describe_events(path)
         facts = summary.event_facts(found)

@@ -30,8 +30,9 @@ import numpy as np
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
 from vid2ev.formats.frame_index import FrameIndex
-from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, is_whole, opened
+from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.stream.events import Events
+from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:
     import h5py
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 VERSION = 1
 CHUNK = 1 << 16  # events per compressed chunk
 MS_US = 1000
+BESIDE = ("events/label", "frames/t", "frames/to_idx", "ms_to_idx", "t_offset")  # the events
 
 
 class Hdf5Events:
@@ -153,6 +155,19 @@ def _check(file: h5py.File, path: Path) -> None:
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
         raise DataError(f"{path} has no events/t, x, y, p; expected an event file in the layout of DSEC")
+    others = [file[name] for name in BESIDE if name in file]
+    if not all(isinstance(each, h5py.Dataset) for each in others):
+        raise DataError(f"{path} is damaged: {', '.join(BESIDE)} are arrays; make it again or get another copy")
+    for each in [*columns, *others]:
+        if not is_inside(each, path):
+            raise DataError(
+                f"{path}: {each.name} is in another file; expected one file, so copy it into this (h5repack)"
+            )
+        check_chunks(each, path)
+    if "frames/t" in file:
+        check_bytes(path, file["frames/t"].size * 8, "frames/t")
+    if not all(is_whole(each) for each in others) or any(each.size > 1 for each in others if each.name == "/t_offset"):
+        raise DataError(f"{path} is damaged: parts of {', '.join(BESIDE)} are missing; get another copy")
     if not all(is_whole(column) for column in columns):
         raise DataError(f"{path} is damaged: parts of events/t, x, y, p are missing; get another copy")
     if len({len(column) for column in columns}) > 1:

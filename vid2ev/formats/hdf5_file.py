@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError
+from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:
     import h5py
@@ -46,10 +47,18 @@ def holds_table(path: Path) -> bool:
         return False
 
 
+def is_inside(dataset: h5py.Dataset, path: Path) -> bool:
+    """Whether a dataset is in the file itself: links and virtual datasets can name any file that there is."""
+    return not (dataset.is_virtual or dataset.external) and Path(dataset.file.filename) == path
+
+
+def check_chunks(dataset: h5py.Dataset, path: Path) -> None:
+    """Raise DataError where a part that is unpacked at a time is too large."""
+    check_bytes(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize, f"a chunk of {dataset.name}")
+
+
 def is_whole(dataset: h5py.Dataset) -> bool:
     """Whether the file holds all of a dataset; what is missing would read as zeros, however much that is."""
-    if dataset.is_virtual:
-        return True
     if dataset.chunks:
         return dataset.id.get_num_chunks() * math.prod(dataset.chunks) >= dataset.size
     return dataset.id.get_storage_size() >= dataset.size * dataset.dtype.itemsize

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import warnings
 from typing import Any, BinaryIO, cast
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 PART = 1 << 18  # rows read at a time
+MOST_OF_A_PART = 1 << 25  # bytes of them
 LARGEST_ROW = 1 << 12  # bytes
 
 
@@ -21,6 +23,11 @@ class Array:
 
     def __len__(self) -> int:
         return self.shape[0] if self.shape else 1
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of a row."""
+        return math.prod(self.shape[1:]) * self.dtype.itemsize
 
     def read(self, count: int) -> np.ndarray:
         """The next `count` rows.  Raises EOFError if they are not there."""

@@ -26,7 +26,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import Format, Recording, promised
-from vid2ev.formats.npy_arrays import PART, Array, array_header, open_array
+from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array
 from vid2ev.formats.sequential import Sequential, reading
 from vid2ev.stream.events import Events
 
@@ -69,8 +69,9 @@ class NpzEvents(Sequential):
             if any(len(array) != count for array in files.values()):
                 raise DataError(f"{self.path} is damaged: its arrays t, x, y, p differ in length; get another copy")
             outside, scale = 0, 0
-            for at in range(0, count, PART):
-                parts = {key: array.read(min(PART, count - at)) for key, array in files.items()}
+            step = min(PART, *(max(MOST_OF_A_PART // array.row_bytes, 1) for array in files.values()))
+            for at in range(0, count, step):
+                parts = {key: array.read(min(step, count - at)) for key, array in files.items()}
                 column = {name: _take(parts[id(array)], key) for name, (array, key) in columns.items()}
                 scale = scale or self._scale(column["t"])
                 events, left = self._inside(self._events(column, scale))

@@ -22,6 +22,7 @@ from typing import Any
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Format, Picture, Recording
+from vid2ev.formats.ros2_bombs import bound_decompression, check_bag
 from vid2ev.formats.ros_events import EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
 from vid2ev.formats.ros_messages import event_array_bytes, image_bytes
 from vid2ev.formats.rosbag import Topic
@@ -44,7 +45,7 @@ class Ros2Bag:
         self.path = path
         self.warnings: list[str] = []
         with closing(self._opened()) as reader:
-            kinds = [(connection.topic, connection.msgtype) for connection in reader.connections]
+            kinds = [(str(connection.topic), str(connection.msgtype)) for connection in reader.connections]
         self.topics = [Topic(name, kind.replace("/msg/", "/")) for name, kind in dict.fromkeys(kinds)]
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes]]:
@@ -57,6 +58,8 @@ class Ros2Bag:
                     connection, _, content = next(messages)
                 except StopIteration:
                     return
+                except DataError:
+                    raise
                 except Exception as error:  # (what rosbags stumbles over in a damaged file can be anything)
                     raise ValueError("a message cannot be read") from error
                 yield connection.topic, bytes(content)
@@ -73,11 +76,15 @@ class Ros2Bag:
             head = file.read(len(METADATA))
         try:
             reader: Any
+            bound_decompression()
             if head.startswith(METADATA):
+                check_bag(self.path)
                 reader = Reader(self.path.parent)
             else:
                 reader = (McapReader if head.startswith(MCAP) else Sqlite3Reader)(self.path)
             reader.open()
+        except DataError:
+            raise
         except Exception as error:
             raise ValueError("no bag that rosbags can read") from error
         return reader

@@ -21,7 +21,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import Format, Recording, promised
-from vid2ev.formats.hdf5_file import MAGIC, WholeFile, holds_table, is_whole, opened
+from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.events import Events
 
@@ -87,6 +87,9 @@ def _check(file: h5py.File, path: Path) -> None:
     table = file.get("events")
     if not isinstance(table, h5py.Dataset) or table.ndim != 2 or not COLUMNS <= table.shape[1] <= COLUMNS + 1:
         raise DataError(f"{path} has no table of events with 4 columns; expected the HDF5 of v2e")
+    if not is_inside(table, path):
+        raise DataError(f"{path}: its events are in another file; expected one file, so copy them into it (h5repack)")
+    check_chunks(table, path)
     if not is_whole(table):
         raise DataError(f"{path} is damaged: parts of its events are missing; get another copy")
     if table.dtype.kind not in "iu":

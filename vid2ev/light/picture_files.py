@@ -18,6 +18,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, TIFF, head_of
+from vid2ev.untrusted import LARGEST, check_exr, first_line
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
 
@@ -70,7 +71,7 @@ def _read(path: Path, page: int, head: bytes, count: int = 1) -> list[np.ndarray
     import cv2
 
     flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
-    level = cv2.utils.logging.getLogLevel()
+    level, too_large = cv2.utils.logging.getLogLevel(), False
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)
     try:
         if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
@@ -78,10 +79,12 @@ def _read(path: Path, page: int, head: bytes, count: int = 1) -> list[np.ndarray
         else:
             one = cv2.imread(str(path), flags)
             found = [] if one is None else [one]
-    except cv2.error:
-        found = []
+    except cv2.error as error:
+        found, too_large = [], "MAX_IMAGE" in str(error)
     finally:
         cv2.utils.logging.setLogLevel(level)
+    if not found and too_large:
+        raise DataError(f"{path}: has more pixels than are allowed; if that is meant, set {LARGEST} in the environment")
     if not found:
         raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
     return [pixels if pixels.ndim == 2 else pixels[..., 2::-1] for pixels in found]
@@ -92,12 +95,13 @@ def _read_exr(path: Path) -> Picture:
         import OpenEXR
     except ImportError as error:
         raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+    check_exr(path)
     try:
         # (one thread: pictures are read in turn with work that has threads of its own)
         file = OpenEXR.File(str(path), separate_channels=True, num_threads=0)
         parts = [(part.header, part.channels) for part in file.parts]
     except Exception as error:  # (the library raises RuntimeError, ValueError and more)
-        raise DataError(f"{path}: not an EXR that can be read ({str(error).splitlines()[0]})") from error
+        raise DataError(f"{path}: not an EXR that can be read ({first_line(error)})") from error
     for header, channels in parts:
         names = _colour_channels(list(channels))
         if names and all(channels[name].xSampling == channels[name].ySampling == 1 for name in names):

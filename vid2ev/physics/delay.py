@@ -20,6 +20,7 @@ from pydantic import BaseModel, Field
 
 from vid2ev.stream.bounds import surely, unlike
 from vid2ev.stream.events import Events
+from vid2ev.stream.saved import events_of
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 FIELDS = ("t", "x", "y", "p", "label")
@@ -42,7 +43,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
 class Delayed:
     """Events made later; the state is those that are not due yet."""
 
-    def __init__(self, delay_us: float):
+    def __init__(self, delay_us: float, size: tuple[int, int]):
+        self.size = size
         self.delay_us = math.floor(delay_us + 0.5)
         self.held = Events.empty()
 
@@ -65,6 +67,5 @@ class Delayed:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that `state` gave."""
-        t, x, y, p, label = (state[f"delayed_{name}"] for name in FIELDS)
-        labels = label.astype(np.uint8) if len(label) else None
-        self.held = Events(t.copy(), x.astype(np.uint16), y.astype(np.uint16), p.astype(np.uint8), labels)
+        labelled = len(state["delayed_label"]) > 0
+        self.held = events_of(state, "delayed_", self.size, labelled, dict.fromkeys(FIELDS, np.int64))

@@ -20,7 +20,10 @@ from pydantic import BaseModel, Field
 
 from vid2ev.physics.omission import omitted
 from vid2ev.stream.events import Events
+from vid2ev.stream.saved import clock, entry, events_of
 from vid2ev.stream.scene import Omission, Scene
+
+KINDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}  # of events held back
 
 
 class FixedRate(BaseModel, frozen=True, extra="forbid"):
@@ -34,7 +37,7 @@ class EventFrames:
     """Events into event frames; the state is `origin_us`, the last frame of each pixel, and the events held back."""
 
     def __init__(self, spec: FixedRate, width: int, height: int, labels: bool = False):
-        self.spec, self.width, self.labels = spec, width, labels
+        self.spec, self.width, self.height, self.labels = spec, width, height, labels
         self.origin_us: int | None = None
         self.last = np.full(width * height, -1, np.int64)
         self.held = Events.empty(labels)
@@ -93,10 +96,9 @@ class EventFrames:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that `state` gave."""
-        self.origin_us = int(state["frame_origin"][0])
-        self.last[...] = state["frame_last"]
-        held = (state[f"held_{k}"] for k in "txyp")
-        self.held = Events(*held, state["held_label"] if self.labels else None)
+        (self.origin_us,) = clock(state, "frame_origin", 1)
+        self.last[...] = entry(state, "frame_last", np.int64, self.last.shape)
+        self.held = events_of(state, "held_", (self.width, self.height), self.labels, KINDS)
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

@@ -31,6 +31,7 @@ from vid2ev.recording.truth_arrays import (
     stated_number,
     write_png,
 )
+from vid2ev.untrusted import check_exr, read_array
 
 NOTHING, MOST = 65535, 65534  # codes
 CHANNELS = ("Z", "V", "Y", "R")  # of depth, of any layer, the likeliest first: renderers differ
@@ -63,7 +64,7 @@ def _write_npy(path: Path, depth: np.ndarray) -> None:
 
 def _read_npy(path: Path) -> np.ndarray:
     with reading(path), open(path, "rb") as file:
-        return np.lib.format.read_array(file, allow_pickle=False)
+        return read_array(file, path)
 
 
 def _write_exr(path: Path, depth: np.ndarray) -> None:
@@ -83,6 +84,7 @@ def _read_exr(path: Path) -> np.ndarray:
     openexr = _openexr(path)
     with reading(path):
         open(path, "rb").close()  # (the library does not say why it cannot)
+        check_exr(path)
         channels = openexr.File(str(path), separate_channels=True, num_threads=0).channels()
         name = next((name for last in CHANNELS for name in channels if name.rpartition(".")[2] == last), None)
         if name is None:

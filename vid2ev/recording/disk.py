@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -61,7 +63,7 @@ def whole(path: Path) -> Iterator[Path]:
         yield made
         for file in [*made.rglob("*"), made]:
             sync(file)
-        _exchange(made, path, replaced)
+        put_in_place(made, path, replaced)
         sync(path.absolute().parent)
     finally:
         for rest in (made, replaced, aside / "lock"):
@@ -103,9 +105,16 @@ def write_npz(path: Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
                 np.lib.format.write_array(member, array, allow_pickle=False)
 
 
-def _exchange(made: Path, path: Path, replaced: Path) -> None:
+def put_in_place(made: Path, path: Path, replaced: Path) -> None:
+    """Rename what was made to `path`, and what was there to `replaced`, which is not there.
+
+    At each instant there is one of both at `path`, where the system can exchange names; elsewhere for a moment none.
+    """
     if not path.is_dir():
         made.replace(path)
+        return
+    if _swapped(made, path):
+        made.rename(replaced)
         return
     path.rename(replaced)
     try:
@@ -113,6 +122,15 @@ def _exchange(made: Path, path: Path, replaced: Path) -> None:
     except OSError:
         replaced.rename(path)
         raise
+
+
+def _swapped(one: Path, other: Path) -> bool:
+    """Exchange two names at once; False where the system cannot (Linux can, on most file systems)."""
+    if sys.platform != "linux":
+        return False
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return rename is not None and rename(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0
 
 
 def _remove(path: Path) -> None:

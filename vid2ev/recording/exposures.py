@@ -31,9 +31,11 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
+from vid2ev.untrusted import read_text
 
 KINDS = {"raw": "raw", "png": "frames", "mp4": "frames.mp4"}  # and what they are called
 TIMESTAMPS, HEADER = "timestamps.txt", "# start_us end_us\n"
+LATEST_US = 1 << 60
 LEVEL = 1  # of Deflate: half the time of OpenCV's own 3, and 4 % more bytes where there is noise
 
 
@@ -123,6 +125,22 @@ class ExposureFiles:
             yield picture if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
 
 
+def read_spans(path: Path) -> np.ndarray:
+    """When each exposure began and ended, int64 [N, 2], us, of a file timestamps.txt.  Raises DataError."""
+    try:
+        lines = read_text(path).splitlines()
+        rows = [[int(word) for word in line.split()] for line in lines if line.strip() and line.lstrip()[0] != "#"]
+        spans = np.array(rows, np.int64).reshape(-1, 2)
+    except DataError:
+        raise
+    except (OSError, ValueError, OverflowError) as error:
+        said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+        raise DataError(f"{path}: cannot be read ({said}); expected two times in us on every line") from error
+    if not len(spans) or np.abs(spans.astype(np.float64)).max() >= LATEST_US or np.any(spans[:, 1] < spans[:, 0]):
+        raise DataError(f"{path}: {len(spans)} exposures, or one that ends before it begins; make the recording again")
+    return spans
+
+
 def write_codes(path: Path, codes: np.ndarray) -> None:
     """A PNG of codes, uint8 or uint16, [H, W] or red, green, blue [H, W, 3]; the same codes give the same bytes."""
     import cv2
@@ -135,8 +153,11 @@ def read_codes(path: Path) -> np.ndarray:
     """The codes of a PNG that `write_codes` wrote.  Raises DataError."""
     import cv2
 
-    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if pixels is None:
+    try:
+        pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16) or pixels.shape[2:] not in ((), (3,)):
         raise DataError(f"{path}: not a picture that can be read, expected one written here; start again")
     return pixels if pixels.ndim == 2 else pixels[..., ::-1]
 

@@ -20,17 +20,18 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from vid2ev.errors import UsageError
-from vid2ev.recording.disk import lock, sync, whole_file, writing
+from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
+from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
     r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
@@ -118,11 +119,25 @@ class Folder:
             np.savez(saved, allow_pickle=False, **state, **sizes)
 
     def saved(self) -> dict[str, np.ndarray]:
-        """The state of the last checkpoint; empty without one."""
+        """The state of the last checkpoint; empty without one.  Raises DataError."""
         if not self.resumable:
             return {}
-        with np.load(self.partial / "checkpoint.npz") as arrays:
-            return dict(arrays)
+        with self.taking_up():
+            return read_arrays(self.partial / "checkpoint.npz")
+
+    @contextmanager
+    def taking_up(self) -> Iterator[None]:
+        """What does not fit in the last checkpoint becomes one sentence: DataError."""
+        try:
+            yield
+        except DataError:
+            raise
+        except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own; the state may be of anything)
+            said = (str(error).splitlines() or [""])[0] if isinstance(error, Vid2evError) else type(error).__name__
+            raise DataError(
+                f"{self.partial / 'checkpoint.npz'} is damaged, or not of this recording ({said[:150]}); --overwrite"
+                " starts again"
+            ) from error
 
     @property
     def whole(self) -> Path:
@@ -144,10 +159,9 @@ class Folder:
         for path in self.whole.rglob("*"):
             sync(path)
         sync(self.whole)
-        if self.directory.exists():
-            shutil.rmtree(self.partial / "replaced", ignore_errors=True)
-            self.directory.rename(self.partial / "replaced")
-        self.whole.rename(self.directory)
+        shutil.rmtree(self.partial / "replaced", ignore_errors=True)
+        put_in_place(self.whole, self.directory, self.partial / "replaced")
+        sync(self.directory.absolute().parent)
         (self.partial / "checkpoint.npz").unlink(missing_ok=True)
 
     def writing(self) -> AbstractContextManager[None]:
@@ -158,8 +172,11 @@ class Folder:
         """Take up the checkpoint, find the recording finished, or start."""
         made, sizes = self.directory / "manifest.json", dict[str, int]()
         if self.resume and self.resumable and self._is_same(self.partial / "job.json"):
-            with np.load(self.partial / "checkpoint.npz") as saved:
+            shutil.rmtree(self.partial / "whole", ignore_errors=True)  # (perhaps the recording that was replaced)
+            saved = self.saved()
+            with self.taking_up():
                 sizes = {name[5:]: int(saved[name]) for name in saved if name.startswith("size.")}
+                self._check_sizes(sizes)
         elif self.resume and not self.resumable and made.exists() and self._is_same(made):
             self.finished = read_manifest(made)
             return
@@ -167,6 +184,16 @@ class Folder:
             self._clear()
             self._write_job()
         self._open(sizes)
+
+    def _check_sizes(self, sizes: Mapping[str, int]) -> None:
+        """Raise DataError where less is there of a file that grows than was there at the checkpoint."""
+        for name in self._growing:
+            path = self.partial / name
+            there = path.stat().st_size if path.is_file() else 0
+            if not 0 <= sizes[name] <= there:
+                raise DataError(
+                    f"{path} has {there:,} bytes, and {sizes[name]:,} at the last checkpoint; --overwrite starts again"
+                )
 
     def _write_job(self) -> None:
         with whole_file(self.partial / "job.json") as file:

@@ -9,12 +9,14 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
 HEAD = 1 << 20  # bytes at the start of a file by which it is known
@@ -60,14 +62,29 @@ def read_manifest(path: Path) -> dict[str, Any]:
     """Read the manifest of a recording folder, or a file; raises DataError."""
     path = path / "manifest.json" if path.is_dir() else path
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = json_of(read_text(path))
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file; give a folder that `vid2ev convert` wrote") from error
+    except DataError:
+        raise
     except (OSError, ValueError) as error:
         raise DataError(f"{path} cannot be read as JSON ({error}); make the recording again") from error
-    if not isinstance(manifest, dict) or "vid2ev" not in manifest.get("versions", {}):
+    stated = manifest.get("versions") if isinstance(manifest, dict) else None
+    if not isinstance(stated, dict) or "vid2ev" not in stated:
         raise DataError(f"{path} is not the manifest of a vid2ev recording; give a folder that `vid2ev convert` wrote")
     return manifest
+
+
+@contextmanager
+def as_stated(path: Path) -> Iterator[None]:
+    """What a manifest or a journal lacks, or has of another kind, becomes one sentence: DataError."""
+    try:
+        yield
+    except Vid2evError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        said = f"{type(error).__name__}: {error}"[:100].replace("\n", " ")
+        raise DataError(f"{path} does not say what it should ({said}); it is damaged: make it again") from error
 
 
 def is_of_job(path: Path, job: Mapping[str, Any], output: Path, overwrite: bool) -> bool:

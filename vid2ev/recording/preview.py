@@ -16,16 +16,19 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vid2ev.errors import UsageError
 from vid2ev.pictures.film import film_frame, join_films, open_film
 from vid2ev.recording.disk import sync
 from vid2ev.recording.panels import COLOURS, count, paint, reduced
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.saved import clock, entry
 from vid2ev.stream.upload import downloaded
 
 RATE = 30  # frames per second
@@ -98,10 +101,14 @@ class Preview:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state."""
-        self._t0_ns, self._next, *flags = (int(value) for value in state["clock"])
+        self._t0_ns, self._next, *flags = clock(state, "clock", 5)
         self._waiting, self._showing, self._moved = (bool(flag) for flag in flags)
-        self._starts = [int(start) for start in state["starts"]]
-        self._counts[...] = state["counts"]
+        self._starts = [int(start) for start in entry(state, "starts", np.int64, (None,))]
+        self._counts[...] = entry(state, "counts", np.uint8, self._counts.shape)
+        if any(after <= before for before, after in pairwise([-1, *self._starts, self._next + (not self._starts)])):
+            raise UsageError(f"state of a preview whose pieces begin at {self._starts[:9]}, up to {self._next}")
+        if missing := next((k for k in range(len(self._starts)) if not self._piece(k).is_file()), None):
+            raise UsageError(f"state of a preview without its piece {missing}")
 
     def join(self, path: Path) -> None:
         """Put the pieces one after the other into one file, without encoding them again."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file
+from vid2ev.untrusted import read_arrays, read_text
 
 NUMBERS = {"depth.txt": ("m_per_code", 0.001), "flow.txt": ("codes_per_px", 128)}  # what each states, as an example
 SMALLEST, LARGEST = 1e-9, 1e9
@@ -49,12 +50,13 @@ def as_stored(values: np.ndarray, dimensions: int, path: Path) -> np.ndarray:
 
 def read_npz(path: Path, name: str) -> np.ndarray:
     """An array of an .npz file.  Raises as `reading` does."""
-    with reading(path), open(path, "rb") as file, zipfile.ZipFile(file) as whole:
-        held = [member.removesuffix(".npy") for member in whole.namelist()]
+    with reading(path):
+        with zipfile.ZipFile(path) as whole:
+            held = [member.removesuffix(".npy") for member in whole.namelist()]
         if name not in held:
-            raise DataError(f"{path} has no array '{name}', only {', '.join(held) or 'none'}; give another file")
-        with whole.open(f"{name}.npy") as member:
-            return np.lib.format.read_array(member, allow_pickle=False)
+            said = ", ".join(held)[:200].replace("\n", " ") or "none"
+            raise DataError(f"{path} has no array '{name}', only {said}; give another file")
+        return read_arrays(path, [name])[name]
 
 
 def write_png(path: Path, picture: np.ndarray) -> None:
@@ -101,12 +103,14 @@ def stated_number(path: Path, name: str) -> float:
     """The number that is stated beside a file.  Raises DataError."""
     beside, (wanted, example) = path.with_name(name), NUMBERS[name]
     try:
-        key, value = beside.read_text(encoding="utf-8").split()
+        key, value = read_text(beside).split()
         number = float(value)
     except (OSError, ValueError) as error:
         raise DataError(f"{path} needs {beside} beside it, with a line such as '{wanted} {example}'") from error
     if key != wanted or not SMALLEST < number < LARGEST:
-        raise DataError(f"{beside} holds '{key} {value}', not a line such as '{wanted} {example}'; correct it")
+        raise DataError(
+            f"{beside} holds '{key[:40]} {value[:40]}', not a line such as '{wanted} {example}'; correct it"
+        )
     return number
 
 

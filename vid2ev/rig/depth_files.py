@@ -16,6 +16,7 @@ KITTI's development kit, "Stereo evaluation 2015".
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
 from vid2ev.rig.depth import DepthScale, between
+from vid2ev.untrusted import check_exr, read_arrays
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
 NAMES = ("depth", "depths", "disparity", "disparities")
@@ -108,12 +110,13 @@ def _read_arrays(path: Path) -> np.ndarray:
     try:
         if recognise(path) == "array":
             return np.load(path, mmap_mode="r", allow_pickle=False)
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            named = [name for name in archive.files if name in NAMES]
-            if len(archive.files) != 1 and len(named) != 1:
-                held = ", ".join(archive.files) or "nothing"
-                raise DataError(f"{path}: holds {held}; expected one array, or one called 'depth'")
-            return archive[(named or archive.files)[0]]
+        with zipfile.ZipFile(path) as archive:
+            files = [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
+        named = [name for name in files if name in NAMES]
+        if len(files) != 1 and len(named) != 1:
+            held = ", ".join(files)[:200].replace("\n", " ") or "nothing"
+            raise DataError(f"{path}: holds {held}; expected one array, or one called 'depth'")
+        return next(iter(read_arrays(path, (named or files)[:1]).values()))
     except DataError:
         raise
     except Exception as error:  # (damaged archives raise almost anything: of zipfile, zlib, struct, numpy)
@@ -126,6 +129,7 @@ def _read_exr(path: Path) -> np.ndarray:
     except ImportError as error:
         raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
     try:
+        check_exr(path)
         file = OpenEXR.File(str(path), separate_channels=True, num_threads=0)
         channels = {name: channel for part in file.parts for name, channel in part.channels.items()}
         named = [name for name in channels if name.rpartition(".")[2] in ("Z", "depth", "Depth")]

@@ -17,7 +17,6 @@ from __future__ import annotations
 import os
 import re
 import reprlib
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -27,7 +26,8 @@ from pydantic import BaseModel, ValidationError
 from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.rig.camera import Camera, Rig, Source
-from vid2ev.toml_text import toml_value
+from vid2ev.toml_text import parsed_toml, toml_value
+from vid2ev.untrusted import beside
 
 EXAMPLE = Path(__file__).with_name("example_rig.toml")
 Model = TypeVar("Model", bound=BaseModel)
@@ -35,9 +35,13 @@ TABLES = ("source", "camera")
 LARGEST = 1 << 18  # bytes; no rig or calibration comes near
 
 
-def read_rig(path: str | Path) -> Rig:
-    """The rig of a file.  Raises DataError for what cannot be read as TOML, UsageError for a file that is not there and
-    for keys and values that cannot be meant."""
+def read_rig(path: str | Path, to_use: bool = True) -> Rig:
+    """The rig of a file.
+
+    to_use  its sensors are to be read, too: files of theirs must be beside it or below (`vid2ev.untrusted`)
+    Raises DataError for what cannot be read as TOML, UsageError for a file that is not there and for keys and values
+    that cannot be meant.
+    """
     path = Path(path)
     tables = _tables(path)
     unknown = next((key for key in tables if key not in TABLES), None)
@@ -50,7 +54,7 @@ def read_rig(path: str | Path) -> Rig:
     if not isinstance(listed, list) or not listed or not all(isinstance(table, dict) for table in listed):
         raise UsageError(f"{path}: there is no camera; write a table [[camera]] for each one, with its name and kind")
     source = _made(Source, tables.get("source", {}), f"{path}: [source]")
-    cameras = [_camera(table, index, path) for index, table in enumerate(listed)]
+    cameras = [_camera(table, index, path, to_use) for index, table in enumerate(listed)]
     try:
         return Rig(source=source, cameras=tuple(cameras))
     except ValidationError as error:
@@ -113,18 +117,19 @@ def names_cameras(path: Path) -> bool:
 def _tables(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # (numbers of thousands of digits are ValueErrors of their own)
-        raise DataError(f"{path}: not valid TOML: {str(error).splitlines()[0]}; correct that line") from error
+        return parsed_toml(text)
+    except ValueError as error:
+        raise DataError(f"{path}: not valid TOML: {error}; correct that line") from error
 
 
-def _camera(table: Mapping[str, Any], index: int, path: Path) -> Camera:
+def _camera(table: Mapping[str, Any], index: int, path: Path, to_use: bool) -> Camera:
     name = table.get("name")
     where = f"{path}: camera '{name}'" if isinstance(name, str) else f"{path}: camera {index + 1}"
     camera = _made(Camera, table, where)
     if camera.sensor is not None and _is_file(camera.sensor):
-        beside = os.path.normpath(path.parent / camera.sensor)
-        camera = camera.model_copy(update={"sensor": beside})
+        if to_use:
+            beside(path, camera.sensor)
+        camera = camera.model_copy(update={"sensor": os.path.normpath(path.parent / camera.sensor)})
     return camera
 
 

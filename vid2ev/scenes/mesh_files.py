@@ -9,6 +9,7 @@ Source: the formats as trimesh reads them; its (u, v) count from the lower borde
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.pictures import PictureReader
 from vid2ev.scenes.snapshot import Mesh, Texture
+from vid2ev.untrusted import PATHS, check_bytes, first_line, json_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".obj", ".ply", ".stl", ".gltf", ".glb")
 SMOOTH_RAD = np.radians(30.0)
 MOST = 0.9
+MOST_OF_AN_ENTRY = 16  # bytes
 
 
 def load_mesh(path: Path | str) -> Mesh:
@@ -35,7 +38,12 @@ def load_mesh(path: Path | str) -> Mesh:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"{path}: a mesh must be one of {', '.join(SUFFIXES)}")
-    parts = [_part(part) for part in _geometries(path)]
+    try:
+        parts = [_part(part) for part in _geometries(path)]
+    except (UsageError, DataError):
+        raise
+    except Exception as error:  # (pictures within can be damaged, or larger than Pillow allows)
+        raise DataError(f"{path}: not a mesh that can be read ({first_line(error)}); export it anew") from error
     if not parts:
         raise DataError(f"{path}: holds no triangles; export it anew as a mesh with faces")
     mesh = parts[0] if len(parts) == 1 else _joined(parts)
@@ -55,13 +63,33 @@ def _geometries(path: Path) -> list[trimesh.Trimesh]:
     if not path.is_file():
         raise DataError(f"{path}: no such file; give the path of a mesh")
     try:
-        found = trimesh.load_scene(path, process=False).dump(concatenate=False)
+        _check_claims(path)
+        # (pictures and buffers that the file names are looked for in its folder and below, nowhere else)
+        anywhere = os.environ.get(PATHS) == "anywhere"
+        found_by = trimesh.resolvers.FilePathResolver(str(path), allow_anywhere=anywhere)
+        found = trimesh.load_scene(path, process=False, resolver=found_by).dump(concatenate=False)
         meshes = [part for part in found if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    except (UsageError, DataError):
+        raise
     except Exception as error:  # (the package raises whatever its parsers come across)
         raise DataError(f"{path}: not a mesh that can be read; export it anew") from error
+    if any(part.faces.min() < 0 or part.faces.max() >= len(part.vertices) for part in meshes):
+        raise DataError(f"{path}: has triangles between vertices that are not there; export it anew")
     if any(not np.isfinite(part.vertices).all() for part in meshes):
         raise DataError(f"{path}: has vertices that are not finite numbers; export it anew")
     return meshes
+
+
+def _check_claims(path: Path) -> None:
+    """Raise DataError for a glTF file whose arrays would take more memory than they may: of those without content the
+    file has nothing but the length."""
+    if path.suffix.lower() not in (".gltf", ".glb"):
+        return
+    content = path.read_bytes()
+    if content.startswith(b"glTF"):
+        content = content[20 : 20 + int.from_bytes(content[12:16], "little")]
+    arrays = json_of(content).get("accessors", [])
+    check_bytes(path, sum(max(int(array["count"]), 0) for array in arrays) * MOST_OF_AN_ENTRY, "its arrays")
 
 
 def _part(part: trimesh.Trimesh) -> Mesh:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import copy
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +20,13 @@ from vid2ev.scenes.complaints import sentence
 from vid2ev.scenes.ranges import Chance, chance_of, drawn, extremes, is_range
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.textures import ANY, IN_COLOUR, PHOTOGRAPHS
+from vid2ev.toml_text import parsed_toml
+from vid2ev.untrusted import beside, read_text
 
 PREDEFINED = Path(__file__).with_name("predefined")
 LISTS = ("objects", "lights")
 MOST = 1000  # of anything that has a count
+MOST_OF_ALL = 5000
 LARGEST_SEED = (1 << 63) - 1
 
 
@@ -35,6 +37,7 @@ class SceneFile:
     name: str
     path: Path
     tables: Mapping[str, Any]
+    asked: frozenset[str] = frozenset()  # files that were asked for beside it, which may be anywhere
 
     def resolved(self, seed: int = 0) -> Scene:
         """The scene of a seed, every number settled.  Raises UsageError if there can be none."""
@@ -71,6 +74,7 @@ class SceneFile:
         if not isinstance(things, list) or not all(isinstance(thing, Mapping) for thing in things):
             raise UsageError(f"{kind} = {things!r}: expected tables, each under a line [[{kind}]]")
         names = [str(thing.get("name", f"{thing.get('kind', kind)}-{index}")) for index, thing in enumerate(things)]
+        total = 0
         for name, thing in zip(names, things, strict=True):
             if names.count(name) > 1:
                 raise UsageError(f"{kind}.{name}: {names.count(name)} have this name; give each its own, or a count")
@@ -79,6 +83,8 @@ class SceneFile:
             count = drawn(thing["count"], chance, f"{path}.count") if "count" in thing else 1
             if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MOST:
                 raise UsageError(f"{path}.count = {count!r}: expected a whole number from 0 to {MOST}")
+            if (total := total + count) > MOST_OF_ALL:
+                raise UsageError(f"{kind}: there are {total:,}; expected at most {MOST_OF_ALL:,} in all")
             for k in range(count):
                 numbered = f"{name}-{k + 1}" if "count" in thing else name
                 yield {"name": numbered} | drawn(content, chance, f"{path}#{k}", (k, count))
@@ -100,7 +106,7 @@ class SceneFile:
             return text
         if text == ANY:
             return IN_COLOUR[int(chance(f"{path}.any") * len(IN_COLOUR))]
-        file = (self.path.parent / text).absolute()
+        file = (self.path.parent / text).absolute() if text in self.asked else beside(self.path, text)
         if file.is_dir() and path.endswith(("texture", "environment")):
             return str(_one_of(file, chance(f"{path}.any"), f"{self.name}: {path}"))
         if not file.is_file():
@@ -138,16 +144,19 @@ def read_scene(name_or_path: str | Path, settings: Sequence[str] = ()) -> SceneF
     """
     name, path = _find(str(name_or_path))
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        tables = parsed_toml(read_text(path))
+    except DataError:
+        raise
     except OSError as error:
         raise DataError(f"scene {path} cannot be read ({error.strerror}); give a readable TOML file") from error
     except UnicodeDecodeError as error:
         raise DataError(f"scene {path} cannot be read (it is not UTF-8 text); give a TOML file") from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise DataError(f"scene {path} is not valid TOML: {error}; correct that line") from error
     for text in settings:
         tables = changed(tables, text, name)
-    file = SceneFile(name, path, tables)
+    asked = (_parsed(text.partition("=")[2].strip()) for text in settings)
+    file = SceneFile(name, path, tables, frozenset(value for value in asked if isinstance(value, str)))
     file.check()
     return file
 
@@ -189,8 +198,8 @@ def _entered(node: Any, step: str, before: Sequence[str], where: str) -> Any:
 def _parsed(text: str) -> Any:
     """A TOML value, or the text itself."""
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+        parsed = parsed_toml(f"value = {text}")
+    except ValueError:
         return text
     return parsed["value"] if list(parsed) == ["value"] else text
 

@@ -16,6 +16,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.limits import check_sensor
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.saved import clock, entry
 
 __all__ = ["Cis", "CisSpec"]
 
@@ -132,16 +133,17 @@ class Cis:
             self._t_ns, self._first_ns, self._next = None, 0, 0
             self._made = self._unfinished = self._rows.mended = 0
             return
-        if state["light"].shape != self._rows.shape:
-            raise UsageError(
-                f"state of {state['light'].shape} values, expected {self._rows.shape}: another sensor's state"
-            )
-        self._t_ns, self._first_ns, self._next = (int(n) for n in state["clock"])
-        self._made, self._unfinished, self._rows.mended = (int(n) for n in state["counts"])
-        self._rows.before = self._rows.put(state["light"])
+        shape = self._rows.shape
+        light = entry(state, "light", np.float32, shape)
+        begun = entry(state, "open", np.int64, (None, 2))
+        totals = entry(state, "totals", np.float64, (len(begun), *shape)) if len(begun) else begun
+        pending = entry(state, "pending", np.float64, (len(begun), shape[0])) if len(begun) else begun
+        self._t_ns, self._first_ns, self._next = clock(state, "clock", 3)
+        self._made, self._unfinished, self._rows.mended = clock(state, "counts", 3)
+        self._rows.before = self._rows.put(light)
         self._open += [
-            Open(int(index), int(start_ns), self._rows.put(total), pending.copy())
-            for (index, start_ns), total, pending in zip(state["open"], state["totals"], state["pending"], strict=True)
+            Open(int(index), int(start_ns), self._rows.put(total), rows.copy())
+            for (index, start_ns), total, rows in zip(begun, totals, pending, strict=True)
         ]
 
     @property

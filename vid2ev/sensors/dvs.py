@@ -26,6 +26,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part, Tiles
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.saved import clock, entry
 from vid2ev.stream.still import NOT_TOLD, Still, strip_count, told_of
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Dvs:
         self._flags, self._numbers = flags or flags_of(spec, self.labels), numbers_of(spec, seed, camera)
         self._planes, self._bad = planes_of(spec, self._flags, self._numbers, *self.size, old)
         self._frames = EventFrames(spec, *self.size, self.labels) if spec.frame_rate_hz > 0 else None
-        self._delayed = Delayed(spec.delay_us) if spec.delay_us > 0 else None
+        self._delayed = Delayed(spec.delay_us, self.size) if spec.delay_us > 0 else None
         self._tallies = np.zeros((self._tiles.count, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
@@ -216,16 +217,12 @@ class Dvs:
             return
         for name in STATE_PLANES:
             plane = getattr(self._planes, name)
-            if state[name].shape != plane.shape:
-                raise UsageError(
-                    f"state of {state[name].size} entries in '{name}', expected {plane.size}: another sensor's state"
-                )
-            plane[...] = state[name]
-        self._t_ns, self._leak_since_ns, self._step, fresh = (int(value) for value in state["clock"])
+            plane[...] = entry(state, name, plane.dtype, plane.shape)
+        self._t_ns, self._leak_since_ns, self._step, fresh = clock(state, "clock", 4)
         self._fresh_noise = bool(fresh)
         self._tallies[...] = 0
-        self._tallies[0] = state["tallies"]
-        self._polarities[...] = state["polarities"]
+        self._tallies[0] = entry(state, "tallies", self._tallies.dtype, self._tallies.shape[1:])
+        self._polarities[...] = entry(state, "polarities", self._polarities.dtype, self._polarities.shape)
         for part in (self._frames, self._delayed):
             if part is not None:
                 part.restore(state)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 import reprlib
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,8 @@ from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.requests import setting
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.toml_text import parsed_toml
+from vid2ev.untrusted import read_text
 
 
 @dataclass(frozen=True)
@@ -131,13 +132,15 @@ def kinds_of(name_or_path: str | Path) -> list[Kind]:
 def _tables(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of a TOML file, and what is in it."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
+    except DataError:
+        raise
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise DataError(f"Sensor file {path} cannot be read ({reason}); give a readable TOML file.") from error
     try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return text, parsed_toml(text)
+    except ValueError as error:
         raise DataError(f"Sensor file {path} is not valid TOML: {error}; correct that line.") from error
 
 

@@ -198,16 +198,16 @@ def _rows(path: Path) -> list[list[float]]:
     if lines and lines[0][0] == "t":
         names = lines.pop(0)
     if not {"t", "x", "y"} <= set(names) <= {"t", "x", "y", "angle", "zoom"} or len(set(names)) < len(names):
-        raise DataError(f"{path}: columns {', '.join(names)}; expected t,x,y[,angle][,zoom]")
+        raise DataError(f"{path}: columns {', '.join(names)[:80]}; expected t,x,y[,angle][,zoom]")
     rows = []
     for number, words in enumerate(lines, 1):
         try:
             row = {"angle": 0.0, "zoom": 1.0} | dict(zip(names, map(float, words), strict=True))
         except ValueError as error:
-            raise DataError(f"{path}: row {number} is {','.join(words)}; expected {len(names)} numbers") from error
+            raise DataError(f"{path}: row {number} is {','.join(words)[:80]}; expected {len(names)} numbers") from error
         if not all(map(math.isfinite, row.values())) or not 0.01 <= row["zoom"] <= 100:
             raise DataError(
-                f"{path}: row {number} is {','.join(words)}; expected finite numbers, a zoom of 0.01 to 100"
+                f"{path}: row {number} is {','.join(words)[:80]}; expected finite numbers, a zoom of 0.01 to 100"
             )
         rows.append([row[name] for name in ("t", "x", "y", "angle", "zoom")])
     if len(rows) < 2 or any(b[0] <= a[0] for a, b in pairwise(rows)):

@@ -25,6 +25,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.untrusted import check_bytes, read_array
 
 Shape = tuple[int, ...]
 Read = Callable[[int], np.ndarray]
@@ -93,6 +94,7 @@ class NpzStack:
     def opened(self) -> Iterator[Read]:
         """Frames are unpacked one after the other."""
         size = math.prod(self.shape[1:]) * self.dtype.itemsize
+        check_bytes(self.path, size, f"a frame of shape {list(self.shape[1:])}")
         with self._archive() as archive:
             offset = self._header(archive, self.name)[1]
             with archive.open(f"{self.name}.npy") as member:
@@ -141,7 +143,9 @@ class NpzStack:
     def _small(self, archive: zipfile.ZipFile, name: str) -> np.ndarray:
         try:
             with archive.open(f"{name}.npy") as member:
-                found = np.lib.format.read_array(member, allow_pickle=False)
+                found = read_array(member, self.path)  # type: ignore[arg-type]
+        except DataError:
+            raise
         except BROKEN as error:
             raise DataError(f"{self.path}: its array '{name}' cannot be read; write it with numpy.savez") from error
         if found.dtype.kind not in "iuf" or found.size == 0:

@@ -22,11 +22,11 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from tokenize import TokenError
 
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.untrusted import read_array
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
@@ -120,7 +120,7 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
             said = re.match(UNIT_LINE, line)
             stated = said and (said[1] or said[2] or said[3])
             if stated and stated not in NS_PER_UNIT:
-                raise DataError(f"{path}, line {number}: unit '{stated}', expected s, ms, us or ns")
+                raise DataError(f"{path}, line {number}: unit '{stated[:40]}', expected s, ms, us or ns")
             unit, column = stated or unit, 0 if said and said[3] else column
         elif line.strip():
             words.append(line.replace(",", " ").split()[column])
@@ -130,7 +130,9 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
             values.append(Fraction(word))
         except (ValueError, ZeroDivisionError) as error:
             place = "last" if column else "first"
-            raise DataError(f"{path}: '{word}' is no time; expected one in the {place} column of every line") from error
+            raise DataError(
+                f"{path}: '{word[:40]}' is no time; expected one in the {place} column of every line"
+            ) from error
     if unit is not None:
         return _in_seconds(values, unit, path), unit
     whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
@@ -141,9 +143,13 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
 def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a one-dimensional .npy: floating point is seconds, whole numbers by their spacing (rule above)."""
     try:
-        stamps = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError, SyntaxError, TokenError) as error:
-        raise DataError(f"{path}: cannot be read as a .npy array ({error}); write it with numpy.save") from error
+        with open(path, "rb") as file:
+            stamps = read_array(file, path)
+    except DataError:
+        raise
+    except Exception as error:  # (numpy has a dozen of its own for damaged headers)
+        said = (str(error).splitlines() or [type(error).__name__])[0][:200]
+        raise DataError(f"{path}: cannot be read as a .npy array ({said}); write it with numpy.save") from error
     return stamps_of_array(stamps, path)
 
 

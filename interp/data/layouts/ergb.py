@@ -36,6 +36,7 @@ LAYOUTS = {
     "hsergb": Names("images_corrected", "events_aligned", ("x", "y", "t", "p"), False),
     "bsergb": Names("images", "events", ("x", "y", "timestamp", "polarity"), True),
 }
+LATEST_US = 1 << 60
 MOMENT = 0.25  # of the time between pictures
 STAMPS = ("timestamp.txt", "timestamps.txt")
 
@@ -84,7 +85,10 @@ class Ergb:
         """Picture k, red, green, blue."""
         import cv2
 
-        picture = cv2.imread(str(self._images[k]), cv2.IMREAD_COLOR)
+        try:
+            picture = cv2.imread(str(self._images[k]), cv2.IMREAD_COLOR)
+        except cv2.error:
+            picture = None
         if picture is None:
             raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
         return picture[..., ::-1]
@@ -105,9 +109,12 @@ class Ergb:
         times, strange = [], 0
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
             try:
-                times.append(round(float(line.split()[0])) if line.strip() else None)
+                time_us = round(float(line.split()[0])) if line.strip() else None
             except (ValueError, OverflowError):
-                strange += 1
+                time_us, strange = None, strange + 1
+            if time_us is not None and abs(time_us) >= LATEST_US:
+                time_us, strange = None, strange + 1
+            times.append(time_us)
         if strange:
             self.remarks.append(f"{strange} lines of {path.name} are no times")
         return np.array([t for t in times if t is not None], np.int64)

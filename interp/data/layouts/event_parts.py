@@ -15,7 +15,6 @@ Sources: the READMEs and loaders of rpg_timelens and timelens-pp, and what their
 
 from __future__ import annotations
 
-import zipfile
 from functools import lru_cache
 from pathlib import Path
 
@@ -23,6 +22,7 @@ import numpy as np
 
 from interp.data.layouts.sequence import Placed
 from vid2ev.errors import DataError
+from vid2ev.untrusted import read_arrays
 
 SCALE = 32.0
 WRAP = 65536
@@ -108,15 +108,23 @@ class EventParts:
 def columns_of(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """t int64 [us], x, y as they are, and p as 0 and 1, uint8, of a file.  Raises DataError."""
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
-            names = [next((name for name in choice if name in arrays), choice[0]) for choice in COLUMNS]
-            columns = [arrays[name].reshape(-1) for name in names]
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
-        raise DataError(f"{path} is no file of events ({error}); expected an npz of x, y, t, p") from error
+        arrays = read_arrays(path, [name for choice in COLUMNS for name in choice])
+        names = [next((name for name in choice if name in arrays), choice[0]) for choice in COLUMNS]
+        columns = [arrays[name].reshape(-1) for name in names]
+    except DataError:
+        raise
+    except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own)
+        said = (str(error).splitlines() or [type(error).__name__])[0][:150]
+        raise DataError(f"{path} is no file of events ({said}); expected an npz of x, y, t, p") from error
     lengths = {len(each) for each in columns}
     if len(lengths) > 1:
         raise DataError(f"{path} is no file of events (columns of {sorted(lengths)}); expected one length")
     t, x, y, p = columns
+    if any(each.dtype.kind not in "iufb" for each in columns) or not np.all(np.abs(t.astype(np.float64)) < 1 << 62):
+        kinds = ", ".join(str(each.dtype) for each in columns)
+        raise DataError(
+            f"{path} is no file of events (columns of {kinds}, or times beyond all clocks); expected numbers"
+        )
     return np.floor(t).astype(np.int64), x, y, (p > 0).astype(np.uint8)
 
 

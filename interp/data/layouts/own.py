@@ -13,10 +13,12 @@ import numpy as np
 
 from interp.data.layouts.sequence import Placed
 from vid2ev import CisSpec, DataError, read_events
-from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes
-from vid2ev.recording.manifest import read_manifest
+from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes, read_spans
+from vid2ev.recording.manifest import as_stated, read_manifest
 
 MANIFEST = "manifest.json"
+MOST_PIXELS = 1 << 16  # of a side of a sensor
+LATEST_US = 1 << 60
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
 
@@ -85,26 +87,37 @@ def _cameras(folder: Path) -> list[dict[str, Any]]:
     """Kind, folder and what else matters of each camera of a recording."""
     found = []
     for path in [folder / MANIFEST, *sorted(folder.glob(f"*/{MANIFEST}"))]:
-        said = read_manifest(path)
-        sensor = said.get("sensor")
-        if sensor is None or (sensor["kind"] == "cis" and _pictures_in(path.parent) is None):
-            continue
-        numbers, begin = sensor["parameters"], said["start_us"]
-        facts = {"kind": sensor["kind"], "folder": path.parent, "size": sensor["size"]}
-        if sensor["kind"] == "cis":
-            facts |= {"folder": _pictures_in(path.parent), "rate_hz": numbers["frame_rate_hz"], "numbers": numbers}
-        else:
-            facts["contrast"] = (numbers["threshold_off"], numbers["threshold_on"])
-            facts["span_us"] = (begin, begin + said["duration_us"])
-        found.append(facts)
+        with as_stated(path):
+            facts = _facts(read_manifest(path), path.parent)
+        found += [facts] if facts else []
     return found
+
+
+def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
+    """What the manifest of a camera says; None of one without pictures, or of all cameras.  Raises KeyError,
+    TypeError, ValueError for what no manifest says."""
+    sensor = said.get("sensor")
+    if sensor is None or (sensor["kind"] == "cis" and _pictures_in(folder) is None):
+        return None
+    numbers = sensor["parameters"]
+    width, height = (range(1, MOST_PIXELS)[int(side) - 1] for side in sensor["size"])
+    facts = {"kind": sensor["kind"], "folder": folder, "size": (width, height)}
+    if sensor["kind"] == "cis":
+        return facts | {"folder": _pictures_in(folder), "rate_hz": float(numbers["frame_rate_hz"]), "numbers": numbers}
+    begin, length = (range(-LATEST_US, LATEST_US)[int(said[key]) + LATEST_US] for key in ("start_us", "duration_us"))
+    contrast = tuple(float(numbers[key]) for key in ("threshold_off", "threshold_on"))
+    if not all(0 < each < 100 for each in contrast):
+        raise ValueError(f"thresholds {contrast}")
+    return facts | {"contrast": contrast, "span_us": (begin, begin + length)}
 
 
 def _apart(folder: Path, *names: str) -> bool:
     """Whether two cameras of a recording look from different places, or through different lenses."""
-    placed = {each["name"]: each for each in read_manifest(folder / MANIFEST).get("rig", {}).get("cameras", [])}
-    one, other = (placed.get(name) for name in names)
-    return one is not None and other is not None and not np.allclose(_sight(one), _sight(other), atol=1e-6)
+    said = read_manifest(folder / MANIFEST)
+    with as_stated(folder / MANIFEST):
+        placed = {each["name"]: each for each in said.get("rig", {}).get("cameras", [])}
+        one, other = (placed.get(name) for name in names)
+        return one is not None and other is not None and not np.allclose(_sight(one), _sight(other), atol=1e-6)
 
 
 def _sight(camera: dict[str, Any]) -> np.ndarray:
@@ -122,14 +135,19 @@ class _Pictures:
     def __init__(self, facts: dict[str, Any]):
         self._folder: Path = facts["folder"]
         raw = self._folder.name == KINDS["raw"]
-        self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
-        opened = np.loadtxt(self._folder / TIMESTAMPS, dtype=np.int64, ndmin=2)
+        with as_stated(self._folder.parent / MANIFEST):
+            self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
+        opened = read_spans(self._folder / TIMESTAMPS)
         self.times_us = opened.sum(axis=1) // 2  # the middles of the exposures
 
     def codes(self, number: int) -> np.ndarray:
         """Codes uint8, [H, W] or [H, W, 3]."""
         codes = read_codes(self._folder / f"{number:06d}.png")
-        return codes if self._picture is None else self._picture[codes]
+        if self._picture is None:
+            return codes
+        if codes.max(initial=0) >= len(self._picture):
+            raise DataError(f"{self._folder / f'{number:06d}.png'}: code {codes.max()}, beyond those of its sensor")
+        return self._picture[codes]
 
     def rgb(self, number: int) -> np.ndarray:
         """Red, green, blue [H, W, 3], uint8."""

@@ -30,6 +30,7 @@ from vid2ev.rig.pose import Pose
 from vid2ev.rig.rig_file import read_text
 
 LARGEST = 1e12  # of a number that can be meant
+MOST_ENTRIES = 1000  # of a list of numbers: YAML can say one list a thousand times
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,10 @@ class Node:
         """The entries of a list and of the lists in it, or those of one of OpenCV's matrices."""
         if "data" in self:
             return self["data"]._flat(count)
-        entries = [one for entry in self.entries() for one in (entry.entries() if _is_list(entry) else [entry])]
+        outer = self.entries()
+        if sum(len(entry.value) if _is_list(entry) else 1 for entry in outer) > MOST_ENTRIES:
+            raise self.wrong(f"at most {MOST_ENTRIES} numbers")
+        entries = [one for entry in outer for one in (entry.entries() if _is_list(entry) else [entry])]
         if count is not None and len(entries) != count:
             raise self.wrong(f"{count} numbers")
         return entries

@@ -1,0 +1,253 @@
+"""Files that nobody vouches for: bombs are refused before they go off, names stay in their folder, nothing is run."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import torch
+
+from interp import weights
+from interp.networks import make
+from interp.train.checkpoints import read_checkpoint
+from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.formats import open_events
+from vid2ev.light.picture_files import read_picture
+from vid2ev.recording.manifest import as_stated, read_manifest
+from vid2ev.recording.truth_files import read_depth, read_flow
+from vid2ev.rig.calibration import read_calibration
+from vid2ev.rig.depth import DepthScale
+from vid2ev.rig.depth_files import DepthFiles
+from vid2ev.rig.rig_file import read_rig
+from vid2ev.scenes.mesh_files import load_mesh
+from vid2ev.scenes.scene_file import read_scene
+from vid2ev.sensors.presets import load_sensor
+from vid2ev.sources.times import read_timestamp_array
+from vid2ev.untrusted import LARGEST, PATHS, beside, most_bytes
+
+MEGABYTE = 1 << 20
+
+
+def npy_head(shape: tuple[int, ...], dtype: str = "<f4") -> bytes:
+    """The beginning of a .npy file: all that a bomb needs."""
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"descr": dtype, "fortran_order": False, "shape": shape})
+    return head.getvalue()
+
+
+def npz(path: Path, **members: bytes) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(f"{name}.npy", content)
+    return path
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight megabytes may be taken."""
+    monkeypatch.setenv(LARGEST, "8")
+
+
+def bomb_of_zeros(side: int) -> bytes:
+    return npy_head((side, side)) + bytes(4 * side * side)
+
+
+@pytest.mark.usefixtures("small")
+def test_arrays_that_claim_too_much_are_refused_and_the_limit_can_be_raised(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claims = npy_head((1 << 20, 1 << 20))
+    (tmp_path / "a.npy").write_bytes(claims)
+    packed = npz(tmp_path / "a.npz", flow=npy_head((2000, 2000, 2)) + bytes(32_000_000))
+    assert packed.stat().st_size < MEGABYTE
+    for read in (
+        lambda: read_depth(tmp_path / "a.npy"),
+        lambda: read_timestamp_array(tmp_path / "a.npy"),
+        lambda: read_flow(packed),
+        lambda: DepthFiles(npz(tmp_path / "d.npz", depth=bomb_of_zeros(2000)), (2000, 2000), DepthScale()),
+    ):
+        with pytest.raises(DataError, match=f"are allowed; if that is meant, set {LARGEST}="):
+            read()
+    monkeypatch.setenv(LARGEST, "100")
+    assert read_flow(packed).shape == (2000, 2000, 2)
+
+
+def test_a_limit_that_is_no_number_is_a_mistake_of_who_set_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LARGEST, "much")
+    with pytest.raises(UsageError, match="whole number of megabytes"):
+        most_bytes()
+
+
+def test_pictures_that_claim_too_much_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    head = struct.pack(">IIBBBBB", 1 << 19, 1 << 19, 8, 0, 0, 0, 0)
+    chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(bytes(100_000))), (b"IEND", b"")]
+    png = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
+    (tmp_path / "a.png").write_bytes(png)
+    with pytest.raises(DataError, match=f"more pixels than are allowed; .*{LARGEST}"):
+        read_picture(tmp_path / "a.png")
+    OpenEXR = pytest.importorskip("OpenEXR")
+    OpenEXR.File({}, {"Y": np.ones((600, 600), np.float32)}).write(str(tmp_path / "a.exr"))
+    read_picture(tmp_path / "a.exr")
+    monkeypatch.setenv(LARGEST, "1")
+    with pytest.raises(DataError, match="its pixels would take 3 MB"):
+        read_picture(tmp_path / "a.exr")
+
+
+def hdf5(path: Path, **datasets: Any) -> Path:
+    with h5py.File(path, "w") as file:
+        for name in "txyp":
+            file[f"events/{name}"] = np.zeros(4, np.uint16)
+        for name, options in datasets.items():
+            file.create_dataset(name.replace("__", "/"), **options)
+    return path
+
+
+@pytest.mark.usefixtures("small")
+def test_hdf5_cannot_fill_the_memory_or_reach_into_other_files(tmp_path: Path) -> None:
+    zeros = {"shape": (1 << 22,), "dtype": "i8", "chunks": (1 << 16,), "compression": "gzip", "data": np.zeros(1 << 22)}
+    with pytest.raises(DataError, match="frames/t would take 32 MB"):
+        open_events(hdf5(tmp_path / "a.h5", frames__t=zeros))
+    path = hdf5(tmp_path / "b.h5")
+    with h5py.File(path, "r+") as file:
+        del file["events/t"]
+        file.create_dataset("events/t", (4,), "u2", chunks=(1 << 23,), maxshape=(None,))
+    with pytest.raises(DataError, match="a chunk of /events/t would take 16 MB"):
+        open_events(path)
+    other = hdf5(tmp_path / "secret.h5")
+    for link in ("external", "virtual"):
+        path = hdf5(tmp_path / f"{link}.h5")
+        with h5py.File(path, "r+") as file:
+            del file["events/t"]
+            if link == "external":
+                file["events/t"] = h5py.ExternalLink(str(other), "events/t")
+            else:
+                layout = h5py.VirtualLayout((4,), "u2")
+                layout[:] = h5py.VirtualSource(str(other), "events/t", (4,))
+                file.create_virtual_dataset("events/t", layout)
+        with pytest.raises(DataError, match="is in another file"):
+            open_events(path)
+
+
+def test_texts_that_are_nested_too_deeply_are_no_texts(tmp_path: Path) -> None:
+    deep = "[" * 100_000
+    (tmp_path / "a.toml").write_text(f"[dvs]\nthreshold_on = {deep}")
+    (tmp_path / "a.json").write_text(deep)
+    for read in (load_sensor, read_scene, read_rig):
+        with pytest.raises(DataError, match="nested too deeply"):
+            read(tmp_path / "a.toml")
+    with pytest.raises(DataError, match="nested too deeply"):
+        read_manifest(tmp_path / "a.json")
+
+
+def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:
+    once = f"&a [{', '.join(['1'] * 2000)}]"
+    text = f"cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [{once}{', *a' * 2000}]\n"
+    (tmp_path / "a.yaml").write_text(f"{text}  distortion_coeffs: []\n  resolution: [2, 2]\n")
+    with pytest.raises(DataError, match="at most 1000 numbers"):
+        read_calibration(tmp_path / "a.yaml")
+
+
+def test_scenes_have_so_many_things_and_no_more(tmp_path: Path) -> None:
+    things = "".join(f'[[objects]]\nname = "o{k}"\ncount = 1000\nshape = "sphere"\n' for k in range(9))
+    (tmp_path / "a.toml").write_text(f"[scene]\nduration_s = 1\n{things}")
+    with pytest.raises(UsageError, match="expected at most 5,000 in all"):
+        read_scene(tmp_path / "a.toml")
+
+
+def test_names_in_files_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "mine.toml").write_text("[dvs]\n")
+    rig, scene = tmp_path / "in" / "rig.toml", tmp_path / "in" / "scene.toml"
+    assert beside(rig, "sub/mine.toml") == tmp_path / "in" / "sub" / "mine.toml"
+    for name in ("../mine.toml", str(tmp_path / "mine.toml"), "sub/../../mine.toml"):
+        rig.write_text(f'[[camera]]\nname = "a"\nkind = "dvs"\nsensor = "{name}"\n')
+        scene.write_text(f'[scene]\nduration_s = 1\n[[objects]]\nname = "a"\nshape = "mesh"\nfile = "{name}"\n')
+        for read, path in ((read_rig, rig), (read_scene, scene)):
+            with pytest.raises(UsageError, match=f"not in its folder or below; .* {PATHS}=anywhere"):
+                read(path)
+    assert read_rig(rig, to_use=False).cameras[0].sensor == str(tmp_path / "mine.toml")
+    monkeypatch.setenv(PATHS, "anywhere")
+    assert read_rig(rig).cameras[0].sensor == str(tmp_path / "mine.toml")
+
+
+def test_pictures_that_a_mesh_names_are_beside_it(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    from vid2ev.recording.exposures import write_codes
+
+    (tmp_path / "in").mkdir()
+    write_codes(tmp_path / "secret.png", np.full((4, 4, 3), 200, np.uint8))
+    (tmp_path / "in" / "a.mtl").write_text("newmtl m\nmap_Kd ../secret.png\n")
+    (tmp_path / "in" / "a.obj").write_text(
+        "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+    )
+    texture = load_mesh(tmp_path / "in" / "a.obj").texture
+    assert (
+        texture is None or not np.allclose(texture.pixels, texture.pixels.max(), atol=0.5) or texture.pixels.max() < 0.5
+    )
+
+
+def test_meshes_that_claim_too_much_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    claims = {"asset": {"version": "2.0"}, "accessors": [{"componentType": 5126, "count": 1 << 40, "type": "VEC3"}]}
+    (tmp_path / "a.gltf").write_text(json.dumps(claims))
+    with pytest.raises(DataError, match="its arrays would take"):
+        load_mesh(tmp_path / "a.gltf")
+
+
+def test_weights_that_ask_for_a_huge_network_take_no_memory(tmp_path: Path) -> None:
+    from safetensors.torch import save_file
+
+    spec = json.dumps({"size": "paper", "bins": 10**6})
+    save_file({"a": torch.zeros(1)}, tmp_path / "a.safetensors", {"network": "rrin_events", "spec": spec})
+    with pytest.raises(DataError):
+        weights.load(tmp_path / "a.safetensors")
+    weights.save(tmp_path / "b.safetensors", "firenet", make("firenet"))
+    assert weights.load(tmp_path / "b.safetensors")
+
+
+class Ran:
+    """What a pickle would run."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (Path("ran"),)
+
+
+@pytest.mark.parametrize("packed", ["torch", "plain"])
+def test_checkpoints_run_nothing(packed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "checkpoint.ckpt"
+    state = {"global_step": 3, "state_dict": {}, "evil": Ran()}
+    if packed == "torch":
+        torch.save(state, path)
+    else:
+        path.write_bytes(pickle.dumps(state))
+    with pytest.raises(DataError, match="is no whole checkpoint"):
+        read_checkpoint(path)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.array([Ran()], object), allow_pickle=True)
+    for read in (read_depth, read_timestamp_array):
+        with pytest.raises(DataError):
+            read(tmp_path / "a.npy")
+
+
+def test_what_a_manifest_lacks_is_one_sentence(tmp_path: Path) -> None:
+    said = r"m.json does not say what it should \(KeyError: 'size'\)"
+    with pytest.raises(DataError, match=said), as_stated(tmp_path / "m.json"):
+        dict[str, int]()["size"]
+    with pytest.raises(UsageError), as_stated(tmp_path / "m.json"):
+        raise UsageError("as it is")
+    assert issubclass(DataError, Vid2evError)

@@ -1,0 +1,125 @@
+"""Files that nobody vouches for: how much memory they may claim, and where the files that they name may be.
+
+A header of a few bytes can claim more memory than there is, and a compressed file hold a thousand times its size.
+What one file would put into memory at a time is therefore bounded: by VID2EV_LARGEST_MB in the environment, or 4096.
+Files that a file names are in its folder or below; VID2EV_PATHS=anywhere lifts that, for files that one trusts.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from vid2ev.errors import DataError, UsageError
+
+LARGEST, PATHS = "VID2EV_LARGEST_MB", "VID2EV_PATHS"
+DEFAULT_MB = 4096
+TEXT_MB = 16  # of a text in which people write, or which says what a recording is
+
+
+def most_bytes() -> int:
+    """What one file may put into memory at a time.  Raises UsageError for a limit that is no number."""
+    text = os.environ.get(LARGEST, str(DEFAULT_MB))
+    if not text.isdecimal() or len(text) > 9:
+        raise UsageError(f"{LARGEST}={text[:40]}: expected a whole number of megabytes, such as {DEFAULT_MB}")
+    return int(text) << 20
+
+
+def check_bytes(path: Path | str, count: int, what: str = "its content") -> None:
+    """Raise DataError, with the remedy, where a file asks for more memory than it may."""
+    if count > most_bytes():
+        claimed, most = -(-count >> 20), most_bytes() >> 20
+        raise DataError(
+            f"{path}: {what} would take {claimed:,} MB of memory, and {most:,} are allowed; if that is meant, set"
+            f" {LARGEST}={claimed if claimed < 10**9 else 10**9} in the environment"
+        )
+
+
+def read_text(path: Path) -> str:
+    """A text in UTF-8.  Raises OSError, UnicodeDecodeError, DataError for one that is too long to be meant."""
+    size = path.stat().st_size if path.is_file() else 0
+    if size > TEXT_MB << 20:
+        raise DataError(f"{path}: {size:,} bytes are too many for such a text; expected at most {TEXT_MB} MB")
+    return path.read_text(encoding="utf-8")
+
+
+def json_of(text: str | bytes) -> Any:
+    """What a text in JSON says.  Raises ValueError for what is none, also for what is nested too deeply."""
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+
+
+def read_array(file: BinaryIO, path: Path | str) -> np.ndarray:
+    """The array of a .npy file that is at its start.
+
+    Raises DataError where it is too large; ValueError and all that numpy and zipfile have for damage, for Python
+    objects, too.
+    """
+    begin = file.tell()
+    version = npy.read_magic(file)
+    header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = header(file)
+    check_bytes(path, math.prod(shape) * max(dtype.itemsize, 1), f"an array of shape {list(shape)[:9]}")
+    file.seek(begin)
+    return npy.read_array(file, allow_pickle=False)
+
+
+def read_arrays(path: Path, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+    """The arrays of a .npz file, or those of them with these names.  Raises as `read_array`."""
+    with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
+        members = {name.removesuffix(".npy"): name for name in archive.namelist() if name.endswith(".npy")}
+        wanted = members if names is None else {name: members[name] for name in names if name in members}
+        check_bytes(path, sum(archive.getinfo(member).file_size for member in wanted.values()))
+        found = {}
+        for name, member in wanted.items():
+            with archive.open(member) as content:
+                found[name] = read_array(content, path)  # type: ignore[arg-type]
+        return found
+
+
+def check_exr(path: Path) -> None:
+    """Raise DataError for an EXR whose header claims more memory than it may, before the library takes it at its word.
+    What is damaged otherwise the library finds out."""
+    try:
+        import OpenEXR
+
+        parts = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
+        bytes_ = 0
+        for header in parts:
+            for name in ("dataWindow", "displayWindow"):
+                (left, top), (right, bottom) = (np.asarray(corner).tolist() for corner in header[name])
+                channels = max(len(header.get("channels", ())), 1)
+                bytes_ += max(right - left + 1, 0) * max(bottom - top + 1, 0) * 4 * channels
+    except Exception as error:  # (the library raises RuntimeError, ValueError and more)
+        raise DataError(f"{path}: not an EXR that can be read ({first_line(error)})") from error
+    check_bytes(path, bytes_, "its pixels")
+
+
+def first_line(error: Exception) -> str:
+    """What an error of others says, as a clause."""
+    return (str(error).splitlines() or [type(error).__name__])[0][:200]
+
+
+def beside(file: Path, name: str) -> Path:
+    """The place of a file that another one names.  Raises UsageError where that is neither in its folder nor below.
+
+    What counts is the name: a link in the folder may lead anywhere, since whoever made it could read the file.
+    """
+    folder = os.path.abspath(file.parent)
+    place = os.path.normpath(os.path.join(folder, name))
+    if os.environ.get(PATHS) != "anywhere" and os.path.commonpath([folder, place]) != folder:
+        raise UsageError(
+            f"{file} names {name}, which is not in its folder or below; put it there, or set {PATHS}=anywhere in the"
+            " environment if the file is to be trusted"
+        )
+    return Path(place)
