@@ -1,4 +1,7 @@
-"""The page in a real browser: what is entered there is what is previewed, saved and converted."""
+"""The page in a real browser: what is entered there is what is previewed, saved and converted.
+
+A browser, a server and pixels that are compiled for it take minutes: `python -m pytest tests/gui -m slow`.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ PATIENT_MS = 120_000
 
 pytest.importorskip("nicegui", reason="the extra gui is not installed")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +195,6 @@ def test_the_page_is_served_to_this_machine_alone(address: Any) -> None:
             assert link.recv(64).split()[1] == status
 
 
-@pytest.mark.slow
 def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser: Any, address: Any) -> None:
     page, wrong = opened(browser, address)
     expected = {}

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from vid2ev.commands.convert import convert
 from vid2ev.commands.gui import gui
+from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text
 from vid2ev.gui.loading import loaded
@@ -49,7 +50,7 @@ def parsed(setup: Setup, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[
     (video,) = options.pop("videos")
     Outputs.taken_from(options)
     for name in ("output", "dry_run", "verbose", "quiet", "as_json", "budget", "threads", "device", "skip", "overwrite",
-                 "resume", "effects", "tolerance"):  # fmt: skip
+                 "resume", "effects", "tolerance", "split", *NAMES):  # fmt: skip
         options.pop(name)
     return Recipe.of(video, **options).describe()
 
