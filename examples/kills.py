@@ -11,7 +11,7 @@ disk is full instead, from a number of bytes on that is drawn: that must end wit
 the output must be absent, or the one that was there before, or whole; for train and eval, which keep what is done in
 their folder, what is there of the result must be whole.  Half a line or a few bytes are then put at the end of files
 that grow, as a machine that stops leaves them.  What goes on is killed again, or ends, and then every byte must be that
-of an undisturbed run (of training: weights, pictures and all that it goes on from).  The exit code is 1 if one is not.
+of an undisturbed run (of training: weights, and all that it goes on from).  The exit code is 1 if one is not.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ HERE = Path(__file__).resolve().parent
 FULL = 3  # the exit code of what a full disk ended with a sentence
 TORN = b'{"group": 7, "ro'
 LASTING = ((os, "fsync"), (shutil, "rmtree"), *((Path, name) for name in ("rename", "replace", "unlink")))
-OF_TRAINING = ("weights", "pictures", "steps.json")  # the others have times in them, or rows of the last step missing
+OF_TRAINING = ("weights", "steps.json")  # curves and pictures of a validation that is killed are not made up for
 
 
 def child(work: Callable[[], object], killed_at: int = 0, counts: Path | None = None, room: int = 0) -> int:

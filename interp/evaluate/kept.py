@@ -97,7 +97,8 @@ class Kept(KeptRows):
         super().__init__(folder)
         wanted = json.loads(json.dumps({**job, "methods": methods}))
         there = (folder / JOB).exists()
-        if folder.exists() and not there and any(folder.iterdir()):
+        # (what is left of an evaluation that was killed before it had begun is no reason not to begin)
+        if folder.exists() and not there and {each.name for each in folder.iterdir()} - {"lock", f"{JOB}.new"}:
             raise UsageError(f"{folder} holds something else; choose another folder with -o")
         if there and not resume:
             raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")

@@ -49,7 +49,7 @@ class RunFolder:
         with writing(path, "make room or access there, or choose another folder with -o"):
             path.mkdir(parents=True, exist_ok=True)
             self._lock: int | None = lock(path)
-            for left in path.glob("*.new"):  # (of files that were being written when a session was killed)
+            for left in path.rglob("*.new"):  # (of files that were being written when a session was killed)
                 left.unlink()
             if not resume:
                 self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
