@@ -39,7 +39,7 @@ def test_training_ends_where_nothing_is_finite_any_more(tmp_path: Path) -> None:
 
 def test_a_checkpoint_is_whole_or_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "checkpoint.ckpt"
-    WholeFiles().save_checkpoint({"global_step": 1}, path)
+    WholeFiles().save_checkpoint({"global_step": 1, "state_dict": {}}, path)
 
     def torn(content: object, file: object) -> None:
         file.write(b"half of it")  # type: ignore[attr-defined]
@@ -48,7 +48,7 @@ def test_a_checkpoint_is_whole_or_the_one_before(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(torch, "save", torn)
     with pytest.raises(DataError, match=r"No space left on device; make room"):
         WholeFiles().save_checkpoint({"global_step": 2}, path)
-    assert read_checkpoint(path) == {"global_step": 1}
+    assert read_checkpoint(path) == {"global_step": 1, "state_dict": {}}
     assert [child.name for child in tmp_path.iterdir()] == ["checkpoint.ckpt"]
 
 
