@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -27,6 +28,7 @@ import click
 
 HERE = Path(__file__).resolve().parent
 GOOD = ("read", "refused")
+HUNG = (-signal.SIGALRM, -signal.SIGPROF)
 
 
 def run(name: str, folder: Path, first: int, count: int) -> Counter[str]:
@@ -52,7 +54,7 @@ def run(name: str, folder: Path, first: int, count: int) -> Counter[str]:
             break
         number, at = (int(word) for word in (folder / "current").read_text().split())
         tally["read"] += max(number - int(found.get("next", begin)), 0)  # (or refused; they were not written down)
-        tally["hung" if done.returncode == -14 else "crashed"] += 1
+        tally["hung" if done.returncode in HUNG else "crashed"] += 1
         _keep(folder, number, at, f"ended with {done.returncode}\n{end}")
         begin = number + 1
     return tally

@@ -31,7 +31,7 @@ from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
-from vid2ev.sources.times import read_timestamp_array
+from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.untrusted import LARGEST, PATHS, beside, most_bytes
 
 MEGABYTE = 1 << 20
@@ -242,6 +242,20 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
     for read in (read_depth, read_timestamp_array):
         with pytest.raises(DataError):
             read(tmp_path / "a.npy")
+
+
+def test_times_of_millions_of_digits_are_no_times(tmp_path: Path) -> None:
+    for word in ("0.1e40000000", "1e-99999999", "9" * 100_000):
+        (tmp_path / "timestamps.txt").write_text(f"{word}\n1\n")
+        with pytest.raises(DataError, match="is no time"):
+            read_timestamps(tmp_path / "timestamps.txt")
+
+
+def test_what_errors_quote_of_files_is_short_and_moves_no_cursor() -> None:
+    for kind in (DataError, UsageError):
+        said = str(kind(f"a.toml: key '\x1b[2J{'9' * 5000}'\nis unknown"))
+        assert len(said) < 200 and said.isprintable() and said.startswith("a.toml: key '") and said.endswith("unknown")
+    assert str(pickle.loads(pickle.dumps(DataError("as it is")))) == "as it is"
 
 
 def test_what_a_manifest_lacks_is_one_sentence(tmp_path: Path) -> None:

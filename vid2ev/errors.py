@@ -13,9 +13,15 @@ from collections.abc import Iterable
 
 
 class Vid2evError(Exception):
-    """Base of every error that vid2ev raises on purpose."""
+    """Base of every error that vid2ev raises on purpose.
+
+    What it quotes of files is shortened, and has no control characters: nobody's terminal does what a file says.
+    """
 
     exit_code = 1
+
+    def __init__(self, message: object = ""):
+        super().__init__(_quoted(str(message)))
 
 
 class UsageError(Vid2evError, ValueError):
@@ -28,6 +34,11 @@ class DataError(Vid2evError, OSError):
     """A source or a disk that does not hold what was expected; exit code 1."""
 
     exit_code = 1
+
+
+def _quoted(message: str) -> str:
+    message = re.sub(r"[\x00-\x1f\x7f-\x9f]+", " ", message)
+    return re.sub(r"\S{200,}", lambda word: f"{word[0][:80]}...{word[0][-40:]}", message)
 
 
 def nearest(word: str, words: Iterable[str]) -> str:

@@ -28,7 +28,8 @@ from pathlib import Path
 
 import numpy as np
 
-SECONDS = 20  # for an attempt
+SECONDS = 20  # of the processor for an attempt
+LONGEST_S = 600  # for one that waits
 SPACE = 6 << 30  # bytes of address space beyond those that the process has when it has read the valid files
 PEAK_MB = 900  # of memory in use beyond those; twice what `VID2EV_LARGEST_MB` is set to, and what reading takes
 LARGEST_MB = 256
@@ -76,9 +77,11 @@ class Attempts:
         begin = 0 if random.random() < 0.5 else int(random.integers(len(kinds)))
         content = mutated(kinds[begin], random, [each[0] for each in self.contents])
         path.write_bytes(content)
-        signal.alarm(SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        signal.alarm(LONGEST_S)
         ended, kind = self._read(path)
         signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         self.tally[ended] += 1
         if kind not in self.known and len(kinds) < MOST_KINDS:
             self.known.add(kind)

@@ -88,6 +88,8 @@ class Folder:
                 file.close()
         if self._lock is not None:
             if self.finished or not self.resumable:
+                with suppress(OSError):
+                    self._clear()
                 shutil.rmtree(self.partial, ignore_errors=True)
             os.close(self._lock)
 
@@ -211,7 +213,9 @@ class Folder:
         return is_of_job(path, self.job, self.directory, self.overwrite)
 
     def _clear(self) -> None:
-        for path in self.partial.iterdir():
+        """Remove all but the lock: first what could be gone on from, last what says whose folder it is."""
+        (self.partial / "checkpoint.npz").unlink(missing_ok=True)
+        for path in sorted(self.partial.iterdir(), key=lambda path: path.name == "job.json"):
             if path.name != "lock":
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 

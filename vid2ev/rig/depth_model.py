@@ -95,7 +95,7 @@ def _loaded(name: str) -> tuple[Any, Any]:
     disable_progress_bar()  # (of weights that are read from disk within a second)
     try:
         processor = AutoImageProcessor.from_pretrained(name, backend="pil")
-        model = AutoModelForDepthEstimation.from_pretrained(name)
+        model = AutoModelForDepthEstimation.from_pretrained(name, use_safetensors=True)  # (other files can run code)
     except Exception as error:  # (of the hub, of JSON, of safetensors, of configurations)
         said = (str(error).splitlines() or [type(error).__name__])[0]
         raise DataError(f"model:{name} cannot be loaded ({said}); give a folder or a name, as {EXAMPLE}") from error

@@ -31,6 +31,7 @@ from vid2ev.untrusted import read_array
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
+LONGEST_WORD = 100  # digits of a time
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
 
@@ -127,7 +128,7 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     values = []
     for word in words:
         try:
-            values.append(Fraction(word))
+            values.append(_number(word))
         except (ValueError, ZeroDivisionError) as error:
             place = "last" if column else "first"
             raise DataError(
@@ -138,6 +139,14 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
     unit = unit_of_integers([int(value) for value in values]) if whole else "s"
     return _in_seconds(values, unit, path), f"{unit}{GUESSED * whole}"
+
+
+def _number(word: str) -> Fraction:
+    """A number as it is written.  Raises ValueError for what is none, or has more digits than there is memory for."""
+    exponent = re.search(r"e([-+]?\d+)$", word, re.IGNORECASE)
+    if len(word) > LONGEST_WORD or (exponent and abs(int(exponent[1])) > LONGEST_WORD):
+        raise ValueError("a number of too many digits")
+    return Fraction(word)
 
 
 def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:

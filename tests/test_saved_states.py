@@ -1,0 +1,142 @@
+"""What is kept to go on from is believed only where it can be true; what a kill leaves is in nobody's way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from interp.evaluate.kept import Kept
+from interp.train.run_folder import RunFolder
+from vid2ev import Dvs, convert, load_sensor
+from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.disk import put_in_place
+from vid2ev.recording.folder import partial_of
+
+CLIP = "synthetic:moving-edge,size=16x12,fps=100,duration_s=0.08"
+OPTIONS = {"overrides": ["frame_rate_hz=900", "delay_us=3000"], "threads": 1, "piece": 3 << 18}
+
+
+class Stopped(Exception):
+    pass
+
+
+def begun(out: Path) -> Path:
+    """The checkpoint of a recording that was stopped on the way."""
+    count = iter(range(100))
+
+    def report(*_: object) -> None:
+        if next(count) == 6:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        convert(CLIP, out, report=report, **OPTIONS)
+    return partial_of(out) / "checkpoint.npz"
+
+
+def state_of(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("track0.dvs.delayed_x", lambda x: np.append(x, 99)),
+        ("track0.dvs.held_t", lambda t: np.append(t, 1)),
+        ("track0.dvs.clock", lambda clock: clock.astype(np.float64)),
+        ("track0.film.starts", lambda starts: starts + (1 << 40)),
+        ("track0.film.counts", lambda counts: counts[:, :-1]),
+        ("track0.dvs.tallies", lambda tallies: tallies[None]),
+        ("progress", lambda progress: np.array(str(progress).replace('"frames"', '"framed"'))),
+        ("progress", lambda _: np.array("[" * 5000)),
+        ("size.t", lambda size: size + (1 << 40)),
+        ("size.t", None),
+    ],
+)
+def test_checkpoints_that_cannot_be_are_one_sentence(name: str, change: object, tmp_path: Path) -> None:
+    path = begun(tmp_path / "out")
+    state = state_of(path)
+    wanted = state.pop(name)
+    if change is not None:
+        np.savez(path, **state, **{name: change(wanted)})  # type: ignore[operator]
+    else:
+        np.savez(path, **state)
+    with pytest.raises(DataError, match="--overwrite starts again") as raised:
+        convert(CLIP, tmp_path / "out", resume=True, **OPTIONS)
+    assert "\n" not in str(raised.value)
+    convert(CLIP, tmp_path / "out", overwrite=True, **OPTIONS)
+
+
+def test_a_checkpoint_that_is_cut_short_is_one_sentence(tmp_path: Path) -> None:
+    path = begun(tmp_path / "out")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(DataError, match=r"checkpoint.npz is damaged, or not of this recording \(BadZipFile\)"):
+        convert(CLIP, tmp_path / "out", resume=True, **OPTIONS)
+
+
+def test_a_sensor_takes_no_state_of_another_kind() -> None:
+    dvs = Dvs(load_sensor("ideal"), (16, 12))
+    dvs.step(np.full((12, 16), 0.5, np.float32), 0)
+    state = dvs.state()
+    for name in state:
+        with pytest.raises(UsageError, match=f"in '{name}', expected"):
+            dvs.restore(state | {name: state[name].astype(np.complex64)})
+    dvs.restore(state)
+
+
+def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path: Path) -> None:
+    for name in ("lock", "run.json.new", "job.json.new"):
+        for folder in ("run", "eval"):
+            (tmp_path / folder).mkdir(exist_ok=True)
+        (tmp_path / ("eval" if name == "job.json.new" else "run") / name).write_text("{")
+    run = RunFolder(tmp_path / "run", {"a": 1}, resume=False)
+    run.close()
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"lock", "run.json"}
+    with Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False):
+        pass
+    (tmp_path / "eval" / "notes.txt").write_text("mine")
+    (tmp_path / "eval" / "job.json").unlink()
+    with pytest.raises(UsageError, match="holds something else"):
+        Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False)
+
+
+def test_a_folder_that_is_being_removed_says_to_the_last_whose_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed at any instant of that, what is left can be gone on from or begun anew."""
+    begun(tmp_path / "out")
+    removed: list[str] = []
+    real = Path.unlink
+
+    def noted(self: Path, missing_ok: bool = False) -> None:
+        removed.append(self.name)
+        real(self, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", noted)
+    with pytest.raises(DataError):
+        convert(CLIP, tmp_path / "out", overwrite=True, report=_fails, **OPTIONS)
+    assert removed[0] == "checkpoint.npz" and removed.index("job.json") > removed.index("t")
+    assert not partial_of(tmp_path / "out").exists()
+
+
+def _fails(*_: object) -> None:
+    raise DataError("at once")
+
+
+def test_folders_are_exchanged_at_once_where_the_system_can(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from vid2ev.recording import disk
+
+    for swapped in (True, False):
+        for name in ("made", "there"):
+            (tmp_path / name).mkdir()
+            (tmp_path / name / name).touch()
+        if not swapped:
+            monkeypatch.setattr(disk, "_swapped", lambda *_: False)
+        put_in_place(tmp_path / "made", tmp_path / "there", tmp_path / "replaced")
+        assert [path.name for path in sorted(tmp_path.rglob("*"))] == ["replaced", "there", "there", "made"]
+        assert (tmp_path / "there" / "made").exists() and (tmp_path / "replaced" / "there").exists()
+        for name in ("there", "replaced"):
+            (tmp_path / name / {"there": "made", "replaced": "there"}[name]).unlink()
+            (tmp_path / name).rmdir()
