@@ -9,14 +9,15 @@ weights are the same bytes each time.
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
 
 import click
+from safetensors import safe_open
 
 from interp import pretrained, weights
+from interp.train.curves import read_curve
 
 
 @click.command()
@@ -28,10 +29,11 @@ def ship(run: Path, reports: tuple[Path, ...], machine: str, hours: float) -> No
     """Weights of RUN, and their card."""
     said = json.loads((run / "run.json").read_text())
     job, network = said["job"], weights.load(run / "weights.safetensors")
-    steps = int(_last(run / "validation.csv")["step"])
+    with safe_open(run / "weights.safetensors", "pt") as file:
+        best = int(file.metadata()["step"])
     path = Path(pretrained.__file__).with_name(f"{job['network']}-{job['size']}.safetensors")
-    weights.save(path, job["network"], network, {"steps": str(steps), "seed": str(job["recipe"]["seed"])}, half=True)
-    path.with_suffix(".md").write_text(_card(run, job, said["versions"], steps, machine, hours, reports))
+    weights.save(path, job["network"], network, {"steps": str(best), "seed": str(job["recipe"]["seed"])}, half=True)
+    path.with_suffix(".md").write_text(_card(run, job, said["versions"], best, machine, hours, reports))
     click.echo(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
 
 
@@ -39,12 +41,13 @@ def _card(
     run: Path,
     job: dict[str, Any],
     versions: dict[str, str],
-    steps: int,
+    best: int,
     machine: str,
     hours: float,
     reports: tuple[Path, ...],
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
+    steps = read_curve(run / "validation.csv")[-1]["step"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
     total = clips["scenes"] + clips["photographs"] + clips["videos"] + clips["recordings"]
     trained_on = [Path(name).name for name in clips["video_files"]]
@@ -53,8 +56,9 @@ def _card(
         "",
         f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
         f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
-        f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; stored in 16"
-        f" bits. Versions: torch {versions['torch']}, lightning {versions['lightning']}.",
+        f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; the weights are"
+        f" those of step {best}, whose validation was best, stored in 16 bits."
+        f" Versions: torch {versions['torch']}, lightning {versions['lightning']}.",
         "",
         "- **Data**: events simulated while training, of "
         f"{clips['scenes'] / total:.0%} rendered scenes ({', '.join(clips['scene_names'])}), "
@@ -67,7 +71,7 @@ def _card(
         "",
         "## Validation",
         "",
-        *_validation(run),
+        *_validation(run, best),
     ]
     for report in reports:
         summary = json.loads((report / "summary.json").read_text())
@@ -75,15 +79,13 @@ def _card(
     return "\n".join(lines) + "\n"
 
 
-def _validation(run: Path) -> list[str]:
-    """The scores of the last validation beside those of what needs no training."""
+def _validation(run: Path, best: int) -> list[str]:
+    """The scores of the best validation beside those of what needs no training."""
     others = json.loads((run / "baselines.json").read_text())
-    last = _last(run / "validation.csv")
+    row = next(row for row in read_curve(run / "validation.csv") if int(row["step"]) == best)
     groups = list(next(iter(others.values())))
     found = {name: {group: (of[group]["psnr"], of[group]["ssim"]) for group in groups} for name, of in others.items()}
-    found["**these weights**"] = {
-        group: (float(last[f"{group}.psnr"]), float(last[f"{group}.ssim"])) for group in groups
-    }
+    found["**these weights**"] = {group: (float(row[f"{group}.psnr"]), float(row[f"{group}.ssim"])) for group in groups}
     lines = [f"| PSNR-255 / SSIM | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
     for name, of in found.items():
         lines.append(f"| {name} | {' | '.join(f'{psnr:.2f} / {ssim:.3f}' for psnr, ssim in of.values())} |")
@@ -98,11 +100,6 @@ def _scores(summary: dict[str, Any]) -> list[str]:
         shown = ("–" if mean is None else f"{mean:.{3 if score == 'ssim' else 2}f}" for score, mean in means.items())
         lines.append(f"| {name} | {' | '.join(shown)} |")
     return lines
-
-
-def _last(path: Path) -> dict[str, str]:
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))[-1]
 
 
 if __name__ == "__main__":

@@ -120,6 +120,7 @@ def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
         rest = "" if outcome.finished else "; the same command with --resume goes on"
         click.echo(f"{path}: step {outcome.step}{of}{skipped}{rest}")
         if outcome.finished:
+            click.echo(f"weights.safetensors: those of step {outcome.best}, the best by validation")
             click.echo(f"\n{told.table(outcome)}")
 
 

@@ -38,12 +38,14 @@ class Outcome:
 
     step, steps   where training stands, and how many steps it has; None where that is not known yet
     skipped       steps without a finite gradient
-    scores        of methods on groups of clips, the network's as "network"; empty before the end
+    best          the step whose weights are kept: those of the best validation
+    scores        of methods on groups of clips, those of these weights as "network"; empty before the end
     """
 
     step: int
     steps: int | None
     skipped: int
+    best: int
     scores: dict[str, dict[str, Scores]]
 
     @property
@@ -161,15 +163,16 @@ class Fit:
     def _outcome(self, trainer: Trainer) -> Outcome:
         step, steps, skipped = trainer.global_step, self.learner.schedule.steps, self.learner.skipped
         if step != steps:
-            return Outcome(step, steps, skipped, {})
+            return Outcome(step, steps, skipped, self.learner.best[0], {})
         if self.learner.validated_at != step:
             self.learner.load_state_dict(read_checkpoint(self.folder.checkpoint)["state_dict"])  # (the running mean)
             trainer.validate(self.learner, self.feed, verbose=False)
-        found: dict[str, dict[str, Scores]] = {group: {"network": one} for group, one in self.learner.table.items()}
+        best, kept = self.learner.best
+        found: dict[str, dict[str, Scores]] = {group: {"network": one} for group, one in kept.items()}
         for name, table in self.folder.baselines().items():
             for group, values in table.items():
                 found[group][name] = Scores(**values)
-        return Outcome(step, steps, skipped, found)
+        return Outcome(step, steps, skipped, best, found)
 
 
 @contextmanager

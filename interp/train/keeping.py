@@ -1,4 +1,4 @@
-"""What a run keeps after each validation: the weights, for use, and pictures."""
+"""What a run keeps after each validation: the weights, for use, if none were better, and pictures."""
 
 from __future__ import annotations
 
@@ -45,9 +45,10 @@ class Keeping(Callback):
                 logger.experiment.add_image(group, torch.from_numpy(rgb), trainer.global_step, dataformats="HWC")
 
     def on_validation_epoch_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
-        """The weights."""
+        """The weights, if these are the best."""
         assert isinstance(pl_module, Learner)
-        if trainer.is_global_zero:
+        pl_module.conclude_validation()
+        if trainer.is_global_zero and pl_module.best[0] == trainer.global_step:
             with self._writing():
                 weights.save(self.folder.weights, self.network, pl_module.network, {"step": str(trainer.global_step)})
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import time
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ class Learner(LightningModule):
     skipped    steps whose gradients were not finite, so far
     table      mean scores of each group of clips, of the last validation, which was at step `validated_at`
                and took `validation_s`
+    best       the table of the validation that was best, and its step: of the mean PSNR of all groups, so that neither
+               scenes nor real clips, neither clean nor noisy sensors are given up for the rest
     """
 
     def __init__(self, network: nn.Module, recipe: Recipe, schedule: Schedule):
@@ -41,6 +44,7 @@ class Learner(LightningModule):
         self.skipped = self._in_a_row = 0
         self.table: dict[str, Scores] = {}
         self.validated_at, self.validation_s = -1, 0.0
+        self.best: tuple[int, dict[str, Scores]] = (-1, {})
         self._scores: list[tuple[str, list[Scores]]] = []
 
     def parts(self, batch: Any) -> dict[str, torch.Tensor]:
@@ -111,23 +115,28 @@ class Learner(LightningModule):
         self._scores.append((group, self.scored(clip, images)))
         return images
 
-    def on_validation_epoch_end(self) -> None:
-        """Means of each group of clips, those of all processes together."""
+    def conclude_validation(self) -> None:
+        """Means of each group of clips, of all processes together; asked for while the running mean is in place."""
         mine, self._scores = self._scores, []
         self.table = means(gathered(mine))
         self.validated_at, self.validation_s = self.trainer.global_step, time.monotonic() - self._begun_s
         self.log("step", float(self.trainer.global_step))
         for group, mean in self.table.items():
             self.log_dict(mean.named(f"validation/{group}."))
+        if not self.best[1] or overall(self.table) > overall(self.best[1]):
+            self.best = (self.validated_at, self.table)
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """What was skipped, and how long validation took."""
+        """What was skipped, how long validation took, and what was best."""
         checkpoint["skipped"] = [self.skipped, self._in_a_row]
+        checkpoint["best"] = [self.best[0], {group: asdict(scores) for group, scores in self.best[1].items()}]
         checkpoint["validation_s"] = self.validation_s
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """The same."""
         self.skipped, self._in_a_row = checkpoint["skipped"]
+        step, table = checkpoint["best"]
+        self.best = (step, {group: Scores(**scores) for group, scores in table.items()})
         self.validation_s = checkpoint["validation_s"]
 
 
@@ -135,6 +144,11 @@ def means(scores: list[tuple[str, list[Scores]]]) -> dict[str, Scores]:
     """The mean of each group, over all its images."""
     groups = dict.fromkeys(group for group, _ in scores)
     return {name: Scores.mean([one for group, each in scores if group == name for one in each]) for name in groups}
+
+
+def overall(table: dict[str, Scores]) -> float:
+    """One number for a validation: the mean PSNR of all groups of clips [dB]."""
+    return sum(scores.psnr for scores in table.values()) / len(table)
 
 
 def gathered(mine: list[Any]) -> list[Any]:

@@ -3,7 +3,7 @@
     run.json              what is trained, with what, how; versions, machine
     steps.json            how many steps, once that is known
     checkpoint.ckpt       where training goes on
-    weights.safetensors   the running mean of the network, for use (`interp.networks`)
+    weights.safetensors   the running mean of the network at its best validation, for use (`interp.networks`)
     baselines.json        scores of methods that need no training
     training.csv          loss, its parts, learning rate, speed
     validation.csv        scores of the running mean

@@ -45,4 +45,10 @@ def table(outcome: Outcome) -> str:
 def as_json(outcome: Outcome) -> Mapping[str, Any]:
     """The same for programs; NaN as nothing."""
     scores = {g: {m: s.named("") for m, s in methods.items()} for g, methods in outcome.scores.items()}
-    return {"step": outcome.step, "steps": outcome.steps, "skipped": outcome.skipped, "scores": scores}
+    return {
+        "step": outcome.step,
+        "steps": outcome.steps,
+        "skipped": outcome.skipped,
+        "best": outcome.best,
+        "scores": scores,
+    }

@@ -40,7 +40,10 @@ def test_a_run_in_two_sessions_ends_with_a_table() -> None:
     assert first.output == "run: step 1 of 3; the same command with --resume goes on\n"
     again = run("-o", "run", "--resume", "--workers", "0", "--cpu")
     assert again.exit_code == 0, again.output
-    assert again.output.startswith("run: step 3 of 3\n\nscenes             PSNR     SSIM   moving   static\n")
+    assert again.output.startswith(
+        "run: step 3 of 3\nweights.safetensors: those of step 0, the best by validation\n\n"
+        "scenes             PSNR     SSIM   moving   static\n"
+    )
     assert "\nbridge " in again.output and "\nnetwork " in again.output
     same = run(*FEW, "-o", "run", "--resume", "--json")
     assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}

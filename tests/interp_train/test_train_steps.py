@@ -14,7 +14,11 @@ from interp import weights
 from interp.methods import METHODS
 from interp.train.checkpoints import WholeFiles, read_checkpoint
 from interp.train.curves import read_curve
+from interp.train.frame_fed import FrameFedLearner
 from interp.train.learner import number_of
+from interp.train.recipe import Recipe
+from interp.train.schedule import Schedule
+from interp.train.scores import Scores
 from vid2ev.errors import DataError, UsageError
 
 
@@ -79,11 +83,28 @@ def test_a_run_keeps_all_that_it_has_to_show(tmp_path: Path) -> None:
     assert list((tmp_path / "run" / "tensorboard").glob("events.out.*"))
     assert str(tmp_path) not in (tmp_path / "run" / "run.json").read_text()
 
-    # The weights are the running mean, and score what the run says.
-    network = weights.load(tmp_path / "run" / "weights.safetensors")
-    mean = kept(tmp_path / "run")
-    assert all(torch.equal(value, mean[f"network.{name}"]) for name, value in network.state_dict().items())
-    assert any(not torch.equal(mean[f"network.{n}"], mean[f"current.network.{n}"]) for n in network.state_dict())
+
+def test_the_weights_are_the_running_mean_where_it_was_best(tmp_path: Path) -> None:
+    # The first run gets better, so that its last weights are kept; the other is spoilt by its rate and keeps its first.
+    for folder, rate, best in ((tmp_path / "slow", 1e-4, STEPS_OF_RUN), (tmp_path / "fast", 30.0, 0)):
+        done = session(folder, rate=rate, clip=100.0)
+        rows = {int(row["step"]): row for row in read_curve(folder / "validation.csv")}
+        assert done.best == best == max(rows, key=lambda step: float(rows[step]["scenes.psnr"]))
+        assert done.scores["scenes"]["network"].psnr == pytest.approx(float(rows[best]["scenes.psnr"]), abs=1e-3)
+        network = weights.load(folder / "weights.safetensors")
+        again = [one for _, clip in clips() for one in of_clip(network, clip)]
+        assert Scores.mean(again) == done.scores["scenes"]["network"]
+        mean = kept(folder)
+        same = [torch.equal(value, mean[f"network.{name}"]) for name, value in network.state_dict().items()]
+        assert all(same) == (best == STEPS_OF_RUN)
+        assert any(not torch.equal(mean[f"network.{n}"], mean[f"current.network.{n}"]) for n in network.state_dict())
+
+
+def of_clip(network: torch.nn.Module, clip: dict[str, torch.Tensor]) -> list[Scores]:
+    """Scores of a network on a clip."""
+    learner = FrameFedLearner(NETWORK, network, Recipe(), Schedule(0, 0))  # type: ignore[arg-type]
+    with torch.no_grad():
+        return learner.scored(clip, learner.predicted(clip).float())
 
 
 def test_a_folder_is_taken_once(tmp_path: Path) -> None:
