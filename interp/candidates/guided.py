@@ -114,6 +114,13 @@ def flows_to(
 
 
 @in_full_precision
+def motion_between(frame_0: torch.Tensor, frame_1: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+    """Motion [B, 4, H, W] px from each of two frames [B, C, H, W] to the other: of the first, then of the second."""
+    shown = [_shown(frame[:, None], transfer) for frame in (frame_0, frame_1)]
+    return torch.cat([_flows(shown[0], shown[1]), _flows(shown[1], shown[0])], 2).squeeze(1)
+
+
+@in_full_precision
 def agreement(
     warps: torch.Tensor, pictures: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
 ) -> torch.Tensor:

@@ -24,7 +24,7 @@ WORD = "auto"
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
 @click.option(
     "--network", default="rrin-events-guided", show_default=True, metavar="NAME",
-    help="superslomo, slomo-events, rrin, rrin-events, rrin-events-light, rrin-events-guided,"
+    help="superslomo, slomo-events, rrin, rrin-light, rrin-events, rrin-events-light, rrin-events-guided,"
     " rrin-slomo-events, timelens, e2vid, firenet,"
     " hdr.",
 )  # fmt: skip

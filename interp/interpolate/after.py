@@ -68,7 +68,7 @@ class After:
     def memory(self) -> dict[str, np.ndarray]:
         """What it has to remember after a stretch."""
         state = self._state
-        kept = None if state is None else (state.output, state.second, state.cell)
+        kept = None if state is None else (state.output, state.second, state.cell, state.carried)
         return as_arrays((kept, self._rest, torch.tensor(self._shot)))
 
     def remember(self, arrays: dict[str, np.ndarray]) -> None:

@@ -33,6 +33,9 @@ NETWORKS = {
     "superslomo": Entry("superslomo", "SuperSlomo", {"events": "none"}),
     "slomo_events": Entry("superslomo", "SuperSlomo"),
     "rrin": Entry("rrin_events", "RrinEvents", {"depths": (5, 4, 4, 4), "bins": 0}),
+    "rrin_light": Entry(
+        "rrin_events", "RrinEvents", {"bins": 0, "coarse": True, "first_flow": "dis", "depths": (4, 4, 4, 4)}
+    ),
     "rrin_events": Entry("rrin_events", "RrinEvents"),
     "rrin_events_light": Entry(
         "rrin_events",

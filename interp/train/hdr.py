@@ -7,20 +7,27 @@ the last; and flows (`true_flows.py`).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 
-from interp.light import to_codes
+from interp.candidates.beyond import carried
+from interp.light import RATIOS, to_codes, to_ratios
 from interp.losses import objectives
 from interp.losses.perceptual import Perceptual
 from interp.networks.hdr import Hdr
+from interp.representation.event_counts import PER_VOXEL_NATS
 from interp.train.batches import Batch
 from interp.train.event_fed import windows
 from interp.train.learner import Learner
 from interp.train.pictures import of_error, rows, shown
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
-from interp.train.scores import Scores, scores
+from interp.train.scores import Scores, rounded
+from vid2ev.compare.pictures import psnr, ssim
+
+DECADE = 1.0
 
 
 class HdrLearner(Learner):
@@ -36,27 +43,45 @@ class HdrLearner(Learner):
         """Light [B, T, C, H, W] after the network."""
         frames, state, images = seen(batch), None, []
         for frame, second in zip(frames.unbind(1), self._second(batch).unbind(1), strict=True):
-            image, state = self.network(frame, second, state)
+            image, state = self.network(frame, second, state, batch["range"])
             images.append(image)
         return torch.stack(images, 1)
 
     def parts(self, batch: Batch) -> objectives.Terms:
-        """Terms of the loss."""
-        return objectives.hdr(self.made(batch), batch["truth"], batch["flows"], batch["flows_to_first"], self.features)
+        """Terms of the loss, of ratios."""
+        made, truth = to_ratios(self.made(batch)), to_ratios(batch["truth"])
+        return objectives.hdr(made, truth, batch["flows"], batch["flows_to_first"], self.features)
 
     def predicted(self, clip: Batch) -> torch.Tensor:
         """Light [T, C, H, W] of one sequence."""
         return self.made(clip)[0]
 
     def scored(self, clip: Batch, images: torch.Tensor) -> list[Scores]:
-        """One for each image, of sRGB codes, full code for the brightest of the truth."""
-        top = clip["truth"].amax().clamp(min=1)
-        made, truth = (to_codes(light / top, "srgb") for light in (images, clip["truth"][0]))
-        return scores(made, truth, truth[0], truth[-1])
+        """One for each image: PSNR in decades of light, of what is beyond the range of the frame sensor, as `moving` of
+        what is above it, as `static` below; SSIM of whole pictures, in ratios up to the brightest."""
+        truth = clip["truth"][0]
+        top = to_ratios(truth).amax().clamp(min=1)
+        whole = [to_ratios(light) / top for light in (images, truth)]
+        beyond = outside(truth, clip["range"][0])
+        return [
+            Scores(
+                psnr(error[above | below], DECADE),
+                ssim(rounded(made[None])[0], rounded(true[None])[0]),
+                psnr(error[above], DECADE),
+                psnr(error[below], DECADE),
+            )
+            for error, above, below, made, true in zip(decades(images, truth), *beyond, *whole, strict=True)
+        ]
 
     def baselines(self, clip: Batch) -> dict[str, torch.Tensor]:
-        """The frames as they were."""
-        return {"unprocessed": seen(clip)[0]}
+        """The frames as they were, and with what events carry on."""
+        frames, before, images = seen(clip), None, []
+        changes = PER_VOXEL_NATS * windows(clip, 1)
+        for k, frame in enumerate(frames.unbind(1)):
+            change = changes[:, k - 1] if k else torch.zeros_like(frame[:, :1])
+            before, _ = carried(frame, change, before, clip["range"])
+            images.append(before[0])
+        return {"unprocessed": frames[0], "carried": torch.stack(images)}
 
     def picture(self, clip: Batch, images: torch.Tensor) -> np.ndarray:
         """Clipped, image, truth, error; a row per instant."""
@@ -70,6 +95,19 @@ class HdrLearner(Learner):
             return seen(batch)
         since = windows(batch, self.network.spec.bins)
         return torch.cat([torch.zeros_like(since[:, :1]), since], 1)
+
+
+def decades(images: torch.Tensor, truth: torch.Tensor) -> np.ndarray:
+    """Squared errors [T, H, W, C] of light [T, C, H, W] in decades; what is far below a thousandth of diffuse white is
+    black."""
+    error = (to_ratios(images.clamp(min=0)) - to_ratios(truth)) * math.log10(1 + RATIOS)
+    return np.moveaxis((error.double() ** 2).cpu().numpy(), 1, -1)
+
+
+def outside(truth: torch.Tensor, limits: torch.Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """Which values [T, H, W, C] of light [T, C, H, W] are above the range [2] of a frame sensor, and which below."""
+    light, (low, high) = np.moveaxis(truth.cpu().numpy(), 1, -1), limits.tolist()
+    return light > high, light < low
 
 
 def seen(batch: Batch) -> torch.Tensor:

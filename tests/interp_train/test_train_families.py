@@ -31,8 +31,11 @@ KINDS = {
 
 def learner(name: str) -> Learner:
     torch.manual_seed(0)
-    recipe = Recipe(steps=8, rate=5e-3 if KINDS[name] is EventFedLearner else 1e-3)
-    made: Any = KINDS[name](name, make(name), recipe, Schedule(0, 1.0, 8))  # type: ignore[arg-type]
+    rate = 5e-3 if KINDS[name] is EventFedLearner else 1e-4 if name == "hdr" else 1e-3
+    recipe, network = Recipe(steps=8, rate=rate), make(name)
+    if name == "hdr":  # (which begins with frames that are right already, wherever they are not clipped)
+        torch.nn.init.normal_(network.out.weight, std=0.05)  # type: ignore[arg-type, union-attr]
+    made: Any = KINDS[name](name, network, recipe, Schedule(0, 1.0, 8))  # type: ignore[arg-type]
     made._trainer = SimpleNamespace(global_step=0, world_size=1)
     return made
 
