@@ -83,7 +83,7 @@ def _validation(run: Path, best: int) -> list[str]:
     """The scores of the best validation beside those of what needs no training."""
     others = json.loads((run / "baselines.json").read_text())
     row = next(row for row in read_curve(run / "validation.csv") if int(row["step"]) == best)
-    groups = list(next(iter(others.values())))
+    groups = [key.removesuffix(".psnr") for key in row if key.endswith(".psnr")]
     found = {name: {group: (of[group]["psnr"], of[group]["ssim"]) for group in groups} for name, of in others.items()}
     found["**these weights**"] = {group: (float(row[f"{group}.psnr"]), float(row[f"{group}.ssim"])) for group in groups}
     lines = [f"| PSNR-255 / SSIM | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]

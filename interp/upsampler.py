@@ -71,7 +71,7 @@ class NetUpsampling:
 
 def make(weights: str | None, subframes: Subframes, max_subframes: int, threshold: float) -> NetUpsampling:
     """The upsampler with the weights of a file, or with those that come with vid2ev.  Raises UsageError."""
-    path = Path(weights) if weights else pretrained.default(events=False)
+    path = Path(weights) if weights else pretrained.first(pretrained.OF_FRAMES)
     if path is None:
         raise UsageError(
             "upsampling 'net': no network of frames alone comes with this version; give the weights of one with"

@@ -30,7 +30,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--fps", metavar="RATE", help="Frames per second of the scene's time: 960, 30000/1001.")
 @click.option(
     "--method", metavar="NAME", help="nearest, linear, flow, or with events integration, both, bridge, ramps, guided."
-    "  [default: a network that comes with vid2ev, if there is one; guided with events, flow without]",
+    "  [default: the network that comes with vid2ev with events, flow without]",
 )  # fmt: skip
 @click.option("--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS", help="Of `vid2ev train`.")
 @click.option(

@@ -19,8 +19,7 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
 @click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_seen.mp4 here]")
 @click.option(
     "--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
-    help="Of `vid2ev train --network e2vid` or firenet.  [default: a network that comes with vid2ev, if there is one; a"
-    " high-pass filter]",
+    help="Of `vid2ev train --network e2vid` or firenet.  [default: the FireNet that comes with vid2ev]",
 )  # fmt: skip
 @click.option(
     "--cutoff", "cutoff_hz", type=float, metavar="HZ",

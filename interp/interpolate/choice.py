@@ -39,7 +39,8 @@ def choice(
         raise UsageError(f"--method {name} and --network {network} each say what interpolates; leave out one of them")
     why = "as asked"
     if not (name or network):
-        network = pretrained.default(events)
+        # (of frames alone there is a network, too, but it does not beat optical flow)
+        network = pretrained.first(pretrained.WITH_EVENTS) if events else None
         name = None if network else BEST if events else FALLBACK
         seen = "there are events" if events else "there are no events"
         best = "the network that comes with vid2ev" if network else "the best that needs no training"

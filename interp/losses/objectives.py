@@ -7,6 +7,7 @@
     rrin_light, rrin_events_guided            0.1 log error
     E2VID, FireNet             L1 + features from the second image on; FireNet + 2 inconsistency
     HDR                        100 inconsistency, from image to image and to the first + 10 features + 100 L1
+                               + 3 log error of what is beyond the range of the frames
 
 Each gives its terms weighted, so that their sum is the loss and each can be looked at.
 
@@ -93,9 +94,12 @@ def hdr(
     flows: torch.Tensor,
     flows_to_first: torch.Tensor,
     features: Features,
+    beyond: torch.Tensor,
 ) -> Terms:
     """Terms for images [B, T, C, H, W] after HDR post-processing.
 
+    beyond           [B, T, C, H, W] whether the truth is beyond the range of the frames; L1 alone would let what is
+                     seen decide, and take what is not for its median
     flows            [B, T - 1, 2, H, W] px, from each image but the first to the one before
     flows_to_first   [B, T - 1, 2, H, W] px, from each to the first; those from the third image on count
     """
@@ -109,6 +113,7 @@ def hdr(
         "time": 100 * _flicker(images, truth, flows, through_earlier=False),
         "long time": 100 * torch.stack(far).mean() if far else images.new_zeros(()),
         "features": 10 * features(images, truth),
+        "beyond": 3 * log_error(images, truth, beyond),
     }
 
 

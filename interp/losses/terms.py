@@ -39,9 +39,14 @@ def absolute(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
 
 
 @in_full_precision
-def log_error(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
-    """How far images [..., C, H, W] are from the truth, by ratio."""
-    return torch.log(((images - truth) ** 2).mean((-3, -2, -1)) + LEAST_ERROR).mean()
+def log_error(images: torch.Tensor, truth: torch.Tensor, where: torch.Tensor | None = None) -> torch.Tensor:
+    """How far images [..., C, H, W] are from the truth, by ratio; where it says so, if it does."""
+    error = (images - truth) ** 2
+    if where is None:
+        return torch.log(error.mean((-3, -2, -1)) + LEAST_ERROR).mean()
+    number = where.sum((-3, -2, -1))
+    mean = (error * where).sum((-3, -2, -1)) / number.clamp(min=1)
+    return (torch.log(mean + LEAST_ERROR) * (number > 0)).sum() / (number > 0).sum().clamp(min=1)
 
 
 @in_full_precision

@@ -1,7 +1,7 @@
 """Weights that come with the package: `NAME-SIZE.safetensors` beside this file, such as
-`rrin_events_guided-tiny.safetensors`.
+`rrin_events_guided-tiny.safetensors`, each with a card that says where it comes from and what it scores.
 
-What is used where nothing is asked for stands first in `PREFERRED`.
+What is used where nothing is asked for stands first.
 """
 
 from __future__ import annotations
@@ -9,23 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PREFERRED: dict[bool, tuple[str, ...]] = {
-    True: ("rrin_events_guided-small", "rrin_events_guided-tiny"),
-    False: ("rrin-small", "rrin-tiny"),
-}
+WITH_EVENTS = ("rrin_events_guided-small", "rrin_events_guided-tiny")
+OF_FRAMES = ("rrin_light-small", "rrin_light-tiny")
 OF_EVENTS = ("e2vid-small", "e2vid-tiny", "firenet-paper", "firenet-small", "firenet-tiny")
+HDR = ("hdr-small", "hdr-tiny")
 
 
-def default(events: bool) -> Path | None:
-    """The weights to interpolate with, with events or of frames alone; None if there are none."""
-    return _first(PREFERRED[events])
-
-
-def of_events() -> Path | None:
-    """The weights to make pictures of events alone with; None if there are none."""
-    return _first(OF_EVENTS)
-
-
-def _first(names: tuple[str, ...]) -> Path | None:
+def first(names: tuple[str, ...]) -> Path | None:
+    """The weights of the first of some names that come with this version; None if there are none."""
     paths = (HERE / f"{name}.safetensors" for name in names)
     return next((path for path in paths if path.exists()), None)

@@ -220,7 +220,7 @@ def _choice(
         raise UsageError(f"--network {network} and --cutoff {cutoff_hz:g}: leave out one of them")
     asked = network or cutoff_hz is not None
     if not asked:
-        network = pretrained.of_events()
+        network = pretrained.first(pretrained.OF_EVENTS)
     if network:
         why = "as asked" if asked else "the network that comes with vid2ev"
         about = {"network": str(network), "sha256": sha256(Path(network))}

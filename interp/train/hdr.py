@@ -50,7 +50,9 @@ class HdrLearner(Learner):
     def parts(self, batch: Batch) -> objectives.Terms:
         """Terms of the loss, of ratios."""
         made, truth = to_ratios(self.made(batch)), to_ratios(batch["truth"])
-        return objectives.hdr(made, truth, batch["flows"], batch["flows_to_first"], self.features)
+        low, high = batch["range"][:, :, None, None, None, None].unbind(1)
+        beyond = (batch["truth"] < low) | (batch["truth"] > high)
+        return objectives.hdr(made, truth, batch["flows"], batch["flows_to_first"], self.features, beyond)
 
     def predicted(self, clip: Batch) -> torch.Tensor:
         """Light [T, C, H, W] of one sequence."""

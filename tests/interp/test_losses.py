@@ -187,11 +187,28 @@ def test_the_first_picture_from_events_does_not_count() -> None:
     assert float(objectives.reconstruction(images, still, features, flows)["time"]) > 1
 
 
+def test_an_error_by_ratio_is_of_what_is_asked_for() -> None:
+    truth, where = torch.zeros(3, 1, 4, 4), torch.zeros(3, 1, 4, 4, dtype=torch.bool)
+    where[0, :, :2], where[1, :, 0, 0] = True, True
+    images = truth + torch.where(where, torch.tensor([0.1, 0.01, 5.0])[:, None, None, None], 7.0)
+    expected = (math.log(1e-2 + 1e-6) + math.log(1e-4 + 1e-6)) / 2  # nothing of the third
+    assert float(log_error(images, truth, where)) == pytest.approx(expected, rel=1e-5)
+
+
 def test_hdr_looks_at_the_frame_before_and_at_the_first() -> None:
     still, flows = torch.rand(1, 1, 3, 16, 16).expand(-1, 4, -1, -1, -1), torch.zeros(1, 3, 2, 16, 16)
     drifting = still + torch.tensor([0.0, 0.01, 0.02, 0.03])[None, :, None, None, None]
-    terms = objectives.hdr(drifting, still, flows, flows, Perceptual())
+    terms = objectives.hdr(drifting, still, flows, flows, Perceptual(), still > 2)
     assert float(terms["time"]) == pytest.approx(100 * 0.01, rel=1e-3)
     assert float(terms["long time"]) == pytest.approx(100 * (0.02 + 0.03) / 2, rel=1e-3)
-    assert all(float(term) == 0 for term in objectives.hdr(still, still, flows, flows, Perceptual()).values())
-    assert float(objectives.hdr(still[:, :2], still[:, :2], flows[:, :1], flows[:, :1], Perceptual())["long time"]) == 0
+    assert all(
+        float(term) == 0 for term in objectives.hdr(still, still, flows, flows, Perceptual(), still > 2).values()
+    )
+    assert (
+        float(
+            objectives.hdr(still[:, :2], still[:, :2], flows[:, :1], flows[:, :1], Perceptual(), still[:, :2] > 2)[
+                "long time"
+            ]
+        )
+        == 0
+    )

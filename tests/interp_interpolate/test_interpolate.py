@@ -134,9 +134,10 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
     said: list[str] = []
     interpolate(images(tmp_path / "a", moving(2)), tmp_path / "out", multiple=1, told=said.append)
     interpolate(recording(tmp_path / "b", moving(2)), tmp_path / "out2", multiple=1, told=said.append)
-    for events, sentence, name in ((False, said[0], "flow"), (True, said[1], "guided")):
-        weights = pretrained.default(events)
-        assert sentence.startswith(weights.stem if weights else name) and "since there are" in sentence
+    weights = pretrained.first(pretrained.WITH_EVENTS)
+    assert weights
+    for sentence, name in zip(said, ("flow", weights.stem), strict=True):
+        assert sentence.startswith(name) and "since there are" in sentence
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_takes import SIZE, images, moving
+from small_takes import images, moving
 
 from interp import pretrained
 from interp.networks import make
@@ -80,9 +80,10 @@ def test_what_cannot_be_meant_is_said(tmp_path: Path, weights: Path) -> None:
         save(tmp_path / "other.safetensors", name, make(name))
         with pytest.raises(error, match=sentence):
             make_upsampler(f"net:{tmp_path / 'other.safetensors'}")
-    if pretrained.default(events=False) is None:
-        with pytest.raises(UsageError, match="net:WEIGHTS, or choose flow"):
-            make_upsampler("net")
-    else:
-        assert len(list(make_upsampler("net", 2).between(*two_frames(False)))) == 2
-    assert SIZE
+
+
+def test_without_a_name_the_weights_that_come_with_it_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(list(make_upsampler("net", 2).between(*two_frames(False)))) == 2
+    monkeypatch.setattr(pretrained, "OF_FRAMES", ())
+    with pytest.raises(UsageError, match="net:WEIGHTS, or choose flow"):
+        make_upsampler("net")

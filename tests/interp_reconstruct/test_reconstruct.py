@@ -210,8 +210,8 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     written(tmp_path / "a.npz", drawn())
     result = CliRunner().invoke(command, ["a.npz"])
     assert result.exit_code == 0, result.output
-    by = pretrained.of_events()
-    assert f"by {by.stem if by else 'high-pass'}: " in result.output
+    by = pretrained.first(pretrained.OF_EVENTS)
+    assert by and f"by {by.stem}: " in result.output
     assert "a_seen.mp4: 30 pictures of 40x24 as mp4, 30 per second" in result.output
     again = CliRunner().invoke(command, ["a.npz", "--resume", "--json"])
     assert json.loads(again.output)["events"] == 5000
