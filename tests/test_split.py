@@ -1,12 +1,14 @@
-"""A clip split by tiles: the recording put together has the bytes of one made at once."""
+"""A clip split by tiles or at cuts: the recording put together has the bytes of one made at once."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -14,8 +16,12 @@ from click.testing import CliRunner
 from vid2ev import UsageError, convert
 from vid2ev.cluster.task import Task
 from vid2ev.commands import main
+from vid2ev.conversion import Paused
+from vid2ev.formats import read_events
 from vid2ev.split import convert_split
+from vid2ev.stream.events import Events
 
+PROBED = ("90,60", "3,4", "50,10")
 FILES = ("events.h5", "preview.mp4", "noise_maps.npz")
 
 
@@ -27,41 +33,55 @@ def here(tasks: Sequence[Task]) -> None:
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """96x64 pixels, which are three blocks; some move, some rest, some are not finite, and there is a cut."""
+    """96x64 pixels, which are three blocks; some move, some rest, some are not finite, and there are two cuts."""
     rng = np.random.default_rng(0)
-    texture = np.exp(rng.normal(0, 0.4, (64, 140)))
-    frames = np.stack([texture[:, 2 * k : 2 * k + 96] for k in range(12)])
+    textures = [cv2.GaussianBlur(np.exp(rng.normal(0, 0.5, (64, 140))), (0, 0), 1.5) ** 4 for _ in range(3)]
+    frames = np.stack([textures[k // 5][:, 2 * k : 2 * k + 96] for k in range(14)])
     frames[:, :20] = 0.5
-    frames[8:] = np.exp(rng.normal(0, 0.6, (64, 96)))
-    frames[3, 40, 5] = np.nan
+    frames[1, 40, 5] = np.nan
     path = tmp_path_factory.mktemp("split") / "clip.npy"
     np.save(path, frames.astype(np.float32))
     return str(path)
 
 
+@pytest.mark.parametrize("kind", ["tiles", "cuts"])
 @pytest.mark.parametrize(
     "options",
     [
         {"sensor": "paper", "upsample": "flow", "subframes": 3},
-        {"sensor": "v2e-noisy", "upsample": "none", "labels": True, "formats": "hdf5,csv"},
-        {"sensor": "paper", "overrides": ("delay_us=700", "max_crossings=3"), "upsample": "linear", "subframes": 2},
+        {"sensor": "v2e-noisy", "upsample": "none", "labels": True, "formats": "hdf5,csv", "slowdown": 1.7},
+        {"overrides": ("delay_us=700", "max_crossings=3"), "upsample": "linear", "subframes": 2, "probe": PROBED},
     ],
     ids=str,
 )
-def test_tiles_together_have_the_bytes_of_the_whole(clip: str, tmp_path: Path, options: dict[str, Any]) -> None:
+def test_parts_together_have_the_bytes_of_the_whole(
+    clip: str, tmp_path: Path, kind: str, options: dict[str, Any]
+) -> None:
     options = {"fps": 50, "noise_maps": True, "threads": 1} | options
     whole = convert(clip, tmp_path / "whole", **options)
-    made = convert_split(clip, tmp_path / "made", 3, here, **options)
+    assert len(whole["cuts_us"]) == 2
+    made = convert_split(clip, tmp_path / "made", kind, 3, here, **options)
     assert whole.pop("run") and made.pop("run") and made == whole and whole["counts"]["events"] > 10_000
-    for name in (*FILES, *["events.csv"] * ("formats" in options)):
+    for name in (*FILES, *["events.csv"] * ("formats" in options), *["probe.csv", "probe.png"] * ("probe" in options)):
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert {path.name for path in tmp_path.iterdir()} == {"whole", "made"}
-    again = convert_split(clip, tmp_path / "made", 3, here, resume=True, **options)
+    again = convert_split(clip, tmp_path / "made", kind, 3, here, resume=True, **options)
     again.pop("run")
     assert again == whole
 
 
-def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("rounding", ["nearest", "causal"])
+def test_tiles_keep_to_the_clock_of_the_readout(clip: str, tmp_path: Path, rounding: str) -> None:
+    overrides = ("frame_rate_hz=130", f"rounding={rounding}")
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "overrides": overrides}
+    convert(clip, tmp_path / "whole", **options)
+    convert_split(clip, tmp_path / "made", "tiles", 2, here, **options)
+    for name in FILES[:2]:
+        assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("kind", ["tiles", "cuts"])
+def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_path: Path, kind: str) -> None:
     options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "piece": 1}
     convert(clip, tmp_path / "whole", **options)
 
@@ -74,54 +94,98 @@ def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_p
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        convert_split(clip, tmp_path / "made", 2, only_one, **options)
+        convert_split(clip, tmp_path / "made", kind, 2, only_one, **options)
     assert not (tmp_path / "made").exists()
     with pytest.raises(UsageError, match="--resume continues it"):
-        convert_split(clip, tmp_path / "made", 2, here, **options)
+        convert_split(clip, tmp_path / "made", kind, 2, here, **options)
     with pytest.raises(KeyboardInterrupt):
-        convert_split(clip, tmp_path / "made", 2, here, resume=True, report=interrupted, **options)
-    convert_split(clip, tmp_path / "made", 2, here, resume=True, **options)
+        convert_split(clip, tmp_path / "made", kind, 2, here, resume=True, report=interrupted, **options)
+    convert_split(clip, tmp_path / "made", kind, 2, here, resume=True, **options)
     for name in FILES[:2]:
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert {path.name for path in tmp_path.iterdir()} == {"whole", "made"}
 
 
-def test_two_event_cameras_are_split_alike(clip: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["tiles", "cuts"])
+def test_the_cameras_of_a_rig_are_split_alike(clip: str, tmp_path: Path, kind: str) -> None:
     rig = tmp_path / "rig.toml"
-    rig.write_text(
-        '[[camera]]\nname = "left"\nkind = "dvs"\n[[camera]]\nname = "right"\nkind = "dvs"\nsize = [48, 32]\n'
-    )
-    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "rig": rig, "preview": False}
+    cameras = ["left", "dvs"], ["still", "cis"], ["right", "dvs"]
+    lines = [f'[[camera]]\nname = "{name}"\nkind = "{sort}"\n' for name, sort in cameras]
+    rig.write_text("".join(lines) + "size = [48, 32]\n")
+    options: dict[str, Any] = {
+        "fps": 50,
+        "upsample": "linear",
+        "subframes": 3,
+        "threads": 1,
+        "rig": rig,
+        "preview": False,
+    }
     convert(clip, tmp_path / "whole", **options)
-    convert_split(clip, tmp_path / "made", 2, here, **options)
-    for name in ("left/events.h5", "right/events.h5"):
+    convert_split(clip, tmp_path / "made", kind, 2, here, **options)
+    for name in ("left/events.h5", "right/events.h5", "still/raw/000000.png"):
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("kind", "options", "sentence"),
     [
-        ({"effects": "auto"}, "cannot do --effects auto"),
-        ({"frame_camera": True}, "cannot do a frame camera"),
-        ({"probe": ["3,4"]}, "cannot do --probe"),
-        ({"overrides": ["frame_rate_hz=1000"]}, "cannot do frame_rate_hz"),
+        ("tiles", {"effects": "auto"}, "cannot do --effects auto; name those"),
+        ("tiles", {"device": "cuda"}, "cannot do --device cuda"),
+        ("approximate", {"probe": ["3,4"]}, "cannot do --probe; take --split cuts"),
+        ("cuts", {"overrides": ["frame_rate_hz=1000"]}, "cannot do frame_rate_hz; take --split tiles"),
+        ("cuts", {"cuts": "keep"}, "cannot do --cuts keep"),
     ],
     ids=str,
 )
-def test_what_cannot_be_split_is_refused(clip: str, tmp_path: Path, options: dict[str, Any], sentence: str) -> None:
+def test_what_cannot_be_split_is_refused(
+    clip: str, tmp_path: Path, kind: str, options: dict[str, Any], sentence: str
+) -> None:
     with pytest.raises(UsageError, match=sentence):
-        convert_split(clip, tmp_path / "made", 2, here, fps=50, **options)
+        convert_split(clip, tmp_path / "made", kind, 2, here, fps=50, **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_parts_with_a_warm_up_are_near_the_whole_and_say_where_their_seams_are(clip: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "linear", "subframes": 2, "threads": 1, "preview": False}
+    whole = convert(clip, tmp_path / "whole", **options)
+    made = convert_split(clip, tmp_path / "made", "approximate", 4, here, **options)
+    seams_us = made["split"]["seams_us"]
+    assert seams_us == [60_000, 120_000, 180_000] and made["split"]["warm_up_us"] == 4100
+    for name in ("frames", "subframes"):
+        assert made["counts"][name] == whole["counts"][name]
+    one, other = (read_events(tmp_path / name) for name in ("whole", "made"))
+    one, other = Events.concatenate(one), Events.concatenate(other)
+    assert made["counts"]["events"] == len(other) == made["counts"]["on"] + made["counts"]["off"]
+    assert len(other) == pytest.approx(len(one), rel=0.02) and np.all(np.diff(other.t) >= 0)
+    # Until the first seam, and from a cut to the next seam, the events are the same.
+    for first_us, last_us in ((0, 60_000), (100_000, 120_000)):
+        parts = [each.select((each.t > first_us) & (each.t <= last_us)) for each in (one, other)]
+        assert len(parts[0]) > 100
+        assert all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in "txyp")
+
+
+def test_a_chain_is_gone_on_with_from_every_checkpoint(clip: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "piece": 1}
+    convert(clip, tmp_path / "whole", **options)
+    links = 0
+    while not (tmp_path / "made").exists():
+        links += 1
+        with suppress(Paused):
+            convert(clip, tmp_path / "made", resume=True, pause=lambda: True, **options)
+    assert links > 10
+    for name in FILES[:2]:
+        assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
 
 
 @pytest.mark.slow
 def test_the_command_splits_among_its_workers(clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     options = [clip, "--fps", "50", "--upsample", "none", "--no-preview"]
-    for wrong, sentence in (("tiles", "add --jobs or --scheduler"), ("time", "expected tiles")):
+    for wrong, sentence in (("tiles", "add --jobs or --scheduler"), ("time", "expected one of tiles")):
         result = CliRunner().invoke(main, ["convert", *options, "--split", wrong])
         assert result.exit_code == 2 and sentence in result.stderr
     assert CliRunner().invoke(main, ["convert", *options, "-o", "whole"]).exit_code == 0
-    result = CliRunner().invoke(main, ["convert", *options, "-o", "made", "--jobs", "2", "--split", "tiles", "--json"])
-    assert result.exit_code == 0 and json.loads(result.stdout)[0]["events"] > 0
-    assert Path("made/events.h5").read_bytes() == Path("whole/events.h5").read_bytes()
+    for split in ("tiles", "cuts:2", "chain:0.0001"):
+        result = CliRunner().invoke(main, ["convert", *options, "-o", split, "--jobs", "2", "--split", split, "--json"])
+        assert result.exit_code == 0 and json.loads(result.stdout)[0]["events"] > 0
+        assert Path(split, "events.h5").read_bytes() == Path("whole/events.h5").read_bytes()

@@ -8,6 +8,7 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -36,6 +37,20 @@ STEP = 1 << 18  # what a step counts for at least, as a small frame takes its ti
 Report = Callable[[Recipe, Progress], object]
 
 
+class Paused(Exception):
+    """A conversion was stopped at a checkpoint, as asked for; `resume` goes on from there."""
+
+
+@dataclass(frozen=True)
+class _Course:
+    """How a recording is to be made, whatever is in it; see `convert`."""
+
+    piece: int
+    report: Report | None
+    since_ns: int | None
+    pause: Callable[[], bool] | None
+
+
 def convert(
     video: str | Path,
     directory: str | Path | None = None,
@@ -54,7 +69,9 @@ def convert(
     notes: Mapping[str, Any] | None = None,
     device: str = "cpu",
     part: Part = WHOLE,
+    since_ns: int | None = None,
     made: Made | None = None,
+    pause: Callable[[], bool] | None = None,
     **rest: Any,
 ) -> dict[str, Any]:
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
@@ -73,7 +90,9 @@ def convert(
     device     where light and events are made: cpu, cuda (a GPU; the CPU where there is none), or auto, by how much
                there is to do (`sensors.devices`); "simulated" is for tests.  Light differs by what float32 rounds
     part       pixels of the event cameras that are simulated; `split` puts the recordings of all parts together
+    since_ns   the instant that the recording begins with; what is seen before it only warms event cameras
     made       the events of all parts, which are then not simulated
+    pause      asked at every checkpoint: whether to raise `Paused`, for `resume` to go on from there
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
     `Recipe.of`.
 
@@ -99,6 +118,7 @@ def convert(
     job = _asked(recipe, tolerance) if planner else recipe.describe() | described(plans)
     job |= {"outputs": outputs.describe()} | plain({**(notes or {})})
     job |= {} if part == WHOLE else {"part": list(part)}
+    job |= {} if since_ns is None else {"since_ns": since_ns}
     beside = growing(recipe, outputs)
     with Folder(directory, job, overwrite=overwrite, resume=resume, growing=beside) as folder:
         if folder.finished:
@@ -106,7 +126,7 @@ def convert(
         make = partial(
             Recorder, outputs=outputs, folder=folder, threads=threads, skip=skip, device=where, part=part, made=made
         )
-        recorder = _recorded(recipe, planner, folder, make, piece, report)
+        recorder = _recorded(recipe, planner, folder, make, _Course(piece, report, since_ns, pause))
         said = described(planner.plans if planner else plans)
         manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
         with folder.writing():
@@ -163,8 +183,7 @@ def _recorded(
     planner: Planner | None,
     folder: Folder,
     make: Callable[[Recipe], Recorder],
-    piece: int,
-    report: Report | None,
+    course: _Course,
 ) -> Recorder:
     """A recording made to its end, from the last checkpoint on, or by new plans from the beginning."""
     if planner:
@@ -173,11 +192,11 @@ def _recorded(
         recipe = planner.left
     recorder = make(recipe)
     recorder.take_up()
-    while not recorder.done.finished and not _record(recorder, planner, piece, report):
+    while not recorder.done.finished and not _record(recorder, planner, course):
         assert planner
         recorder.give_up()
         if recorder.done.by_hand:
-            report = partial(_ends, recorder.done.frames)
+            course = replace(course, report=partial(_ends, recorder.done.frames))
         recorder = make(planner.left)
     return recorder
 
@@ -187,30 +206,36 @@ def _ends(frames: int, _: Recipe, done: Progress) -> bool:
     return done.frames >= frames
 
 
-def _record(recorder: Recorder, planner: Planner | None, piece: int, report: Report | None) -> bool:
+def _record(recorder: Recorder, planner: Planner | None, course: _Course) -> bool:
     """From the point of the last checkpoint to the end of the source; returns False where there are new plans."""
     recipe, done = recorder.recipe, recorder.done
     began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
     coming = planner.instants if planner else partial(instants, recorder.seen, device=recorder.device)
-    with closing(coming(max(done.frames - 1, 0))) as seen:
+    with closing(coming(done.warmed + max(done.frames - 1, 0))) as seen:
         first = next(seen, None)
+        while first and not done.frames and course.since_ns is not None and first.t_ns < course.since_ns:
+            recorder.warm(first)
+            first = next(seen, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
         recorder.begin(first)
+        limited_before -= first.limited
         for instant in seen:
             if planner and planner.see(instant, done.frames + done.subframes):
                 return False
             recorder.add(instant)
             done.limited, done.seconds = limited_before + instant.limited, time.monotonic() - began
             work += max(STEP, sum(math.prod(frame.light.shape) for frame in instant.frames))
-            if instant.original and report and report(recipe, done) is True:
+            if instant.original and course.report and course.report(recipe, done) is True:
                 done.by_hand = True
                 done.warnings.append(f"ended by hand after {done.frames} frames")
                 break
-            if instant.original and work >= piece:
+            if instant.original and work >= course.piece:
                 done.looked, done.ended = (planner.looked, planner.ended) if planner else (0, False)
                 recorder.checkpoint()
                 work = 0
+                if course.pause and course.pause():
+                    raise Paused(recipe.video)
     done.warnings += recipe.source.warnings
     if planner:
         if planner.finish():

@@ -1,4 +1,4 @@
-"""Events that were made before, each part of the pixels by itself: what a recording is put together from.
+"""Events that were made before, each part of the pixels or of the time by itself, for a recording put together of them.
 
 The noise of a pixel depends on no other, so the events of a part are those of the whole at its pixels; and all are
 ordered by (t, y, x), so there is one way to put them together.
@@ -15,8 +15,10 @@ import numpy as np
 
 from vid2ev.formats import read_events
 from vid2ev.mounts import Mount
+from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.recording.probe import merged, one_after_the_other
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
@@ -27,24 +29,40 @@ BLOCK = 1 << 18  # events of a part that are read at a time
 
 @dataclass(frozen=True)
 class Made:
-    """The recordings of all parts, in folders of their own."""
+    """The recordings of all parts, in folders of their own.
+
+    in_time  they are parts of the time, one after the other, and not of the pixels
+    """
 
     folders: tuple[Path, ...]
+    in_time: bool = False
 
     def sensor(self, mount: Mount, labels: bool) -> Dvs:
         """What sends the events of a camera; to a track it is the camera."""
         return Replayed(mount, [folder / mount.within for folder in self.folders], labels)  # type: ignore[return-value]
 
+    def probed(self, mount: Mount, pixels: Sequence[tuple[int, int]]) -> Iterator[bytes]:
+        """The lines of probe.csv of a camera."""
+        tables = [folder / mount.within / "probe.csv" for folder in self.folders]
+        tables = [table for table in tables if table.exists()]
+        return one_after_the_other(tables) if self.in_time else merged(tables, pixels)
+
     def seen(self, recipe: Recipe) -> Recipe:
-        """The recipe for the frames that the recording still needs: those of the source."""
-        return recipe if recipe.source.dense else replace(recipe, upsample="none", subframes="auto")
+        """The recipe for the frames that the recording still needs: those of the source, but for frame cameras."""
+        if recipe.source.dense or any(mount.kind == "cis" for mount in recipe.mounts):
+            return recipe
+        return replace(recipe, upsample="none", subframes="auto")
 
     @property
     def subframes(self) -> tuple[int, int]:
         """How many there were, and how many intervals were limited."""
-        manifest = read_manifest(self.folders[0])
-        counts = next(iter(manifest.get("results", {"": manifest}).values()))["counts"]
-        return counts["subframes"], counts["limited_intervals"]
+        counts = [_counts(read_manifest(folder)) for folder in (self.folders if self.in_time else self.folders[:1])]
+        return sum(each["subframes"] for each in counts), sum(each["limited_intervals"] for each in counts)
+
+
+def _counts(manifest: dict[str, Any]) -> dict[str, int]:
+    """What a recording says of its light, whatever its cameras."""
+    return next(iter(manifest.get("results", {"": manifest}).values()))["counts"]
 
 
 class Replayed:
@@ -58,6 +76,7 @@ class Replayed:
         self.size, self.spec, self.labels = mount.size, mount.sensor.spec, labels
         self._mount, self._folders = mount, folders
         self._parts = [_Stream(folder) for folder in folders]
+        self._frames = EventFrames(self.spec, *self.size, labels) if self.spec.frame_rate_hz > 0 else None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -66,13 +85,15 @@ class Replayed:
         names = ("on", "off", "swallowed", "capped", "not_finite")
         return {name: sum(counts[name] for counts in of_parts) for name in names}
 
-    def step(self, light: Any, t_ns: int) -> Events:
+    def see(self, frame: Frame) -> Events:
         """The first frame, in which a sensor settles."""
+        if self._frames:
+            self._frames.origin_us = frame.t_ns // 1000
         return Events.empty(self.labels)
 
     def see_all(self, frames: Sequence[Frame]) -> list[Events]:
-        """The events up to each frame."""
-        return [self._until(frame.t_ns // 1000) for frame in frames]
+        """The events up to each frame, or of the event frames that are complete by then."""
+        return [self._until(self._sent_us(frame.t_ns // 1000)) for frame in frames]
 
     def flush(self) -> Events:
         """What is left."""
@@ -84,11 +105,20 @@ class Replayed:
 
     def state(self) -> dict[str, np.ndarray]:
         """How many events of each part are sent."""
-        return {"sent": np.array([part.sent for part in self._parts], np.int64)}
+        origin = {"origin": np.array(self._frames.origin_us, np.int64)} if self._frames else {}
+        return {"sent": np.array([part.sent for part in self._parts], np.int64)} | origin
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state."""
         self._parts = [_Stream(folder, int(sent)) for folder, sent in zip(self._folders, state["sent"], strict=True)]
+        if self._frames:
+            self._frames.origin_us = int(state["origin"])
+
+    def _sent_us(self, t_us: int) -> int:
+        """The last instant of which all is sent by a time [us]."""
+        if self._frames is None:
+            return t_us
+        return int(self._frames.instant_us(self._frames.frame_of(np.array([t_us])))[0]) - 1
 
     def _until(self, last_us: int) -> Events:
         events = Events.concatenate(part.until(last_us) for part in self._parts)

@@ -41,6 +41,7 @@ def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
 class Progress:
     """How far a conversion is."""
 
+    warmed: int = 0  # frames of the source before the recording began
     frames: int = 0  # of the source
     subframes: int = 0  # made between them
     limited: int = 0  # source intervals that hit max_subframes
@@ -127,11 +128,20 @@ class Recorder:
                     )
             self.done = progress_of(self.folder)
 
+    def warm(self, instant: Instant) -> None:
+        """Show event cameras what was before the recording, of which nothing is kept."""
+        self.done.warmed += instant.original
+        for track, frame in zip(self.tracks, instant.frames, strict=True):
+            if isinstance(track, DvsTrack):
+                track.dvs.see(frame)
+
     def begin(self, instant: Instant) -> None:
         """The first instant of the recording; after `take_up`, the last source frame before the checkpoint."""
         with self.folder.writing():
             for track, frame in zip(self.tracks, instant.frames, strict=True):
                 track.begin(frame)
+                if self.done.warmed and not self.done.frames and isinstance(track, DvsTrack):
+                    track.dvs.forget_counts()
             if not self.done.frames:
                 self._add_truth(instant)
                 self.done.add(instant)
@@ -202,15 +212,15 @@ class Recorder:
     def _track(self, mount: Mount, threads: int, skip: bool) -> Track:
         if mount.kind == "cis":
             return CisTrack(mount.cis(threads, self.device), self.folder, self.outputs, within=mount.within)
-        source = self.recipe.source
-        dvs = None if self._made is None else self._made.sensor(mount, self.recipe.labels)
+        source, labels, made = self.recipe.source, self.recipe.labels, self._made
         return DvsTrack(
-            dvs or mount.dvs(self.recipe.labels, threads, skip, self.device, self._part),
+            made.sensor(mount, labels) if made else mount.dvs(labels, threads, skip, self.device, self._part),
             self.folder,
             self.outputs,
             within=mount.within,
             rate=rate_for(source.frames_expected, source.duration_expected_s),
             pictures=partial(pictures, self.recipe, mount) if source.rewindable else None,
+            probed=partial(made.probed, mount, self.outputs.probe) if made else None,
         )
 
     def outcome(self, number: int) -> dict[str, Any]:

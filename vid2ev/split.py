@@ -1,10 +1,13 @@
-"""A clip shared out by tiles: some pixels to each worker; the recording put together has the bytes of one made at once.
+"""A clip shared out by parts, of its pixels or of its time; what is put together has the bytes of a recording made at
+once, but for parts begun with a warm-up.
 
-    DIR.tiles/K-of-N/    the recording of a part of the pixels
+    DIR.parts/K-of-N/    the recording of a part
     DIR/                 the recording
 
-Every worker makes the light for itself, so this pays where the sensor takes longer than the light: noisy sensors, large
-pictures.
+    tiles        blocks of pixels; every worker makes the light for itself, so this pays where the sensor takes longer
+                 than the light: noisy sensors, large pictures
+    cuts         shots, at whose beginning sensors start afresh
+    approximate  stretches of time, each begun with a warm-up (`stretches`)
 """
 
 from __future__ import annotations
@@ -27,6 +30,9 @@ from vid2ev.recorder import Progress
 from vid2ev.recording.folder import begun_job, check_free
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
+from vid2ev.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
+
+KINDS = ("tiles", "cuts", "approximate")
 
 ShareOut = Callable[[Sequence[Task]], object]  # does all tasks; raises what one ends with
 
@@ -34,19 +40,24 @@ ShareOut = Callable[[Sequence[Task]], object]  # does all tasks; raises what one
 def convert_split(
     video: str,
     directory: Path,
-    tiles: int,
+    kind: str,
+    count: int,
     share_out: ShareOut,
     *,
     overwrite: bool = False,
     resume: bool = False,
+    look: Look | None = None,
     report: Report | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """`conversion.convert` with the pixels in so many parts, which `share_out` makes as tasks; returns the manifest.
+    """`conversion.convert` of at most so many parts of a kind, which `share_out` makes as tasks; returns the manifest.
 
-    The files are those of `convert` to the byte.  Raises UsageError for what cannot be split, and as `convert` does.
+    look    told how many frames were looked at for cuts and times, and of how many
+    report  called at every source frame as parts are put together
+
+    Raises UsageError for what cannot be split, and as `convert` does.
     """
-    beside = directory.with_name(f"{directory.name}.tiles")
+    beside = parts_of(directory)
     check_free(directory, overwrite, resume)
     if resume and directory.exists() and not beside.exists():
         return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
@@ -55,48 +66,77 @@ def convert_split(
     if overwrite and not resume:
         shutil.rmtree(beside, ignore_errors=True)
     if options.get("seed", 0) is None:
-        options["seed"] = begun_job(beside / f"0-of-{tiles}").get("seed", secrets.randbits(32))
-    count = _checked(video, tiles, dict(options))
-    folders = tuple(beside / f"{number}-of-{count}" for number in range(count))
+        options["seed"] = begun_part(directory).get("seed", secrets.randbits(32))
+    parts, notes = _parts(video, kind, count, dict(options), look)
+    folders = tuple(beside / f"{number}-of-{len(parts)}" for number in range(len(parts)))
     beside.mkdir(parents=True, exist_ok=True)
-    of_parts = {key: value for key, value in options.items() if key not in Outputs.__dataclass_fields__}
+    not_in_parts = Outputs.__dataclass_fields__.keys() - {"probe"}
+    of_parts = {key: value for key, value in options.items() if key not in not_in_parts}
     calls = [
-        partial(_part, video=video, folder=folder, part=Part(number, count), options=of_parts)
-        for number, folder in enumerate(folders)
+        partial(_part, video=video, folder=folder, options=of_parts | part)
+        for folder, part in zip(folders, parts, strict=True)
     ]
-    share_out([Task(f"{video}, tile {number + 1} of {count}", call) for number, call in enumerate(calls)])
-    made = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=Made(folders), **options)
+    share_out([Task(f"{video}, part {number} of {len(parts)}", call) for number, call in enumerate(calls, 1)])
+    options |= {"notes": {**(options.get("notes") or {}), **notes}} if notes else {}
+    made = Made(folders, in_time=kind != "tiles")
+    manifest = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=made, **options)
     shutil.rmtree(beside)
-    return made
+    return manifest
 
 
-def _part(tell: Tell, video: str, folder: Path, part: Part, options: dict[str, Any]) -> None:
+def parts_of(directory: Path) -> Path:
+    """Where the parts of a recording are kept until it is whole."""
+    return directory.with_name(f"{directory.name}.parts")
+
+
+def begun_part(directory: Path) -> dict[str, Any]:
+    """The job of the first part of a recording, if it was begun; otherwise empty."""
+    found = sorted(parts_of(directory).glob("0-of-*"))
+    return begun_job(found[0].with_name(found[0].name.removesuffix(".partial"))) if found else {}
+
+
+def _part(tell: Tell, video: str, folder: Path, options: dict[str, Any]) -> None:
     """The recording of a part, as a task."""
 
     def report(recipe: Recipe, done: Progress) -> None:
         total = recipe.source.frames_expected
         tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
 
-    convert(video, folder, resume=True, report=report, part=part, preview=False, **options)
+    convert(video, folder, resume=True, report=report, preview=False, **options)
 
 
-def _checked(video: str, tiles: int, options: dict[str, Any]) -> int:
-    """Into how many parts the pixels can be split: at most a block of 2048 each.  Raises UsageError."""
-    for name in ("threads", "skip", "piece", "notes", "tolerance", "report"):
+def _parts(
+    video: str, kind: str, count: int, options: dict[str, Any], look: Look | None
+) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """The parts, as what their conversions are told, and what the manifest is to say of them.  Raises UsageError."""
+    for name in ("threads", "skip", "piece", "notes", "tolerance"):
         options.pop(name, None)
     effects, device = options.pop("effects", "all"), options.pop("device", "cpu")
     outputs = Outputs.of(**Outputs.taken_from(options))
     recipe = Recipe.of(video, **options)
     check_outputs(recipe, outputs)
-    specs = [mount.sensor.spec for mount in recipe.mounts]
+    specs = [mount.sensor.spec for mount in recipe.mounts if isinstance(mount.sensor.spec, DvsSpec)]
     for wrong, what, instead in (
-        (effects == "auto", "--effects auto", "name them, or take all"),
-        (device != "cpu", f"--device {device}", "take cpu"),
-        (bool(outputs.probe), "--probe", "probe a recording that is made at once"),
+        (effects == "auto", "--effects auto", "name those that `vid2ev plan` finds"),
+        (device != "cpu" and kind != "cuts", f"--device {device}", "take cpu"),
+        (bool(outputs.probe) and kind == "approximate", "--probe", "take --split cuts or tiles"),
         (not recipe.source.rewindable, video, "keep it in a file first"),
-        (any(not isinstance(spec, DvsSpec) for spec in specs), "a frame camera", "convert that one by itself"),
-        (any(isinstance(spec, DvsSpec) and spec.frame_rate_hz > 0 for spec in specs), "frame_rate_hz", "set it to 0"),
+        (not specs, "a rig without event cameras", "convert it at once"),
+        (kind != "tiles" and any(spec.frame_rate_hz > 0 for spec in specs), "frame_rate_hz", "take --split tiles"),
     ):
         if wrong:
-            raise UsageError(f"--split tiles cannot do {what}; {instead}, or leave --split out")
-    return min(tiles, *(-(-mount.size[0] * mount.size[1] // BLOCK) for mount in recipe.mounts))
+            raise UsageError(f"--split {kind} cannot do {what}; {instead}, or leave --split out")
+    if kind == "tiles":
+        sizes = [mount.size for mount in recipe.mounts if mount.kind == "dvs"]
+        count = min(count, *(-(-width * height // BLOCK) for width, height in sizes))
+        return [{"part": Part(number, count)} for number in range(count)], {}
+    if kind == "cuts":
+        return [stretch._asdict() for stretch in at_cuts(recipe, count, options, look)], {}
+    stretches = with_warm_up(recipe, count, options, look)
+    return [stretch._asdict() for stretch in stretches], {"split": _seams(recipe, stretches)}
+
+
+def _seams(recipe: Recipe, stretches: Sequence[Stretch]) -> dict[str, Any]:
+    """What the manifest says of parts begun with a warm-up."""
+    seams_us = [stretch.since_ns // 1000 for stretch in stretches if stretch.since_ns is not None]
+    return {"kind": "approximate", "seams_us": seams_us, "warm_up_us": warm_up_us(recipe)}

@@ -109,10 +109,10 @@ def test_light_taken_up_anywhere_knows_the_cuts(tmp_path: Path, start: int) -> N
     assert cuts(instants(recipe, start)) == [t_ns for t_ns in cuts(instants(recipe)) if t_ns > start * 10**7]
 
 
+@pytest.mark.parametrize("noise", ["crossing_noise=0.03", "photoreceptor_noise=0.05"])
 @pytest.mark.parametrize("sensor", ["ideal", "paper", "v2e-noisy"])
-def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(sensor: str) -> None:
-    """The same pixel-for-pixel state, but for the counts of crossings, by which noise is drawn."""
-    spec = load_sensor(sensor, ["crossing_noise=0"])
+def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(sensor: str, noise: str) -> None:
+    spec = load_sensor(sensor, [noise, "photoreceptor_tau_us=300", "follower_tau_us=100"])
     rng = np.random.default_rng(1)
     first, second, third = (rng.uniform(0.1, 1, (12, 20)).astype(F) for _ in range(3))
     old, new = Dvs(spec, (20, 12), seed=3), Dvs(spec, (20, 12), seed=3)

@@ -36,8 +36,15 @@ class Refused:
     error: UsageError
 
 
+@dataclass(frozen=True)
+class GoOn:
+    """What a task gives that is not done, and that another worker may go on with: the call that does so."""
+
+    call: Callable[[Tell], Any]
+
+
 def done_on_worker(task: Task, folder: str, topic: str) -> Any:
-    """What the task gives, or `Refused`; its errors go to Dask, which tries again."""
+    """What the task gives, perhaps `GoOn`, or `Refused`; its errors go to Dask, which tries again."""
     from distributed import get_worker
 
     worker = get_worker()

@@ -6,10 +6,10 @@ import os
 import uuid
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vid2ev.cluster.task import Refused, Task, done_on_worker
+from vid2ev.cluster.task import GoOn, Refused, Task, done_on_worker
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError
 
@@ -48,9 +48,9 @@ class _Lives:
 def outcomes(tasks: Sequence[Task], workers: Workers, watch: Watch | None = None) -> Iterator[Outcome]:
     """The outcome of each task, in whatever order they come.
 
-    A task that fails is tried again `workers.retries` times, unless it is a request that cannot be meant; so is one
-    whose worker dies, as of memory.  Tasks are to be such that they go on where another was, or begin anew, to the same
-    result.  `watch` is told in a thread of its own what tasks tell.
+    A task that gives `GoOn` is gone on with.  A task that fails is tried again `workers.retries` times, unless it is a
+    request that cannot be meant; so is one whose worker dies, as of memory.  Tasks are to be such that they go on where
+    another was, or begin anew, to the same result.  `watch` is told in a thread of its own what tasks tell.
 
     Raises DataError where the scheduler is gone, and what `Workers.client` does.
     """
@@ -89,6 +89,12 @@ def _as_they_come(
         name = names[future.key]
         if future.status == "finished":
             value = future.result()
+            if isinstance(value, GoOn):
+                tasks[name] = replace(tasks[name], call=value.call)
+                lives.pids[name].clear()
+                blamed[name] = 0
+                coming.add(submitted(tasks[name]))
+                continue
             yield Outcome(name, error=value.error) if isinstance(value, Refused) else Outcome(name, value)
         elif future.status == "error":
             error = future.exception()

@@ -80,14 +80,14 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
 
 def convert_shared(
     directories: dict[str, Path],
-    convert: Callable[..., dict[str, Any]],
+    convert: Callable[..., Any],
     check: Callable[[str, Path], object],
     workers: Workers,
     quiet: bool,
 ) -> list[dict[str, Any]]:
     """`convert_each` by workers, each of which converts one video at a time.
 
-    convert  a task: takes `Tell`, and `video` and `directory` by name
+    convert  a task, which gives the manifest in the end: takes `Tell`, and `video` and `directory` by name
     check    raises at once, here, for what need not be tried
     """
     from vid2ev.cluster.task import Task

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
+import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +17,7 @@ from vid2ev.commands.worker_options import worker_options
 from vid2ev.errors import UsageError
 
 if TYPE_CHECKING:
-    from vid2ev.cluster.task import Tell
+    from vid2ev.cluster.task import GoOn, Tell
     from vid2ev.recipe import Recipe
     from vid2ev.recorder import Progress
 
@@ -110,8 +112,9 @@ class Auto(click.ParamType):
 )
 @worker_options("Videos")
 @click.option(
-    "--split", metavar="tiles[:N]", help="Split each video among the workers, by parts of its pixels, in place of"
-    " giving them a video each; changes nothing but the time it takes.",
+    "--split", metavar="tiles|cuts|chain|approximate[:N]", help="Split each video among the workers: by parts of its"
+    " pixels, at its cuts, or in turn (N minutes each), which change nothing but the time it takes; or in time at"
+    " seams, near which events differ.",
 )  # fmt: skip
 @click.option(
     "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="cpu", show_default=True,
@@ -197,19 +200,20 @@ def convert(
     from vid2ev import conversion
     from vid2ev.commands import batch
     from vid2ev.commands.progress import given
-    from vid2ev.commands.splitting import split_among, tiles_of
+    from vid2ev.commands.splitting import split_among, split_of
     from vid2ev.commands.worker_options import workers_of
 
     quiet |= as_json
     workers = workers_of(options)
-    tiles = tiles_of(options.pop("split"), workers)
+    split = split_of(options.pop("split"), workers)
+    in_parts = split is not None and split.kind != "chain"
     if options["device"] == "cuda" and not quiet:
         _warn_without_gpu()
     options["seed"] = None if options["seed"] == "random" else options["seed"]
     found = [source for video in videos for source in batch.sources_in(video)]
     single = len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/")
     directory = Path(output) if output and single else conversion.default_directory(videos[0])
-    if single and workers.scheduler is None and not tiles:
+    if single and workers.scheduler is None and split is None:
         made = _one(videos[0], directory, dry_run, verbose, quiet, options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
@@ -219,20 +223,21 @@ def convert(
         options["threads"] = options["threads"] or workers.threads
 
     def one(video: str, directory: Path) -> dict[str, Any]:
-        if tiles and not dry_run:
-            return split_among(workers, video, directory, tiles, quiet, dict(options))
+        if split and in_parts and not dry_run:
+            chosen = _chosen(video, directory, quiet, dict(options), given())
+            return split_among(workers, video, directory, split, quiet, chosen)
         return _one(video, directory, dry_run, verbose, quiet, dict(options))
 
     directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))
-    if workers.alone or tiles or dry_run:
+    if workers.alone or in_parts or dry_run:
         results = batch.convert_each(directories, one, quiet)
     else:
         check = partial(_check_shared, overwrite=options["overwrite"], resume=options["resume"])
         # (What was checked is free, so that going on is beginning, and a task that is tried again goes on.)
         options["resume"] |= not options["overwrite"]
-        results = batch.convert_shared(
-            directories, partial(_on_worker, options=options, named=given()), check, workers, quiet
-        )
+        link_s = 60 * split.number if split else math.inf
+        on_worker = partial(_on_worker, options=options, named=given(), link_s=link_s)
+        results = batch.convert_shared(directories, on_worker, check, workers, quiet)
     click.echo(
         json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )
@@ -255,12 +260,12 @@ def _one(
     from vid2ev.commands import summary
     from vid2ev.commands.progress import bar, given, heard, kept
 
-    budget = options.pop("budget")
+    budget = options["budget"]
     if budget is not None:
         from vid2ev.cost.front import Budget
 
         Budget.parse(budget)
-        options = options if dry_run else _within(budget, video, directory, quiet, options, given())
+    options = _chosen(video, directory, quiet, options, given(), dry_run)
     if dry_run or verbose:
         recipe, plan = _plan(video, directory, dict(options))
         if not quiet:
@@ -287,20 +292,33 @@ def _check_shared(video: str, directory: Path, overwrite: bool, resume: bool) ->
     check_free(directory, overwrite, resume)
 
 
-def _on_worker(tell: Tell, video: str, directory: Path, options: dict[str, Any], named: set[str]) -> dict[str, Any]:
-    """Convert a video, as a task; returns the manifest.  `named`: the options of the command line."""
+def _on_worker(
+    tell: Tell, video: str, directory: Path, options: dict[str, Any], named: set[str], link_s: float
+) -> dict[str, Any] | GoOn:
+    """Convert a video, as a task, or go on for so long and then leave it to another; returns the manifest.  `named`:
+    the options of the command line."""
     from vid2ev import conversion
+    from vid2ev.cluster.task import GoOn
 
-    options = dict(options)
-    budget = options.pop("budget")
-    if budget is not None:
-        options = _within(budget, video, directory, True, options, named)
+    chosen, until_s = _chosen(video, directory, True, dict(options), named), time.monotonic() + link_s
 
     def report(recipe: Recipe, done: Progress) -> None:
         total = recipe.source.frames_expected
         tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
 
-    return conversion.convert(video, directory, report=report, **options)
+    try:
+        return conversion.convert(video, directory, report=report, pause=lambda: time.monotonic() > until_s, **chosen)
+    except conversion.Paused:
+        options = options | {"resume": True}
+        return GoOn(partial(_on_worker, video=video, directory=directory, options=options, named=named, link_s=link_s))
+
+
+def _chosen(
+    video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str], dry_run: bool = False
+) -> dict[str, Any]:
+    """The options of a conversion, with the setting for its budget if there is one."""
+    budget = options.pop("budget")
+    return options if budget is None or dry_run else _within(budget, video, directory, quiet, options, named)
 
 
 def _within(
@@ -312,9 +330,11 @@ def _within(
     from vid2ev.cost.choice import chosen, taken_up
     from vid2ev.outputs import Outputs
     from vid2ev.recording.folder import begun_job, check_free
+    from vid2ev.split import begun_part
 
     check_free(directory, options["overwrite"], options["resume"])
-    begun = begun_job(directory).get("budget", {}) if options["resume"] else {}
+    job = begun_job(directory) or begun_part(directory) if options["resume"] else {}
+    begun = job.get("budget", {})
     choice = taken_up(begun, budget)
     if choice is None:
         rest = dict(options)

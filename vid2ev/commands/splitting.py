@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vid2ev.errors import UsageError
 
@@ -12,35 +12,48 @@ if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
     from vid2ev.cluster.workers import Workers
 
+LOOKS = "looking for places to split: {n_fmt}/{total_fmt} frames, {elapsed} gone, {remaining} left"
+KINDS = ("tiles", "cuts", "chain", "approximate")
+LINK_MIN = 10.0  # of a chain
+PARTS = {"cuts": 4}  # for each worker, as shots are not as long as each other; otherwise one
 
-def tiles_of(split: str | None, workers: Workers) -> int | None:
-    """Into how many parts to split the pixels; None for not at all.  Raises UsageError."""
-    if split is None:
+
+class Split(NamedTuple):
+    """How a clip is split: a kind, and how many parts, or how long the links of a chain are [min]."""
+
+    kind: str
+    number: float
+
+
+def split_of(text: str | None, workers: Workers) -> Split | None:
+    """What --split says; None for not at all.  Raises UsageError."""
+    if text is None:
         return None
-    kind, colon, count = split.partition(":")
-    if kind != "tiles" or (colon and not (count.isdecimal() and int(count))):
-        raise UsageError(f"--split {split}: expected tiles, or how many of them, such as tiles:8")
+    kind, colon, said = text.partition(":")
+    if kind not in KINDS:
+        raise UsageError(f"--split {text}: expected one of {', '.join(KINDS)}")
     if workers.alone:
-        raise UsageError(f"--split {split} needs workers to split among; add --jobs or --scheduler")
+        raise UsageError(f"--split {text} needs workers to split among; add --jobs or --scheduler")
+    if kind == "chain":
+        return Split(kind, _minutes(said, text) if colon else LINK_MIN)
+    if colon and not (said.isdecimal() and 0 < len(said) < 7 and int(said)):
+        raise UsageError(f"--split {text}: expected how many parts, such as {kind}:8")
     if not colon and workers.scheduler:
-        raise UsageError(f"--split {split} with --scheduler: expected how many, such as tiles:8")
-    return int(count) if colon else workers.jobs
+        raise UsageError(f"--split {text} with --scheduler: expected how many parts, such as {kind}:8")
+    return Split(kind, int(said) if colon else workers.jobs * PARTS.get(kind, 1))
 
 
 def split_among(
-    workers: Workers, video: str, directory: Path, tiles: int, quiet: bool, options: dict[str, Any]
+    workers: Workers, video: str, directory: Path, split: Split, quiet: bool, options: dict[str, Any]
 ) -> dict[str, Any]:
-    """Convert a video, its pixels in so many parts; returns the manifest."""
+    """Convert a video in parts; returns the manifest."""
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import bar, heard
+    from vid2ev.commands.progress import bar, counting, heard
     from vid2ev.split import convert_split
-
-    if options.pop("budget") is not None:
-        raise UsageError("--split and --budget: what the budget allows is found in one piece; leave one of them out")
 
     def share_out(tasks: Sequence[Task]) -> None:
         error: Exception | None = None
-        with shared_out(tasks, workers, "tiles", quiet) as (outcomes, live):
+        with shared_out(tasks, workers, "parts", quiet) as (outcomes, live):
             for outcome in outcomes:
                 error = error or outcome.error
                 if live:
@@ -48,5 +61,17 @@ def split_among(
         if error:
             raise error
 
-    with heard() as check, bar(quiet, check) as report:
-        return convert_split(video, directory, tiles, share_out, report=report, **options)
+    with heard() as check, counting(quiet, LOOKS) as look, bar(quiet, check) as report:
+        return convert_split(
+            video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
+        )
+
+
+def _minutes(said: str, text: str) -> float:
+    try:
+        minutes = float(said)
+    except ValueError:
+        minutes = 0.0
+    if not 0 < minutes < 1e6:
+        raise UsageError(f"--split {text}: expected how many minutes a worker goes on for, such as chain:10")
+    return minutes

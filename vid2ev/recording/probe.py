@@ -16,7 +16,10 @@ The columns from `light` on are empty for events.
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+import heapq
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +55,36 @@ class Probe:
         """The lines of events, those of other pixels left out."""
         found = np.flatnonzero(np.isin(events.y.astype(np.int64) * self._width + events.x, self.places))
         return [f"{events.t[k]},{events.x[k]},{events.y[k]},{POLARITY[events.p[k]]},,,,,\n" for k in found]
+
+
+def merged(tables: Sequence[Path], pixels: Sequence[tuple[int, int]]) -> Iterator[bytes]:
+    """The table of all pixels, from those of some of them each, over the same frames."""
+    yield HEADER
+    places = {pixel: k for k, pixel in enumerate(pixels)}
+    for _, line in heapq.merge(*(_placed(table, places) for table in tables), key=itemgetter(0)):
+        yield line
+
+
+def one_after_the_other(tables: Sequence[Path]) -> Iterator[bytes]:
+    """The table of all frames, from those of some of them each, of the same pixels."""
+    yield HEADER
+    for table in tables:
+        with open(table, "rb") as file:
+            yield from islice(file, 1, None)
+
+
+def _placed(table: Path, places: dict[tuple[int, int], int]) -> Iterator[tuple[tuple[int, ...], bytes]]:
+    """The lines of a table, each with what they are ordered by: the frames so far, whether it is of a frame, then the
+    place of its pixel, or of an event (t, y, x)."""
+    frames, before = -1, b""
+    with open(table, "rb") as file:
+        for line in islice(file, 1, None):
+            t_us, x, y, what, _ = line.split(b",", 4)
+            if what == b"frame":
+                frames, before = frames + (t_us != before), t_us
+                yield (frames, 1, places[int(x), int(y)]), line
+            else:
+                yield (frames + 1, 0, int(t_us), int(y), int(x)), line
 
 
 def plot(table: Path, picture: Path) -> None:

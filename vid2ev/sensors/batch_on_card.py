@@ -63,8 +63,7 @@ class DvsBatchOnCard:
 
     def restart(self, light: Any, t_ns: Sequence[int]) -> None:
         """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips]."""
-        steps = [clock.step for clock in self._clocks] or [0] * len(self._numbers)
-        self._clocks = [Clock(int(t), step) for t, step in zip(t_ns, steps, strict=True)]
+        self._clocks = [Clock(int(t)) for _, t in zip(self._numbers, t_ns, strict=True)]
         self._walk.settle(light, [clock.t_ns for clock in self._clocks])
 
     def steps(self, light: Any, t_ns: Any) -> CardEvents:

@@ -16,10 +16,14 @@ def pace_of(num: Numbers) -> tuple[float, ...]:
 
 
 class Clock:
-    """The clock of a sensor that has settled at t_ns."""
+    """The clock of a sensor that has settled at t_ns.
 
-    def __init__(self, t_ns: int, step: int = 0, leak_since_ns: int | None = None, fresh_noise: bool = True):
-        self.t_ns, self.step, self.fresh_noise = t_ns, step, fresh_noise
+    Steps are counted from the microsecond on in which that is, so that their noise depends on nothing before it, and
+    no two have one number.
+    """
+
+    def __init__(self, t_ns: int, step: int | None = None, leak_since_ns: int | None = None, fresh_noise: bool = True):
+        self.t_ns, self.step, self.fresh_noise = t_ns, t_ns // 1000 if step is None else step, fresh_noise
         self.leak_since_ns = t_ns if leak_since_ns is None else leak_since_ns
 
     def __eq__(self, other: object) -> bool:

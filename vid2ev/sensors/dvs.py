@@ -156,7 +156,9 @@ class Dvs:
         """Settle in a frame of light at t_ns [int, ns], as after a cut: the light before it is forgotten.
 
         There are no events in (previous frame, this frame]; only fixed-rate mode may return some, held back from
-        before.  Noise goes on: what is drawn by count or by time is drawn on.  Raises UsageError as `step` does.
+        before.  What follows is what a new sensor of the same seed would send whose first frame this is (but for fixed
+        rate, whose event frames go on): noise is drawn by time, or by count from t_ns on.  Raises UsageError as `step`
+        does.
         """
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
@@ -165,6 +167,7 @@ class Dvs:
             self._frames.origin_us = int(t_ns) // 1000
         t_ns = self._later(t_ns, self._t_ns)
         self._settle(flat, table, t_ns)
+        self._be_at(Clock(t_ns))
         if self._delayed is not None:
             self._delayed.forget()
         released = Events.empty(self.labels)
@@ -247,6 +250,14 @@ class Dvs:
         swallowed, capped, not_finite = (int(tallies[k]) for k in (SWALLOWED, CAPPED, NOT_FINITE))
         return {"on": on, "off": off, "swallowed": swallowed, "capped": capped, "not_finite": not_finite}
 
+    def forget_counts(self) -> None:
+        """Count anew what `counts` has."""
+        self._tallies[...], self._polarities[...] = 0, 0
+
+    def simulates(self, pixel: tuple[int, int]) -> bool:
+        """Whether a pixel (x, y) is in the `part` that is simulated."""
+        return self._tiles.holds((pixel[1] * self.size[0] + pixel[0]) // BLOCK)
+
     @property
     def slept(self) -> tuple[int, int]:
         """How many times a strip of 256 pixels slept through an interval, of how many."""
@@ -277,8 +288,6 @@ class Dvs:
 
         self._sleep.forget()
         self._tiles.each_blocks(settle)
-        self._t_ns = self._leak_since_ns = t_ns
-        self._fresh_noise = True
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
 
     def _steps_to(self, t_ns: Sequence[int]) -> list[Step]:
@@ -286,9 +295,12 @@ class Dvs:
         assert self._t_ns is not None
         clock = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise)
         steps = [clock.step_to(self._later(t, clock.t_ns), self._flags, self._numbers) for t in t_ns]
+        self._be_at(clock)
+        return steps
+
+    def _be_at(self, clock: Clock) -> None:
         self._t_ns, self._step, self._leak_since_ns = clock.t_ns, clock.step, clock.leak_since_ns
         self._fresh_noise = clock.fresh_noise
-        return steps
 
     def _each(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[Events]:
         """The events of each frame of a clip."""

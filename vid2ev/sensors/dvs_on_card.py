@@ -136,8 +136,6 @@ class DvsOnCard(Dvs):
 
     def _settle(self, flat: Any, table: np.ndarray, t_ns: int) -> None:
         self._card.settle(flat, [t_ns])
-        self._t_ns = self._leak_since_ns = t_ns
-        self._fresh_noise = True
 
     def _planes_of_pixels(self) -> Any:
         return pixel_planes([self._planes], self._flags, self._bad.size)

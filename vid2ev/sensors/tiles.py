@@ -37,6 +37,10 @@ class Tiles:
         self._cuts = [first + (last - first) * k // self.count for k in range(self.count + 1)]
         self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
 
+    def holds(self, block: int) -> bool:
+        """Whether a block is among these."""
+        return self._cuts[0] <= block < self._cuts[-1]
+
     def each(self, work: Callable[[int], R]) -> list[R]:
         """[work(0), work(1), ... work(count - 1)], at the same time."""
         if self._pool is None:

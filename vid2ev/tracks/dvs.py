@@ -32,6 +32,7 @@ class DvsTrack:
 
     rate      pictures per second of the preview
     pictures  gives the frames to be kept in files of events that have room for them; None for none
+    probed    gives the lines of probe.csv, where pixels were probed before
     """
 
     def __init__(
@@ -43,13 +44,15 @@ class DvsTrack:
         within: str = "",
         rate: int = 30,
         pictures: Callable[[], Iterator[Picture]] | None = None,
+        probed: Callable[[], Iterator[bytes]] | None = None,
     ):
         self.dvs, self.folder, self.outputs = dvs, folder, outputs
         self.last_us = 0
-        self._within, self._pictures = within, pictures
+        self._within, self._pictures, self._probed = within, pictures, probed
         self._columns = EventColumns(folder, within, dvs.labels)
         self._film = Preview(dvs.size, folder.partial / within, wanted=outputs.preview, rate=rate)
-        self._probe = Probe(outputs.probe, dvs.size[0]) if outputs.probe else None
+        pixels = () if probed else tuple(filter(dvs.simulates, outputs.probe))
+        self._probe = Probe(pixels, dvs.size[0]) if pixels else None
         self._waiting: list[Frame] = []  # until there are as many as the sensor takes at a time
 
     @property
@@ -61,7 +64,7 @@ class DvsTrack:
         """The first frame; after `restore`, the last source frame before the checkpoint."""
         self._film.begin(frame)
         if not self.folder.size(f"{self._within}{FRAME_US}"):
-            self.dvs.step(frame.light, frame.t_ns)
+            self.dvs.see(frame)
             self._note(frame)
             if self._probe:
                 self.folder.write(f"{self._within}{PROBE}", HEADER)
@@ -105,6 +108,10 @@ class DvsTrack:
         self._film.join(whole / "preview.mp4")
         if self._probe:
             shutil.copyfile(self.folder.written(f"{self._within}{PROBE}"), whole / PROBE)
+        elif self._probed and self.outputs.probe:
+            with open(whole / PROBE, "wb") as file:
+                file.writelines(self._probed())
+        if (whole / PROBE).exists():
             plot(whole / PROBE, whole / "probe.png")
         if self.outputs.noise_maps:
             write_npz(whole / "noise_maps.npz", self.dvs.maps())
