@@ -145,23 +145,23 @@ def test_what_cannot_be_split_is_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_parts_with_a_warm_up_are_near_the_whole_and_say_where_their_seams_are(clip: str, tmp_path: Path) -> None:
-    options: dict[str, Any] = {"fps": 50, "upsample": "linear", "subframes": 2, "threads": 1, "preview": False}
+def test_parts_with_a_warm_up_differ_from_their_seam_to_the_next_cut_and_the_manifest_lists_seams(
+    clip: str, tmp_path: Path
+) -> None:
+    options: dict[str, Any] = {"fps": 1, "upsample": "linear", "subframes": 2, "threads": 1, "preview": False}
     whole = convert(clip, tmp_path / "whole", **options)
-    made = convert_split(clip, tmp_path / "made", "approximate", 4, here, **options)
-    seams_us = made["split"]["seams_us"]
-    assert seams_us == [60_000, 120_000, 180_000] and made["split"]["warm_up_us"] == 4100
-    for name in ("frames", "subframes"):
+    made = convert_split(clip, tmp_path / "made", "approximate", 3, here, **options)
+    assert made["split"] == {"kind": "approximate", "seams_us": [4_000_000, 8_000_000], "warm_up_us": 1_004_100}
+    for name in ("frames", "subframes", "not_finite"):
         assert made["counts"][name] == whole["counts"][name]
-    one, other = (read_events(tmp_path / name) for name in ("whole", "made"))
-    one, other = Events.concatenate(one), Events.concatenate(other)
+    one, other = (Events.concatenate(read_events(tmp_path / name)) for name in ("whole", "made"))
     assert made["counts"]["events"] == len(other) == made["counts"]["on"] + made["counts"]["off"]
-    assert len(other) == pytest.approx(len(one), rel=0.02) and np.all(np.diff(other.t) >= 0)
-    # Until the first seam, and from a cut to the next seam, the events are the same.
-    for first_us, last_us in ((0, 60_000), (100_000, 120_000)):
-        parts = [each.select((each.t > first_us) & (each.t <= last_us)) for each in (one, other)]
-        assert len(parts[0]) > 100
-        assert all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in "txyp")
+    assert np.all(np.diff(other.t) >= 0) and len(other) == pytest.approx(len(one), rel=0.02)
+    # (There are cuts at 5 and 10 s.)
+    for first_s, last_s, exact in ((0, 4, True), (5, 8, True), (8, 10, False), (10, 14, True)):
+        parts = [each.select((each.t > 10**6 * first_s) & (each.t <= 10**6 * last_s)) for each in (one, other)]
+        assert len(parts[0]) > 1000
+        assert exact == all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in "txyp")
 
 
 def test_a_chain_is_gone_on_with_from_every_checkpoint(clip: str, tmp_path: Path) -> None:

@@ -137,6 +137,16 @@ def convert(
     return manifests[""]
 
 
+def telling(tell: Callable[[Mapping[str, Any]], object]) -> Report:
+    """A `report` for `convert` that tells what a live line of tasks wants to know: events, and the share of frames."""
+
+    def report(recipe: Recipe, done: Progress) -> None:
+        total = recipe.source.frames_expected
+        tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
+
+    return report
+
+
 def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
     if str(video) == "-" or str(video).startswith("camera:"):

@@ -20,13 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.cluster.task import Task, Tell
-from vid2ev.conversion import Report, check_outputs, convert
+from vid2ev.conversion import Report, check_outputs, convert, telling
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import BLOCK
 from vid2ev.outputs import Outputs
 from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
-from vid2ev.recorder import Progress
 from vid2ev.recording.folder import begun_job, check_free
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
@@ -97,12 +96,7 @@ def begun_part(directory: Path) -> dict[str, Any]:
 
 def _part(tell: Tell, video: str, folder: Path, options: dict[str, Any]) -> None:
     """The recording of a part, as a task."""
-
-    def report(recipe: Recipe, done: Progress) -> None:
-        total = recipe.source.frames_expected
-        tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
-
-    convert(video, folder, resume=True, report=report, preview=False, **options)
+    convert(video, folder, resume=True, report=telling(tell), preview=False, **options)
 
 
 def _parts(

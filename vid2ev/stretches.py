@@ -4,10 +4,11 @@ At **cuts**, where sensors start afresh anyway, this is exact: what they send af
 
 Anywhere else a part does not know what its pixels have in them from before.  Approximately they do after a while:
 sensors are shown some of what comes before the part, and nothing is kept of that.  By then filters have forgotten where
-they began, but not the levels of each pixel: these lie elsewhere between two thresholds, and so do the times of its
-events.
+they began, and pixels that have sent events are as many as ever near their next level.  But the levels of a pixel lie
+elsewhere between two thresholds than they would, and so do the times of its events, up to the next cut or event that
+brings its memory to the signal (shot noise).
 
-    warm-up = 10 (tau of all poles) + refractory period + delay, and two frames at least
+    warm-up = 1 s + 10 (tau of all poles) + refractory period + delay, and up to a frame more
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from vid2ev.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample.cuts import CutDetector
 
-TIME_CONSTANTS, WARM_FRAMES = 10, 2
+WARM_US, TIME_CONSTANTS = 1_000_000, 10
 
 Look = Callable[[int, int | None], object]  # takes how many frames were looked at, and of how many
 
@@ -57,7 +58,7 @@ def with_warm_up(recipe: Recipe, count: int, options: dict[str, Any], look: Look
     times_ns, _ = _looked_at(recipe, look, cuts=False)
     last, warm_ns = len(times_ns) - 1, 1000 * warm_up_us(recipe)
     seams = sorted({last * k // count for k in range(1, count)} - {0})
-    begun = [max(min(bisect(times_ns, times_ns[seam] - warm_ns) - 1, seam - WARM_FRAMES), 0) for seam in seams]
+    begun = [max(bisect(times_ns, times_ns[seam] - warm_ns) - 1, 0) for seam in seams]
     starts = [_ends(times_ns, [first - 1], options)[0] if first else options.get("start") for first in begun]
     stops = [*_ends(times_ns, seams, options), options.get("stop")]
     since = [None, *(times_ns[seam] for seam in seams)]
@@ -67,7 +68,9 @@ def with_warm_up(recipe: Recipe, count: int, options: dict[str, Any], look: Look
 def warm_up_us(recipe: Recipe) -> int:
     """How long sensors are shown what comes before a part [us], but for whole frames."""
     specs = [mount.sensor.spec for mount in recipe.mounts if isinstance(mount.sensor.spec, DvsSpec)]
-    return max(round(TIME_CONSTANTS * _slowest_us(spec) + spec.refractory_us + spec.delay_us) for spec in specs)
+    return WARM_US + max(
+        round(TIME_CONSTANTS * _slowest_us(spec) + spec.refractory_us + spec.delay_us) for spec in specs
+    )
 
 
 def _slowest_us(spec: DvsSpec) -> float:

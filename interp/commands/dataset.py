@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vid2ev.commands.worker_options import worker_options
+
+if TYPE_CHECKING:
+    from vid2ev.cluster.work import Outcome
+    from vid2ev.commands.live import Said
 
 SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 
@@ -60,7 +65,8 @@ def dataset(
 
     from interp.data.dataset import write_dataset
     from interp.data.dataset_spec import DatasetSpec
-    from vid2ev.commands.batch import sources_in
+    from vid2ev.commands.batch import sources_in, table
+    from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import counting
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.errors import UsageError
@@ -72,14 +78,27 @@ def dataset(
         spec = DatasetSpec(videos=found, size=_size(size), **options)
     except ValidationError as error:
         raise UsageError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
-    with counting(quiet or as_json, SCENES) as report:
-        facts = write_dataset(directory, spec, resume=resume, workers=workers, report=report)
+    quiet |= as_json
+    share = partial(shared_out, noun="scenes", quiet=quiet, said=_said)
+    with counting(quiet, SCENES) as report:
+        facts = write_dataset(directory, spec, resume=resume, workers=workers, share=share, report=report)
     if as_json:
         click.echo(json.dumps(facts, indent=2))
     elif not quiet:
+        done = [{"video": name, "state": "done", "events": of["events"]} for name, of in facts["of_scenes"].items()]
+        left = [{"video": name, "state": "failed", "error": why} for name, why in facts["left_out"].items()]
+        click.echo(table([*done, *left]))
         click.echo(f"{directory}: {facts['scenes']} scenes, {facts['samples']:,} samples, {facts['events']:,} events")
-        for name, reason in facts["left_out"].items():
-            click.echo(f"left out: {name}: {reason}", err=True)
+
+
+def _said(outcome: Outcome) -> Said:
+    """What is said of a scene that is made or left out."""
+    from vid2ev.commands.live import Said, said_of
+
+    made = outcome.value
+    if outcome.error or made.failed:
+        return Said(f"{outcome.name}: left out: {made.failed}", failed=True) if made else said_of(outcome)
+    return Said(f"{outcome.name}: {made.facts['events']:,} events", made.facts["events"])
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,7 @@ def evaluate(
     from interp.evaluate.run import evaluate as evaluated
     from interp.evaluate.simulated import Simulated
     from interp.methods import METHODS
+    from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import counting, heard
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.sources import OPTIONS
@@ -118,6 +120,7 @@ def evaluate(
             simulated=Simulated.of(sensor, overrides, seed, **edits),
             report=report,
             workers=workers,
+            share=partial(shared_out, noun="sequences", quiet=quiet or as_json),
             **options,
         )
     if as_json:

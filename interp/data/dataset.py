@@ -25,8 +25,9 @@ from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster.task import Task, Tell
-from vid2ev.cluster.work import WorkerLost, outcomes
+from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
+from vid2ev.conversion import telling
 from vid2ev.recording.disk import lock, sync, whole_file, writing
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
@@ -49,11 +50,14 @@ def write_dataset(
     *,
     resume: bool = False,
     workers: Workers = ALONE,
+    share: Share = outcomes,
     report: Report | None = None,
 ) -> dict[str, Any]:
     """Make a data set; returns its facts, which dataset.json and the data card have.
 
     workers  who make a scene each; they change nothing but the time it takes
+    share    shares scenes out among several workers
+    report   told how far it is where they are not shared out
     resume   go on where an interrupted run was; a finished data set is left as it is
     Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, no
     scene can be made, or the workers of one died.
@@ -70,7 +74,7 @@ def write_dataset(
         handle = lock(made_in)
         try:
             _begin(made_in / "job.json", job, directory)
-            made = sorted(_all(scenes, made_in, spec, workers, report))
+            made = sorted(_all(scenes, made_in, spec, workers, share, report))
             facts = _facts(job, spec, made)
             _publish(made_in, directory, facts)
         finally:
@@ -79,7 +83,7 @@ def write_dataset(
 
 
 def _all(
-    scenes: list[Scene], folder: Path, spec: DatasetSpec, workers: Workers, report: Report | None
+    scenes: list[Scene], folder: Path, spec: DatasetSpec, workers: Workers, share: Share, report: Report | None
 ) -> Iterator[Made]:
     """All recordings, in whatever order they come."""
     make = partial(make_scene, folder=folder, layout=spec.layout, multiple=spec.multiple)
@@ -87,18 +91,18 @@ def _all(
         coming: Iterator[Made] = map(make, scenes)
         yield from _told(coming, len(scenes), report)
     elif workers.scheduler or has_dask():
-        yield from _told(_shared_out(scenes, make, workers), len(scenes), report)
+        yield from _shared_out(scenes, make, workers, share)
     else:
         with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as processes:
             futures = [processes.submit(make, scene) for scene in scenes]
             yield from _told((future.result() for future in as_completed(futures)), len(scenes), report)
 
 
-def _shared_out(scenes: list[Scene], make: Callable[[Scene], Made], workers: Workers) -> Iterator[Made]:
+def _shared_out(scenes: list[Scene], make: Callable[[Scene], Made], workers: Workers, share: Share) -> Iterator[Made]:
     """All recordings, by workers.  What is left out is so because of itself, not of them: raises WorkerLost at the end
     if one was lost."""
     lost: Exception | None = None
-    for outcome in outcomes([Task(scene.name, partial(_as_task, make, scene)) for scene in scenes], workers):
+    for outcome in share([Task(scene.name, partial(_as_task, make, scene)) for scene in scenes], workers):
         if outcome.error and not isinstance(outcome.error, WorkerLost):
             raise outcome.error
         lost = lost or outcome.error
@@ -108,8 +112,8 @@ def _shared_out(scenes: list[Scene], make: Callable[[Scene], Made], workers: Wor
         raise WorkerLost(f"{lost}; the other scenes are kept, the same command with --resume goes on")
 
 
-def _as_task(make: Callable[[Scene], Made], scene: Scene, _: Tell) -> Made:
-    return make(scene)
+def _as_task(make: Callable[..., Made], scene: Scene, tell: Tell) -> Made:
+    return make(scene, tell=tell)
 
 
 def _told(coming: Iterator[Made], count: int, report: Report | None) -> Iterator[Made]:
@@ -119,14 +123,16 @@ def _told(coming: Iterator[Made], count: int, report: Report | None) -> Iterator
         yield made
 
 
-def make_scene(scene: Scene, folder: Path, layout: str, multiple: int) -> Made:
+def make_scene(scene: Scene, folder: Path, layout: str, multiple: int, tell: Tell | None = None) -> Made:
     """One recording in a folder, if it is not there yet."""
     target = folder / scene.name
     source = target if layout == "own" else folder / "parts" / scene.name
     try:
         if not target.exists():
             source.parent.mkdir(exist_ok=True)
-            convert(scene.video, source, pictures="png", preview=False, resume=True, threads=1, **scene.options)
+            report = telling(tell) if tell else None
+            fixed: dict[str, Any] = {"pictures": "png", "preview": False, "resume": True, "threads": 1}
+            convert(scene.video, source, report=report, **fixed, **scene.options)
             if layout != "own":
                 from interp.data.layouts.writing import write_sequence
 

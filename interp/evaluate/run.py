@@ -32,7 +32,7 @@ from interp.evaluate.summary import summarised
 from interp.evaluate.worst import WorstPictures, prune
 from interp.methods import METHODS
 from vid2ev.cluster.task import Task, Tell
-from vid2ev.cluster.work import outcomes
+from vid2ev.cluster.work import Share, outcomes
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
@@ -66,6 +66,7 @@ def evaluate(
     report: Report | None = None,
     figures: bool = False,
     workers: Workers = ALONE,
+    share: Share = outcomes,
 ) -> Evaluation:
     """Score methods on data sets, into a folder.
 
@@ -77,7 +78,9 @@ def evaluate(
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
     figures       films and sheets of the first gaps, too (`figures/of_evaluation.py`)
+    report        told how far it is where sequences are not shared out
     workers       who score a sequence each; they change nothing but the time it takes
+    share         shares sequences out among several workers
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
@@ -94,7 +97,7 @@ def evaluate(
     with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:
         frames = len(protocol.positions)
         if not workers.alone:
-            _share_out(found.footage, methods, frames, kept, workers, report)
+            _share_out(found.footage, methods, frames, kept, workers, share)
             report = None
         rows, about = _scored(found.footage, methods, frames, kept, report)
         if not rows:
@@ -127,29 +130,22 @@ def _share_out(
     frames: int,
     kept: Kept,
     workers: Workers,
-    report: Report | None,
+    share: Share,
 ) -> None:
     """Have workers score the sequences that are not done, each by itself.  Raises what one of them ends with, when the
     others are done."""
     names = {method.name for method in methods}
     left = [each for each in footage if names - set((kept.about(each.name) or {"missing": {}})["missing"])]
-    done, total = dict[str, int](), sum(each.expected for each in left)
     rows = KeptRows(kept.folder)
-
-    def watch(name: str, facts: Mapping[str, Any]) -> None:
-        if report and "groups" in facts:
-            done[name] = facts["groups"]
-            report(min(sum(done.values()), total), total, name)
-
     tasks = [Task(each.name, partial(_score_sequence, each, methods, frames, rows)) for each in left]
-    errors = [outcome.error for outcome in outcomes(tasks, workers, watch) if outcome.error]
+    errors = [outcome.error for outcome in share(tasks, workers) if outcome.error]
     if errors:
         raise errors[0]
 
 
 def _score_sequence(each: Footage, methods: Sequence[Rebuilder], frames: int, kept: KeptRows, tell: Tell) -> None:
     """Score a sequence, as a task."""
-    _scored([each], methods, frames, kept, lambda done, *_: tell({"groups": done}))
+    _scored([each], methods, frames, kept, lambda done, count, _: tell({"share": done / count}))
 
 
 def _scored(

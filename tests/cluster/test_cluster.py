@@ -63,6 +63,20 @@ def test_a_worker_that_is_killed_costs_no_task_its_result(tmp_path: Path, monkey
     assert Path("killed/events.h5").read_bytes() == Path("whole/events.h5").read_bytes()
 
 
+def test_a_chain_goes_on_through_the_death_of_a_worker_to_the_bytes_of_one_task(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    clip = "synthetic:moving-edge,size=32x24,fps=100,duration_s=0.06"
+    found = all_of(
+        [Task("clip", partial(made.converts_in_links, clip=clip, directory=Path("linked"), options=QUICK))],
+        Workers(jobs=1, retries=1),  # (fewer than there are links, each of which begins a task)
+    )
+    convert(clip, "whole", **QUICK)
+    assert found["clip"].error is None and found["clip"].value > 4
+    assert Path("linked/events.h5").read_bytes() == Path("whole/events.h5").read_bytes()
+
+
 def test_a_result_that_dies_with_its_worker_is_made_again() -> None:
     coming = outcomes([Task("first", made.gives_its_process), Task("second", made.gives_its_process)], Workers(jobs=1))
     first = next(coming)

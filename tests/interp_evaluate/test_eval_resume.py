@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from interp.evaluate.run import evaluate
 from interp.networks import make
 from interp.weights import save
 from vid2ev import DataError, UsageError
+from vid2ev.cluster.task import Task
+from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 
 BASELINES = ("linear", "bridge")
@@ -76,12 +79,13 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
 
 
 def test_workers_change_no_byte(data: Path, whole: dict[str, bytes], tmp_path: Path) -> None:
-    told: list[int] = []
-    two = Workers(jobs=2, retries=0)
-    evaluate(
-        datasets(data), tmp_path / "report", workers=two, report=lambda done, *_: told.append(done), **options(data)
-    )
-    assert contents(tmp_path / "report") == whole and told == sorted(told)
+    shares: list[float] = []
+
+    def share(tasks: Sequence[Task], workers: Workers) -> Iterator[Outcome]:
+        return outcomes(tasks, workers, lambda _, facts: shares.append(facts.get("share", 0.0)))
+
+    evaluate(datasets(data), tmp_path / "report", workers=Workers(jobs=2, retries=0), share=share, **options(data))
+    assert contents(tmp_path / "report") == whole and shares and all(0 <= share <= 1 for share in shares)
 
 
 def test_a_finished_evaluation_is_left_as_it_is(

@@ -34,6 +34,9 @@ class Outcome(NamedTuple):
     error: Exception | None = None
 
 
+Share = Callable[[Sequence[Task], Workers], Iterator[Outcome]]  # `outcomes`, or the same with something to see
+
+
 @dataclass
 class _Lives:
     """The processes that each task was begun in."""

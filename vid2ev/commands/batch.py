@@ -13,6 +13,7 @@ import click
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
 if TYPE_CHECKING:
+    from vid2ev.cluster.work import Outcome
     from vid2ev.cluster.workers import Workers
 
 CLIPS = {
@@ -91,7 +92,7 @@ def convert_shared(
     check    raises at once, here, for what need not be tried
     """
     from vid2ev.cluster.task import Task
-    from vid2ev.commands.live import shared_out
+    from vid2ev.commands.live import Said, shared_out
 
     results, tasks = dict[str, dict[str, Any]](), list[Task]()
     for video, directory in directories.items():
@@ -102,17 +103,19 @@ def convert_shared(
             click.echo(f"error: {error}", err=True)
         else:
             tasks.append(Task(video, partial(convert, video=video, directory=directory)))
-    with shared_out(tasks, workers, "clips", quiet) as (outcomes, live):
-        for name, made, wrong in outcomes:
-            results[name] = result = _done(made) if wrong is None else _failed(wrong)
-            events = result.get("events")
-            if wrong and not isinstance(wrong, Vid2evError):
-                traceback.print_exception(wrong)
-            if live:
-                said = "error: " * bool(wrong) + _told(result)
-                live.end(name, bool(wrong), events, f"{name} -> {directories[name]}: {said}")
-            elif wrong:
-                click.echo(f"error: {wrong}", err=True)
+
+    def said(outcome: Outcome) -> Said:
+        result = _result(outcome)
+        failed = outcome.error is not None
+        told = "error: " * failed + _told(result)
+        return Said(f"{outcome.name} -> {directories[outcome.name]}: {told}", result.get("events"), failed)
+
+    for outcome in shared_out(tasks, workers, "clips", quiet, said):
+        results[outcome.name] = _result(outcome)
+        if outcome.error and not isinstance(outcome.error, Vid2evError):
+            traceback.print_exception(outcome.error)
+        if outcome.error and quiet:
+            click.echo(f"error: {outcome.error}", err=True)
     return [{"video": video, "directory": str(directories[video])} | results[video] for video in directories]
 
 
@@ -131,6 +134,10 @@ def table(results: list[dict[str, Any]]) -> str:
         lines.append(f"{result['state']:<7} {result['video']:<{width}}  {_told(result)}".rstrip())
     lines.append(f"{len(results) - failed} of {len(results)} {verb}" + f", {failed} failed" * (failed > 0))
     return "\n".join(lines)
+
+
+def _result(outcome: Outcome) -> dict[str, Any]:
+    return _failed(outcome.error) if outcome.error else _done(outcome.value)
 
 
 def _done(made: dict[str, Any]) -> dict[str, Any]:

@@ -18,8 +18,6 @@ from vid2ev.errors import UsageError
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import GoOn, Tell
-    from vid2ev.recipe import Recipe
-    from vid2ev.recorder import Progress
 
 
 class Auto(click.ParamType):
@@ -301,13 +299,9 @@ def _on_worker(
     from vid2ev.cluster.task import GoOn
 
     chosen, until_s = _chosen(video, directory, True, dict(options), named), time.monotonic() + link_s
-
-    def report(recipe: Recipe, done: Progress) -> None:
-        total = recipe.source.frames_expected
-        tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
-
+    chosen |= {"report": conversion.telling(tell), "pause": lambda: time.monotonic() > until_s}
     try:
-        return conversion.convert(video, directory, report=report, pause=lambda: time.monotonic() > until_s, **chosen)
+        return conversion.convert(video, directory, **chosen)
     except conversion.Paused:
         options = options | {"resume": True}
         return GoOn(partial(_on_worker, video=video, directory=directory, options=options, named=named, link_s=link_s))

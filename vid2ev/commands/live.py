@@ -5,10 +5,9 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -96,11 +95,28 @@ class Live:
             self._bar.refresh()
 
 
-@contextmanager
+class Said(NamedTuple):
+    """What is said of a task that is over."""
+
+    text: str
+    events: int | None = None
+    failed: bool = False
+
+
+def said_of(outcome: Outcome) -> Said:
+    """That it is done, or why it is not."""
+    error = outcome.error
+    return Said(f"{outcome.name}: error: {error}", failed=True) if error else Said(f"{outcome.name}: done")
+
+
 def shared_out(
-    tasks: Sequence[Task], workers: Workers, noun: str, quiet: bool
-) -> Iterator[tuple[Iterator[Outcome], Live | None]]:
-    """The outcomes of tasks, in whatever order they come, and the live line; None if `quiet`.
+    tasks: Sequence[Task],
+    workers: Workers,
+    noun: str,
+    quiet: bool,
+    said: Callable[[Outcome], Said] = said_of,
+) -> Iterator[Outcome]:
+    """The outcomes of tasks, in whatever order they come, with a live line and what is `said` of each unless `quiet`.
 
     Ctrl-C ends the program, and says that it can be resumed.
     """
@@ -108,7 +124,11 @@ def shared_out(
 
     live = None if quiet else Live(len(tasks), noun, quiet)
     try:
-        yield outcomes(tasks, workers, live.watch if live else None), live
+        for outcome in outcomes(tasks, workers, live.watch if live else None):
+            if live:
+                text, events, failed = said(outcome)
+                live.end(outcome.name, failed, events, text)
+            yield outcome
     except KeyboardInterrupt:
         click.echo("interrupted; what is done is kept, the same command with --resume goes on", err=True)
         sys.exit(INTERRUPTED)

@@ -112,16 +112,23 @@ def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[...
     """A progress bar on a terminal; what this yields is told how many are done, of how many, and perhaps a name."""
     from tqdm import tqdm
 
-    with tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, **look) as shown:
+    shown: tqdm | None = None
 
-        def report(done: int, count: int | None, name: str = "") -> None:
-            shown.total = count
-            shown.set_postfix_str(name, refresh=False)
-            shown.update(done - shown.n)
-            if name:
-                shown.refresh()
+    def report(done: int, count: int | None, name: str = "") -> None:
+        nonlocal shown
+        if shown is None:
+            shown = tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, **look)
+        shown.total = count
+        shown.set_postfix_str(name, refresh=False)
+        shown.update(done - shown.n)
+        if name:
+            shown.refresh()
 
+    try:
         yield report
+    finally:
+        if shown is not None:
+            shown.close()
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -52,16 +53,13 @@ def split_among(
     from vid2ev.split import convert_split
 
     def share_out(tasks: Sequence[Task]) -> None:
-        error: Exception | None = None
-        with shared_out(tasks, workers, "parts", quiet) as (outcomes, live):
-            for outcome in outcomes:
-                error = error or outcome.error
-                if live:
-                    live.end(outcome.name, bool(outcome.error), None, f"{outcome.name}: {outcome.error or 'done'}")
-        if error:
-            raise error
+        looking.close()
+        errors = [outcome.error for outcome in shared_out(tasks, workers, "parts", quiet) if outcome.error]
+        if errors:
+            raise errors[0]
 
-    with heard() as check, counting(quiet, LOOKS) as look, bar(quiet, check) as report:
+    with heard() as check, ExitStack() as looking, bar(quiet, check) as report:
+        look = looking.enter_context(counting(quiet, LOOKS))
         return convert_split(
             video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
         )
