@@ -54,6 +54,7 @@ FLOORS = {
     "tracks": 9,
     "instants": 10,
     "parts": 10,
+    "stretches": 10,
     "recipe": 9,
     "reformat": 9,
     "recorder": 11,
