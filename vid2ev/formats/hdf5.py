@@ -112,8 +112,10 @@ def write_events(path: Path, recording: Recording) -> None:
             raise ValueError(f"{start} events, {recording.count} announced")
         _index(index, indexed, len(index), np.empty(0, np.int64), start)
         if frames is not None:
-            _dataset(file, "frames/t", len(frames.counts), np.int64)[...] = frames.frame_us
-            _dataset(file, "frames/to_idx", len(frames.counts), np.uint64)[...] = frames.counts
+            for name, values, dtype in (("t", frames.frame_us, np.int64), ("to_idx", frames.counts, np.uint64)):
+                dataset = _dataset(file, f"frames/{name}", len(values), dtype)
+                dataset[...] = values
+                dataset.flush()  # (now, and not when nobody holds it any more: its place in the file goes by that)
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:
