@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,16 @@ import pytest
 from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
-from vid2ev.gui.light import LightTable, smaller
+from vid2ev.gui.light import Light, LightTable, smaller
 from vid2ev.gui.preview import VIEWS, Previewer, Request
+from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
+from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
+from vid2ev.instants import Instant
+from vid2ev.sensors.compiled import flags_of
+from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.presets import DVS, load
 from vid2ev.stream.events import Events
 
 SMALL = "scene:spinning-shapes,size=64x48"
@@ -36,23 +43,69 @@ def test_light_is_made_again_only_where_something_changed_that_decides_it(setup:
     light = table.light(setup, 0.5, 0.01)
     other = table.light(setup.with_sensor_values(0, {"threshold_on": 0.4}), 0.5, 0.01)
     assert other.instants is light.instants and other.recipe.mounts[0].sensor.spec.threshold_on == 0.4
-    assert table.light(setup, 0.6, 0.01).instants is not light.instants
-    turned = setup.with_camera_values(0, {"rotation_deg": (0.0, 5.0, 0.0)})
-    assert not np.array_equal(
-        table.light(turned, 0.6, 0.01).instants[0].frames[0].light, light.instants[0].frames[0].light
-    )
+    later = table.light(setup, 0.504, 0.01)
+    assert later.instants is not light.instants
+    assert later.instants[later.lead].frames[1].light is at(light, later.instants[later.lead].t_ns).frames[1].light
+    turned = table.light(setup.with_camera_values(0, {"rotation_deg": (0.0, 5.0, 0.0)}), 0.504, 0.01).instants[0]
+    assert not np.array_equal(turned.frames[0].light, later.instants[0].frames[0].light)
+    assert turned.frames[1].light is later.instants[0].frames[1].light
+
+
+def at(light: Light, t_ns: int) -> Instant:
+    return next(instant for instant in light.instants if instant.t_ns == t_ns)
+
+
+def test_what_takes_long_is_rough_first_and_then_all_of_it(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vid2ev.gui.scene_light.ROUGH_S", 0.0)
+    rough, fine = Previewer().answers(Request(setup, 0.5, 0.01))
+    assert (rough.whole, fine.whole) == (False, True) and rough.span_s == fine.span_s
+    assert [*Previewer().answers(Request(setup, 0.5, 0.01))][-1].cameras[0].picture == fine.cameras[0].picture
+    assert ticks_of(0.5, 0.53, 100)[:4] == [50, 53, 52, 51] and ticks_of(0.5, 0.53, 100)[4:] == [48]
+    assert [grid_hz(asked, 0.03) for asked in (1.0, 250.0, 1e5)] == [64, 256, 2048]
+    for count in (1, 2, 3, 17):
+        assert sorted(coarse_first(count)) == [*range(count)] and set(coarse_first(count)[:2]) == {0, count - 1}
+
+
+def test_what_stands_in_needs_no_kernel_of_its_own() -> None:
+    ready = frozenset(flags_of(spec, False) for spec in usual())
+    for name in DVS.names():
+        spec: Any = load(DVS, name)
+        for changes in ({}, {"leak_rate_hz": 2.0}, {"hot_probability": 0.1, "hot_rate_hz": 9.0}, {"mismatch": 0.0},
+                        {"shading": (0.1,), "refractory_us": 50.0}, {"threshold_on": 0.7}):  # fmt: skip
+            other = spec.model_copy(update=changes)
+            chosen = Kernels().choose(other, ready)
+            assert flags_of(chosen, False) in ready
+            assert {key for key, value in other if getattr(chosen, key) != value} <= {*SLIGHT, *LEAK}
+            assert Kernels().choose(other, frozenset()) == other
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ideal", "paper", "davis346"])
+def test_a_sensor_that_stands_in_for_another_sends_what_that_sends(name: str) -> None:
+    steps = np.random.default_rng(0).normal(size=(12, 48, 64)).cumsum(axis=0)
+    spec: Any = load(DVS, name)
+    counts = [
+        len(Events.concatenate([dvs.step(np.exp(0.2 * step).astype(np.float32), k * 10**7) for k, step in
+                                enumerate(steps)]))
+        for dvs in (Dvs(one, (64, 48)) for one in (spec, *stand_ins(spec)))
+    ]  # fmt: skip
+    assert min(counts) > 1000 and max(counts) - min(counts) <= 2
 
 
 def test_a_preview_shows_the_events_that_the_sensor_sends(previewer: Previewer, setup: Setup) -> None:
     answer = previewer.answer(Request(setup, 0.5, 0.01, pixel=(0, 30, 20)))
-    light = previewer._light(Request(setup, 0.5, 0.01))
+    light = previewer.light(Request(setup, 0.5, 0.01))
     mount = light.recipe.mounts[0]
-    events = Events.concatenate(list(mount.dvs().run(instant.frames[0] for instant in light.instants)))
+    sent = [*mount.dvs().run(instant.frames[0] for instant in light.instants)]
+    events = Events.concatenate(sent[light.lead + 1 :])
+    assert light.instants[light.lead].t_ns <= 5e8 < light.instants[light.lead + 1].t_ns
+    assert light.instants[0].t_ns < 4.9e8
     shown = answer.cameras[0]
     assert shown.statistics is not None and shown.statistics.events == len(events) > 100
     assert shown.size == (64, 48) and answer.duration_s == 2.0 and answer.notes == ()
     assert answer.course is not None
     assert answer.course.events.t.tolist() == events.t[(events.x == 30) & (events.y == 20)].tolist()
+    assert answer.course.t_ns[0] == light.instants[light.lead].t_ns
     assert np.all(answer.course.level_on - answer.course.level_off == pytest.approx(0.3))
     assert len(course_chart(answer.course)["series"]) == 7
     assert statistics_rows({"dvs": shown.statistics})[3] == ["events", f"{len(events):,}"]

@@ -1,40 +1,36 @@
 """The light of a short part of a setup's source, as each of its cameras sees it, small enough to be looked at at once.
 
-A preview begins at an instant and takes as long as the slowest exposure asks for.  Cameras and source have at most
-`side` pixels along a side.  Of a scene the reference camera is made smaller, and it is rendered at even intervals, as
-densely as motion asks for there (`scenes.instants.rate_hz`), `MOST` times at most; of a video, what lies between its
-frames is made as for a conversion.  The light is kept as long as nothing changes that decides it.
+A preview begins at an instant and takes as long as the slowest exposure asks for; what comes just before it is seen by
+its sensors, so that they remember something, but not shown.  Cameras and source have at most `side` pixels each way.
+Of a scene the reference camera is made smaller, and it is rendered at even intervals (`gui.scene_light`); of a video,
+what lies between its frames is made as for a conversion.  The light is kept as long as nothing changes that decides it.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from vid2ev.errors import UsageError
+from vid2ev.gui.scene_light import Film, finer_than, grid_hz, ticks_of
 from vid2ev.gui.setup import Setup
 from vid2ev.instants import Instant, instants
 from vid2ev.mounts import Loaded, Mount, mounts_of
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import ResolvedRig, Rig
-from vid2ev.scenes.instants import rate_hz
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sources import open_source
-from vid2ev.sources.cut import Cut
 from vid2ev.sources.source import Source
 
 SIDE = 346  # px
-MOST = 48  # pictures of a scene
 LONGEST_S = 0.25
 MARGIN = 1.02
-SHARE = 0.25  # of an interval: less than that does not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +38,19 @@ class Light:
     """What the cameras see.
 
     recipe     of the preview: its mounts are the cameras, made smaller
-    instants   the first at the beginning
+    instants   those of the run-in first
+    lead       how many these are: the part that is shown begins at instants[lead]
+    whole      whether these are all, or some of them, soon to be followed by the others
     sizes      of the cameras as they are converted [px]
     notes      what a person should know of it, one sentence each
     """
 
     recipe: Recipe
     instants: tuple[Instant, ...]
+    lead: int
     sizes: tuple[tuple[int, int], ...]
     notes: tuple[str, ...]
+    whole: bool = True
 
     def with_sensors(self, setup: Setup) -> Light:
         """The same light before the sensors of another setup."""
@@ -64,34 +64,60 @@ class LightTable:
 
     def __init__(self, check: Callable[[], None] = lambda: None):
         self._check = check
+        self._film = Film(check)
         self._key: Any = None
         self._light: Light | None = None
 
     def light(self, setup: Setup, start_s: float, length_s: float, side: int = SIDE) -> Light:
         """From an instant [s] on, on the recording's clock, at least so long.  Raises UsageError, DataError."""
+        *_, light = self.lights(setup, start_s, length_s, side)
+        return light
+
+    def lights(self, setup: Setup, start_s: float, length_s: float, side: int = SIDE) -> Iterator[Light]:
+        """The same; before it, where it takes long, some of its instants."""
         length_s = _lasting(setup, length_s)
         key: Any = (_without_sensors(setup), tuple(each.colour for each in sensors_of(setup)), start_s, length_s, side)
         if not setup.is_scene:
             key = (*key, _threshold(setup))  # (by which light between frames is made)
         if self._light is None or key != self._key:
-            self._light = self._made(setup, start_s, length_s, side)
-            self._key = key
-        return self._light.with_sensors(setup)
+            made = self._of_scene if setup.is_scene else self._of_video
+            for light in made(setup, start_s, length_s, side):
+                if not light.whole:
+                    yield light
+            self._light, self._key = light, key
+        yield self._light.with_sensors(setup)
 
-    def _made(self, setup: Setup, start_s: float, length_s: float, side: int) -> Light:
-        make = _of_scene if setup.is_scene else _of_video
-        recipe, sizes, notes = make(setup, start_s, length_s, side)
+    def _of_scene(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
+        scene, sensors = setup.settled(), sensors_of(setup)
+        world = _world(scene, side)
+        whole = setup.rig.resolved(scene.camera.size, scene.camera.intrinsics)
+        rig = _smaller_rig(whole, world.intrinsics, side)
+        begin_s = min(max(start_s, 0.0), max(scene.scene.duration_s - length_s, 0.0))
+        end_s = min(begin_s + length_s, scene.scene.duration_s)
+        asked = self._film.rate_hz(world, begin_s, end_s, finer_than(world, rig))
+        fps = grid_hz(asked, end_s - begin_s)
+        mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
+        notes = _notes(mounts, _sizes(whole))
+        if asked > 1.5 * fps:
+            notes.append(f"the scene is rendered {fps} times a second here, where motion and light ask for {asked:.0f}")
+        colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
+        source: Any = SceneSource(world, "scene", fps=fps, colour=colour)
+        recipe = Recipe("scene", source, rig, mounts, upsample="none")
+        ticks = ticks_of(begin_s, end_s, fps)
+        for part in self._film.parts(world, mounts, ticks, fps):
+            lead = _lead(part, begin_s)
+            yield Light(recipe, part, lead, tuple(_sizes(whole)), tuple(notes), len(part) == len(ticks))
+
+    def _of_video(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
+        recipe, sizes, begin_s = _part_of_video(setup, start_s, length_s, side)
         seen = []
         with closing(instants(recipe)) as coming:
             for instant in coming:
                 self._check()
                 seen.append(instant)
-        for size in dict.fromkeys(sizes):
-            these = [mount for mount, own in zip(recipe.mounts, sizes, strict=True) if own == size != mount.size]
-            if these:
-                names, (width, height) = ", ".join(mount.name for mount in these), these[0].size
-                notes.append(f"{names} shown with {width}x{height} of {size[0]}x{size[1]} pixels")
-        return Light(recipe, tuple(seen), tuple(sizes), tuple(notes))
+                if 1e-9 * instant.t_ns >= begin_s + length_s:
+                    break
+        yield Light(recipe, tuple(seen), _lead(seen, begin_s), tuple(sizes), tuple(_notes(recipe.mounts, sizes)))
 
 
 def duration_s(setup: Setup) -> float | None:
@@ -120,50 +146,46 @@ def _lasting(setup: Setup, length_s: float) -> float:
     return min(length_s, LONGEST_S)
 
 
-def _of_scene(
+def _part_of_video(
     setup: Setup, start_s: float, length_s: float, side: int
-) -> tuple[Recipe, list[tuple[int, int]], list[str]]:
-    scene, sensors, notes = setup.settled(), sensors_of(setup), list[str]()
-    world = _world(scene, side)
-    whole = setup.rig.resolved(scene.camera.size, scene.camera.intrinsics)
-    rig = _smaller_rig(whole, world.intrinsics, side)
-    begin_s = min(max(start_s, 0.0), max(scene.scene.duration_s - length_s, 0.0))
-    end_s = min(begin_s + length_s, scene.scene.duration_s)
-    finer = max(view.intrinsics.focal_px[0] for view in rig.viewpoints) / world.intrinsics.focal_px[0]
-    asked = max(rate_hz(world, round(1e9 * t_s), max(finer, 1.0)) for t_s in (begin_s, (begin_s + end_s) / 2, end_s))
-    fps = min(max(asked, 2 / (end_s - begin_s)), MOST / (end_s - begin_s))
-    if asked > fps * 1.01:
-        notes.append(f"the scene is rendered {fps:.0f} times a second here, where motion and light ask for {asked:.0f}")
-    colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
-    first, last = math.floor(begin_s * fps + SHARE), math.ceil(end_s * fps - SHARE)  # (instants are k / fps)
-    whole_scene = SceneSource(world, "scene", fps=fps, colour=colour)
-    source: Any = Cut(whole_scene, max(first - SHARE, 0) / fps, (last + SHARE) / fps)
-    mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
-    return Recipe("scene", source, rig, mounts, upsample="none"), _sizes(whole), notes
-
-
-def _of_video(
-    setup: Setup, start_s: float, length_s: float, side: int
-) -> tuple[Recipe, list[tuple[int, int]], list[str]]:
+) -> tuple[Recipe, list[tuple[int, int]], float]:
+    """What a part is made by, the sizes of its cameras, and where it begins on the recording's own clock [s]; before it
+    there is an interval at least."""
     source, options = _opened(setup), dict(setup.options)
     slower = float(options.get("slowdown") or 1)
     interval_s = _interval_s(source)
     lasting_s = source.duration_expected_s or length_s
     whole = setup.rig.resolved(source.size)
     rig = _smaller_rig(whole, whole.source.scaled_to(smaller(source.size, side)), side).settled()
-    begin_s = min(start_s, max(lasting_s - length_s, 0.0))
-    cut = options.get("start") or 0.0
+    origin_s = _origin_s(setup.source, _opening(setup))
+    begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))
+    latest_s = slower * (begin_s + length_s + 1.5 * interval_s)
     width, height = smaller(source.size, side)
     stretched = "" if "size" in options and not str(options["size"]).endswith("!") else "!"
     options |= {
-        "start": cut + slower * max(begin_s - interval_s, 0.0),
-        "stop": cut + slower * (begin_s + max(length_s, 1.5 * interval_s)),
+        "start": slower * max(begin_s - 1.5 * interval_s, origin_s),
+        "stop": min(latest_s, options.get("stop") or latest_s),
         "size": f"{width}x{height}{stretched}",
     }
     if source.size == (width, height) and "size" not in setup.options:
         options.pop("size")
     recipe = Recipe.of(setup.source, rig=rig, **options)
-    return replace(recipe, mounts=_with_sensors(recipe.mounts, setup)), _sizes(whole), []
+    return replace(recipe, mounts=_with_sensors(recipe.mounts, setup)), _sizes(whole), begin_s
+
+
+def _lead(seen: Sequence[Instant], begin_s: float) -> int:
+    """The number of the last instant that is not after the beginning."""
+    return max((k for k, instant in enumerate(seen) if 1e-9 * instant.t_ns <= begin_s + 1e-6), default=0)
+
+
+def _notes(mounts: Sequence[Mount], sizes: Sequence[tuple[int, int]]) -> list[str]:
+    notes = []
+    for size in dict.fromkeys(sizes):
+        these = [mount for mount, own in zip(mounts, sizes, strict=True) if own == size != mount.size]
+        if these:
+            names, (width, height) = ", ".join(mount.name for mount in these), these[0].size
+            notes.append(f"{names} shown with {width}x{height} of {size[0]}x{size[1]} pixels")
+    return notes
 
 
 def _with_sensors(mounts: tuple[Mount, ...], setup: Setup) -> tuple[Mount, ...]:
@@ -206,17 +228,26 @@ def _without_sensors(setup: Setup) -> Any:
 
 
 def _opened(setup: Setup) -> Source:
-    known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
-    options = tuple((name, setup.options[name]) for name in known if name in setup.options)
-    source = _source(setup.source, options)
+    source = _source(setup.source, _opening(setup))
     if not source.rewindable:
         raise UsageError(f"{setup.source} passes once and cannot be looked at here and there; give a file")
     return source
 
 
+def _opening(setup: Setup) -> tuple[tuple[str, Any], ...]:
+    known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
+    return tuple((name, setup.options[name]) for name in known if name in setup.options)
+
+
 @lru_cache(maxsize=4)
 def _source(path: str, options: tuple[tuple[str, Any], ...]) -> Source:
     return open_source(path, **dict(options))
+
+
+@lru_cache(maxsize=4)
+def _origin_s(path: str, options: tuple[tuple[str, Any], ...]) -> float:
+    """When the first frame is [s]."""
+    return 1e-9 * next(frame.t_ns for frame in _source(path, options).frames())
 
 
 @lru_cache(maxsize=2)

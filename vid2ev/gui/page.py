@@ -15,14 +15,15 @@ from vid2ev.gui.session import Session
 from vid2ev.gui.settings import Settings
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.theme import ACCENT, CSS
+from vid2ev.gui.warming import Warming
 
 TICK_S = 0.05
 GONE_S = 10  # without its page, after which a session is ended
 
 
-def draw(setup: Setup) -> Session:
+def draw(setup: Setup, warming: Warming) -> Session:
     """Draw the page of a new session, whose work ends when the page is closed."""
-    session = Session(setup)
+    session = Session(setup, warming)
     ui.add_css(CSS)
     ui.colors(primary=ACCENT)
     dark = ui.dark_mode(value=None)
@@ -63,13 +64,15 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
 
     from vid2ev.gui.guard import Guard
 
+    warming = Warming()
+
     @ui.page("/", title="vid2ev")
     async def page() -> None:
         await ui.context.client.connected()
         if not ui.context.client.has_socket_connection:
             return
         kept = app.storage.tab  # (of one tab of the browser: what was set up there is there again after a reload)
-        session = draw(kept.get("setup", setup))
+        session = draw(kept.get("setup", setup), warming)
         session.on("setup", lambda changed: kept.update(setup=changed))
 
     app.add_middleware(Guard, host=host)

@@ -13,6 +13,7 @@ from vid2ev.errors import Vid2evError
 from vid2ev.gui.jobs import Done, Job, Progress
 from vid2ev.gui.preview import Answer, Plans, Request
 from vid2ev.gui.setup import Setup
+from vid2ev.gui.warming import Warming
 from vid2ev.gui.worker import Refused, Worker
 
 DEBOUNCE_S = 0.06  # without a change, before a preview is asked for
@@ -22,12 +23,15 @@ Hear = Callable[[Any], None]
 
 
 class Session:
-    """What belongs to one page.  `change` and `look` say what a person does, `tick` is called often and says what came.
+    """What belongs to one page; only what is compiled for it (`warming`) serves others, too.
+
+    `change` and `look` say what a person does, `tick` is called often and says what came.
 
     The last setup that could be meant is kept: a change that is refused changes nothing.
     """
 
-    def __init__(self, setup: Setup):
+    def __init__(self, setup: Setup, warming: Warming | None = None):
+        self._warming = warming or Warming()
         self.request = Request(setup)
         self.answer: Answer | None = None
         self.plans: Plans | None = None
@@ -38,6 +42,7 @@ class Session:
         self._changed_s: float | None = time.monotonic()
         self._asked_s = 0.0
         self._jobs: dict[Job, tuple[Hear, Hear]] = {}
+        self._warming.enter()
 
     @property
     def setup(self) -> Setup:
@@ -76,11 +81,11 @@ class Session:
             self._changed_s, self._asked_s = None, now_s
             if self._worker is None or not self._worker.alive:
                 self._worker = Worker()
-            self._worker.ask(self.request)
+            self._worker.ask(replace(self.request, ready=self._warming.ready))
         for reply in self._worker.replies() if self._worker else ():
             self._take(reply)
         if self._worker and self._worker.busy and self._asked_s and now_s - self._asked_s > SLOW_S:
-            self._tell("working; sensors with other effects are compiled once, which takes up to half a minute")
+            self._tell("working")
         for job, (hear, end) in [*self._jobs.items()]:
             for said in job.news():
                 (end if isinstance(said, Done) else hear)(said)
@@ -104,6 +109,7 @@ class Session:
         if self._worker:
             self._worker.close()
             self._worker = None
+        self._warming.leave()
         for file in self.folder.glob("*"):
             file.unlink(missing_ok=True)
         self.folder.rmdir()
@@ -113,6 +119,8 @@ class Session:
             self.answer, self._asked_s = reply, 0.0
             self._say("answer", reply)
             self._tell("; ".join(reply.notes))
+            if reply.whole:
+                self._warming.begin()
         elif isinstance(reply, Plans):
             self.plans = reply
             self._say("plans", reply)

@@ -8,12 +8,18 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
+from queue import SimpleQueue
+from threading import Lock, Thread
 from typing import Any, NamedTuple
 
 from vid2ev.errors import Vid2evError
-from vid2ev.gui.preview import Answer, Plans, Previewer, Request
+from vid2ev.gui.light import Light
+from vid2ev.gui.preview import Answer, Plans, Previewer, Request, plans_of
+
+CALM_S = 0.3  # after a preview, before its plan
 
 
 class Refused(NamedTuple):
@@ -89,16 +95,54 @@ class Worker:
                 return
 
 
+class Planner(Thread):
+    """Makes the plans of the newest preview, beside the next previews: what plans measure with is compiled, too."""
+
+    def __init__(self, send: Callable[[Any], None], newest: Callable[[], int]):
+        super().__init__(daemon=True)
+        self._send, self._newest = send, newest
+        self._coming: SimpleQueue[tuple[Light, int]] = SimpleQueue()
+
+    def plan(self, light: Light, number: int) -> None:
+        """Plan the cameras of this light, unless another preview is asked for."""
+        self._coming.put((light, number))
+
+    def run(self) -> None:
+        """Plan what comes."""
+        while True:
+            light, number = self._coming.get()
+            time.sleep(CALM_S)
+
+            def check(number: int = number) -> None:
+                if self._newest() != number:
+                    raise Superseded
+
+            try:
+                check()
+                self._send(plans_of(light, number, check))
+            except Superseded:
+                pass
+            except OSError:  # (nobody listens any more)
+                return
+            except Exception as error:  # (the pictures are there, whatever happens to the plan)
+                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
+
+
 def _serve(pipe: Connection, newest: Any) -> None:
     """Answer requests until the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    number = 0
+    number, sending = 0, Lock()
 
     def check() -> None:
         if newest.value != number:
             raise Superseded
 
-    previewer = Previewer(check)
+    def send(reply: Any) -> None:
+        with sending:
+            pipe.send(reply)
+
+    previewer, planner = Previewer(check), Planner(send, lambda: newest.value)
+    planner.start()
     while True:
         try:
             request = pipe.recv()
@@ -107,12 +151,13 @@ def _serve(pipe: Connection, newest: Any) -> None:
         number = request.number
         try:
             check()
-            pipe.send(previewer.answer(request))
-            pipe.send(previewer.plans(request))
+            for answer in previewer.answers(request):
+                send(answer)
+            planner.plan(previewer.light(request), number)
         except Superseded:
             pass
         except Vid2evError as error:
-            pipe.send(Refused(number, str(error)))
+            send(Refused(number, str(error)))
         except Exception as error:  # a page goes on, whatever happens in its preview
-            pipe.send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
-        pipe.send(None)
+            send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
+        send(None)

@@ -29,6 +29,11 @@ class Course(NamedTuple):
     level_off: np.ndarray
     events: Events
 
+    def since(self, first: int) -> Course:
+        """From frame `first` on."""
+        events = self.events.select(self.events.t > self.t_ns[first] // 1000)
+        return Course(*(column[first:] for column in self[:-1]), events)  # type: ignore[call-arg, arg-type]
+
 
 def course_of(dvs: Dvs, frames: Iterable[Frame], pixel: tuple[int, int] = (0, 0)) -> Course:
     """The course of a pixel (x, y) of a sensor over frames of luminance, which the sensor sees as it does."""
