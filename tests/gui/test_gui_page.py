@@ -23,7 +23,7 @@ from vid2ev.gui.controls import Control, controls_of
 from vid2ev.rig.camera import Camera
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.scene import Object
-from vid2ev.scenes.scene_file import read_scene
+from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.presets import CIS, DVS, load
 from vid2ev.sensors.spec import DvsSpec
@@ -252,6 +252,140 @@ def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser:
     for name, spec in expected.items():
         assert manifest["cameras"][name]["parameters"] == spec.model_dump(mode="json")
     assert wrong == []
+    page.context.close()
+
+
+def place_of_things(page: Any) -> dict[str, Any]:
+    """Where each named thing of the 3-D view is: on the screen [px], and in the view."""
+    page.locator(".v-right .q-tab", has_text="World").click()
+    page.locator(".v-right canvas").last.scroll_into_view_if_needed()
+    page.wait_for_timeout(500)
+    return page.evaluate(
+        """() => {
+            const view = [...document.querySelectorAll("[id^=c]")].map((e) => {
+                try { return getElement(+e.id.slice(1)) } catch { return null }
+            }).find((e) => e && e.scene && e.camera)
+            const box = view.$el.querySelector("canvas").getBoundingClientRect(), places = {}
+            view.scene.traverse((thing) => {
+                if (!thing.name) return
+                const there = thing.getWorldPosition(thing.position.clone()), own = there.toArray()
+                there.project(view.camera)
+                const at = [box.left + (there.x + 1) / 2 * box.width, box.top + (1 - there.y) / 2 * box.height]
+                places[thing.name] = { at, own }
+            })
+            return places
+        }"""
+    )
+
+
+def drag(page: Any, name: str, way_px: tuple[float, float]) -> None:
+    """Drag a thing of the 3-D view as a person does."""
+    x, y = place_of_things(page)[name]["at"]
+    page.mouse.move(x, y)
+    page.wait_for_timeout(200)
+    page.mouse.down()
+    for k in range(1, 9):
+        page.mouse.move(x + way_px[0] * k / 8, y + way_px[1] * k / 8)
+        page.wait_for_timeout(40)
+    page.mouse.up()
+
+
+def test_things_lamps_and_cameras_are_moved_in_the_3d_view(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    go_to(page, "scene:room,size=48x36,duration_s=0.1")
+    before = place_of_things(page)
+    scene = read_scene("room", ["camera.size=[48, 36]", "duration_s=0.1"]).resolved(0)
+    lamp = next(f"lights.{each.name}" for each in scene.lights if each.kind == "point")
+    for name in (lamp, "cameras.dvs"):
+        drag(page, name, (30.0, -20.0))
+        wait_for(lambda name=name: place_of_things(page)[name]["own"] != before[name]["own"])
+        tab = "Camera" if name.startswith("cameras") else "Scene"
+        page.wait_for_selector(f'.v-side .q-tab--active:has-text("{tab}")')
+    assert command(page).startswith("vid2ev convert scene.toml --rig rig.toml")
+    after = place_of_things(page)
+    changed = {name for name in before if before[name]["own"] != pytest.approx(after[name]["own"], abs=1e-6)}
+    assert changed == {lamp, "cameras.dvs"}
+    page.locator(".v-side .q-tab", has_text="Scene").click()
+    page.locator("button", has_text="Whole scene as it was").click()
+    wait_for(lambda: place_of_things(page)[lamp]["own"] == pytest.approx(before[lamp]["own"], abs=1e-6))
+    assert page.locator(".v-status").inner_text().count("failed") == 0 and wrong == []
+    page.context.close()
+
+
+def test_files_are_loaded_and_the_command_is_copied(browser: Any, address: Any, tmp_path: Path) -> None:
+    page, wrong = opened(browser, address)
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    for name, text, said in (
+        ("good.toml", "[dvs]\nthreshold_on = 0.33\n", "good.toml is loaded"),
+        ("bad.toml", "[dvs]\nthreshold_on = -3\n", "threshold_on = -3 in sensor bad.toml is impossible"),
+        ("torn.toml", "[dvs", "torn.toml is not valid TOML"),
+    ):
+        (tmp_path / name).write_text(text)
+        page.locator("button", has_text="Load").click()
+        page.locator(".q-uploader input[type=file]").set_input_files(tmp_path / name)
+        page.wait_for_selector(f'.q-notification:has-text("{said}")')
+    shown = page.locator('[data-key="dvs.threshold_on"] .v-value input')
+    wait_for(lambda: shown.input_value() == "0.33")
+    expected = command(page)
+    page.locator("button", has_text="Copy").click()
+    wait_for(lambda: page.evaluate("navigator.clipboard.readText()") == expected)
+    assert "threshold_on=0.33" in expected and wrong == []
+    page.context.close()
+
+
+def go_to(page: Any, source: str) -> None:
+    """Open another source, as typed."""
+    page.locator(".v-side .q-tab", has_text="Source").click()
+    entry = page.locator('input[data-key="source"], [data-key="source"] input').first
+    entry.fill(source)
+    entry.press("Enter")
+    wait_for(lambda: page.locator(".v-source").inner_text() == source)
+
+
+def test_each_scene_becomes_a_recording_by_two_clicks(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    said = page.locator('[data-key="said"]')
+    for name in scene_names():
+        page.locator(".v-side .q-tab", has_text="Source").click()
+        page.locator(f'[data-scene="{name}"]').click()
+        wait_for(lambda name=name: f"vid2ev convert scene:{name} --" in command(page))
+        go_to(page, f"scene:{name},size=48x36,duration_s=0.02")
+        page.locator("[data-key=convert]").click()
+        wait_for(lambda name=name: f"{name}_events:" in said.inner_text() and "events," in said.inner_text(), 120)
+        manifest = json.loads((address[1] / f"{name}_events" / "manifest.json").read_text())
+        assert manifest["source"]["path"].startswith(f"scene:{name}") and {*manifest["cameras"]} == {"dvs", "cis"}
+    assert wrong == []
+    page.context.close()
+
+
+def test_work_is_cancelled_and_ends_with_its_page(browser: Any, address: Any) -> None:
+    page, _ = opened(browser, address)
+    go_to(page, "scene:parallax,size=640x480")
+    said = page.locator('[data-key="said"]')
+    page.locator("[data-key=convert]").click()
+    wait_for(lambda: " frames" in said.inner_text(), 120)
+    page.locator("button:visible", has_text="Cancel").click()
+    wait_for(lambda: said.inner_text() == "cancelled", 30)
+    page.locator(".q-toggle", has_text="replace").click()
+    page.locator("[data-key=convert]").click()
+    wait_for(lambda: " frames" in said.inner_text(), 120)
+    page.context.close()
+    wait_for(lambda: not children(address[2]))
+
+
+def test_statistics_stand_beside_those_of_a_recording(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    text = "".join(f"{1000 * k} {k % 40} {k % 30} {k % 2}\n" for k in range(500))
+    (address[1] / "real.txt").write_text("# width 40 height 30\n" + text)
+    page.locator(".v-right .q-tab", has_text="Compare").click()
+    entry = page.locator('input[data-key="real"], [data-key="real"] input').first
+    entry.fill("nothing.txt")
+    page.locator("button:visible", has_text="Open").last.click()
+    page.wait_for_selector('.v-right .v-muted:has-text("nothing.txt")')
+    entry.fill("real.txt")
+    page.locator("button:visible", has_text="Open").last.click()
+    page.wait_for_selector('.v-right th:has-text("recording")')
+    assert "500" in page.locator(".v-right .v-table:visible").first.inner_text() and wrong == []
     page.context.close()
 
 

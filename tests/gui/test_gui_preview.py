@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import time
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statisti
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
 from vid2ev.gui.light import Light, LightTable, smaller
 from vid2ev.gui.preview import VIEWS, Previewer, Request
+from vid2ev.gui.scene_edit import moved
 from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
@@ -53,6 +55,15 @@ def test_light_is_made_again_only_where_something_changed_that_decides_it(setup:
 
 def at(light: Light, t_ns: int) -> Instant:
     return next(instant for instant in light.instants if instant.t_ns == t_ns)
+
+
+def test_a_scene_in_which_a_thing_was_moved_is_another_light(setup: Setup) -> None:
+    table = LightTable()
+    for k in range(3):
+        other = setup.with_scene(moved(setup.settled(), "objects.box-1", np.array([0.1 * k, 0.0, 0.0])))
+        light = table.light(pickle.loads(pickle.dumps(other)), 0.5, 0.005)
+        assert pickle.loads(pickle.dumps(other)) == other != setup
+        assert table.light(pickle.loads(pickle.dumps(other)), 0.5, 0.005).instants is light.instants
 
 
 def test_what_takes_long_is_rough_first_and_then_all_of_it(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,6 +171,12 @@ def refused(tell: Tell) -> None:
     raise UsageError("value 3: expected 2; give 2")
 
 
+def unheard(tell: Tell) -> None:
+    """A task that does not hear."""
+    tell(0, None, "")
+    time.sleep(600)
+
+
 def finish(job: Job, cancel_after: int | None = None) -> tuple[list[Progress], Done]:
     told: list[Progress] = []
     for _ in range(3000):
@@ -173,13 +190,18 @@ def finish(job: Job, cancel_after: int | None = None) -> tuple[list[Progress], D
     raise AssertionError("the job did not end")
 
 
-def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(tmp_path: Path) -> None:
+def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole, broken, wrong = Job(counted, to=5, folder=str(tmp_path)), Job(counted, to=10**5, folder="/"), Job(refused)
     told, end = finish(whole)
     assert end == Done(5) and [said.done for said in told] == [0, 1, 2, 3, 4] and (tmp_path / "done").exists()
     assert finish(broken, cancel_after=2)[1].why_not == "cancelled"
     assert finish(wrong)[1].why_not == "value 3: expected 2; give 2"
-    for job in (whole, broken, wrong):
+    monkeypatch.setattr("vid2ev.gui.jobs.GRACE_S", 0.2)
+    deaf = Job(unheard)
+    assert finish(deaf, cancel_after=0)[1].why_not == "cancelled"
+    for job in (whole, broken, wrong, deaf):
         job.close()
         assert not job.alive
 

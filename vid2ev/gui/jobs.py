@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import time
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
@@ -50,9 +51,12 @@ class Job:
         self._process.start()
         theirs.close()
         self.ended = False
+        self._cancelled_s: float | None = None
 
     def news(self) -> Iterator[Progress | Done]:
         """What has come since the last call; the last of all is Done."""
+        if self._cancelled_s is not None and time.monotonic() - self._cancelled_s > GRACE_S:
+            self._process.kill()  # (it compiles, or opens a source, and cannot hear)
         try:
             while not self.ended and self._pipe.poll():
                 said = self._pipe.recv()
@@ -63,8 +67,9 @@ class Job:
             yield Done(why_not="cancelled" if self._cancelled.is_set() else "the work's process has ended")
 
     def cancel(self) -> None:
-        """Ask the task to end; it says when it has."""
+        """Ask the task to end; `news` says when it has, and ends it if it does not hear."""
         self._cancelled.set()
+        self._cancelled_s = self._cancelled_s or time.monotonic()
 
     def close(self) -> None:
         """End the task, now if it does not hear."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, Vid2evError
 from vid2ev.gui.setup import Setup
 from vid2ev.rig.rig_file import read_rig, write_text
 from vid2ev.scenes.scene_file import read_scene
@@ -24,6 +25,13 @@ def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
         raise DataError(f"{name} is not valid TOML: {error}; correct that line") from error
     path = folder / Path(name).name
     write_text(path, text, overwrite=True)
+    try:
+        return _taken(setup, path, tables)
+    except Vid2evError as error:  # (where it is kept is nobody's concern)
+        raise type(error)(str(error).replace(str(path), name)) from error
+
+
+def _taken(setup: Setup, path: Path, tables: dict[str, Any]) -> Setup:
     if isinstance(tables.get("camera"), list):
         return replace(setup, rig=read_rig(path), own_rig=False)
     kinds = [kind for kind in (DVS, CIS) if kind.table in tables]

@@ -14,7 +14,7 @@ from vid2ev.gui.result import Results
 from vid2ev.gui.session import Session
 from vid2ev.gui.settings import Settings
 from vid2ev.gui.setup import Setup
-from vid2ev.gui.theme import ACCENT, CSS
+from vid2ev.gui.theme import ACCENT, BAD, CSS
 from vid2ev.gui.warming import Warming
 
 TICK_S = 0.05
@@ -25,7 +25,7 @@ def draw(setup: Setup, warming: Warming) -> Session:
     """Draw the page of a new session, whose work ends when the page is closed."""
     session = Session(setup, warming)
     ui.add_css(CSS)
-    ui.colors(primary=ACCENT)
+    ui.colors(primary=ACCENT, info=ACCENT, negative=BAD)
     dark = ui.dark_mode(value=None)
 
     async def turn_over() -> None:

@@ -47,10 +47,10 @@ class Record:
     def buttons(self) -> None:
         """What stands at the top of the page: open and save files, convert."""
         session = self._session
-        with ui.button("Load").props('flat dense title="a sensor, rig or scene file"'), ui.menu():
-            ui.upload(on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file").props(
-                'accept=".toml" flat data-key="load"'
-            )
+        with ui.button("Load").props('flat dense title="a sensor, rig or scene file"'), ui.menu() as self._menu:
+            self._upload = ui.upload(
+                on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file"
+            ).props('accept=".toml" flat data-key="load"')
         with ui.button("Save").props("flat dense data-key=save"), ui.menu():
             for number, camera in enumerate(session.setup.rig.cameras):
                 ui.menu_item(
@@ -92,6 +92,7 @@ class Record:
 
     def _heard(self, said: Progress) -> None:
         self._bar.value = round(said.done / said.of, 3) if said.of else 0
+        self._bar.props(remove="indeterminate") if said.of else self._bar.props("indeterminate")
         self._said.text = said.text
 
     def _ended(self, done: Done) -> None:
@@ -109,6 +110,8 @@ class Record:
         self._go.set_enabled(not busy)
         self._stop.set_visibility(busy)
         self._bar.set_visibility(busy)
+        # (the browser asks before it leaves a page whose work would end)
+        ui.run_javascript(f"window.onbeforeunload = {'e => e.preventDefault()' if busy else 'null'}")
 
     def _cancelled(self) -> None:
         if self._job is not None:
@@ -120,11 +123,19 @@ class Record:
         ui.notify("copied", type="info", position="bottom-right")
 
     async def _uploaded(self, event: Any) -> None:
-        text = await event.file.text()
-        if why := self._session.change(
-            lambda: loaded(self._session.setup, text, event.file.name, self._session.folder)
-        ):
+        name = event.file.name
+        self._menu.close()
+        self._upload.reset()
+        try:
+            text = (await event.file.read()).decode()
+        except UnicodeDecodeError:
+            why: str | None = f"{name} is not a text; give a TOML file of a sensor, a rig or a scene"
+        else:
+            why = self._session.change(lambda: loaded(self._session.setup, text, name, self._session.folder))
+        if why:
             ui.notify(why, type="negative", multi_line=True, timeout=0, close_button=True)
+        else:
+            ui.notify(f"{name} is loaded", position="bottom-right")
 
     def _name(self, camera: int) -> str:
         return f"{self._session.setup.rig.cameras[camera].name}_sensor"

@@ -5,6 +5,7 @@ Axes of the page's view have z upwards; those of scenes and rigs have y down and
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ GROUND = "#101218"  # of every picture of events
 NEAR_M = 0.2
 LARGE_M = 4.0  # what is larger is seen through, and stays where it is when the view is turned
 CAMERAS = "cameras."
+CLICK_S = 0.7  # after a drop
 
 
 class Stage:
@@ -32,6 +34,7 @@ class Stage:
     def __init__(self, session: Session, select: Any):
         self._session, self._select = session, select
         self._poses: dict[str, Pose] = {}
+        self._dropped_s = -CLICK_S
         self._scene = ui.scene(
             width=760,
             height=420,
@@ -112,15 +115,17 @@ class Stage:
 
     def _clicked(self, event: Any) -> None:
         named = [hit.object_name for hit in event.hits if hit.object_name]
-        if named:
+        if named and time.monotonic() - self._dropped_s > CLICK_S:  # (a drop is followed by a click on what is there)
             self._select(named[0])
 
     def _dropped(self, event: Any) -> None:
         name = event.object_name
         if name in self._poses:
             place_m = TO_VIEW.T @ np.array([event.x, event.y, event.z])
+            self._dropped_s = time.monotonic()
             self._move(name, place_m)
             self.show()
+            self._select(name)
 
     def _move(self, name: str, place_m: np.ndarray) -> None:
         setup = self._session.setup

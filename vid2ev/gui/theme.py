@@ -5,6 +5,7 @@ from __future__ import annotations
 ACCENT = "#3b72d9"
 ON, OFF = "#e0982f", "#5a8ff0"
 MUTED = "#8a92a0"
+BAD = "#b3372b"
 
 CSS = """
 :root { --ground: #f6f7f9; --card: #ffffff; --line: #e3e6eb; --ink: #1d222b; --muted: #687080; --accent: #3b72d9;

@@ -15,6 +15,12 @@ class Part(BaseModel):
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, ignored_types=(cached_property,)
     )
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all values are the same; what is found from them and kept (arrays, too) is not looked at."""
+        return type(self) is type(other) and all(
+            getattr(self, name) == getattr(other, name) for name in type(self).model_fields
+        )
+
 
 Metres = Annotated[float, Field(ge=-1e5, le=1e5)]
 Seconds = Annotated[float, Field(ge=-1e6, le=1e6)]
