@@ -181,7 +181,7 @@ def test_a_change_is_seen_a_bad_one_is_refused_and_two_tabs_do_not_mix(browser: 
     page.locator(".v-right .q-tab", has_text="Pixel").click()
     page.wait_for_selector(".nicegui-echart canvas")
     assert wrong == []
-    wait_for(lambda: len(children(address[2])) == 2)
+    wait_for(lambda: len(children(address[2])) in (2, 3))  # (one for each page, and perhaps one that compiles)
     for each in (page, second):
         each.context.close()
     wait_for(lambda: not children(address[2]))
@@ -351,7 +351,7 @@ def test_each_scene_becomes_a_recording_by_two_clicks(browser: Any, address: Any
         wait_for(lambda name=name: f"vid2ev convert scene:{name} --" in command(page))
         go_to(page, f"scene:{name},size=48x36,duration_s=0.02")
         page.locator("[data-key=convert]").click()
-        wait_for(lambda name=name: f"{name}_events:" in said.inner_text() and "events," in said.inner_text(), 120)
+        wait_for(lambda name=name: f"{name}_events:" in said.inner_text() and "events," in said.inner_text(), 280)
         manifest = json.loads((address[1] / f"{name}_events" / "manifest.json").read_text())
         assert manifest["source"]["path"].startswith(f"scene:{name}") and {*manifest["cameras"]} == {"dvs", "cis"}
     assert wrong == []
