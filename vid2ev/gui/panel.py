@@ -119,6 +119,12 @@ class Row:
                 )
                 for k in range(count)
             ]
+        value = self.board.value(control.key)
+        if (
+            isinstance(value, tuple) and value and isinstance(value[0], dict)
+        ):  # (tables, such as a trajectory's motions)
+            text = ui.textarea(on_change=self._entered).classes("v-text")
+            return [text.props("dense borderless spellcheck=false debounce=400")]
         return [ui.input(on_change=self._entered).props(f'dense borderless placeholder="none" {unit}')]
 
     def _slid(self, event: Any) -> None:

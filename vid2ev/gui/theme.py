@@ -42,6 +42,9 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-value .q-field__control { border-bottom: 1px solid var(--line); }
 .v-value .q-field__suffix { font-size: 11px; color: var(--muted); padding: 4px 0 0 4px; line-height: 20px; }
 .v-value .q-field--focused .q-field__control { border-bottom-color: var(--accent); }
+.v-value .v-text .q-field__control { height: auto !important; }
+.v-value .v-text textarea { font-family: ui-monospace, monospace; font-size: 11.5px; line-height: 1.45;
+          padding: 4px 0 !important; overflow-wrap: anywhere; height: 118px !important; }
 .v-value input { text-align: right; } .v-wide input { text-align: left; }
 .v-value input[type=number]::-webkit-inner-spin-button { display: none; }
 .v-line .q-btn-group .q-btn { padding: 2px 8px; min-height: 28px; font-size: 13px; font-weight: 400; }
