@@ -64,9 +64,12 @@ def _keep(folder: Path, number: int, at: int, trace: str) -> None:
     """Put aside the file that ended a process: the last one that was written."""
     place = folder / "offending"
     place.mkdir(exist_ok=True)
-    latest = max([path for path in (folder / "seeds").rglob("*") if path.is_file()], key=lambda p: p.stat().st_mtime_ns)
-    shutil.copy(latest, place / f"{number}-killed-{latest.name}")
-    (place / f"{number}-killed-{latest.name}.txt").write_text(trace)
+    found = [path for path in (folder / "seeds").rglob("*") if path.is_file()]
+    latest = max(found, key=lambda path: path.stat().st_mtime_ns, default=None)
+    name = f"{number}-killed-{latest.name if latest else 'nothing'}"
+    if latest:
+        shutil.copy(latest, place / name)
+    (place / f"{name}.txt").write_text(trace)
 
 
 @click.command(help="Read changed files, and count how that ends.")

@@ -102,6 +102,16 @@ def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path
         Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False)
 
 
+def test_less_than_nothing_cannot_have_been_evaluated(tmp_path: Path) -> None:
+    with Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False) as kept:
+        for about in ({"groups": -3, "missing": {"linear": 0}}, {"groups": 3, "missing": {"linear": -1}}):
+            kept.finish("film", about)
+            with pytest.raises(DataError, match="below zero"):
+                kept.about("film")
+        kept.finish("film", {"groups": 3, "missing": {"linear": 0}})
+        assert kept.about("film") == {"groups": 3, "missing": {"linear": 0}}
+
+
 def test_a_folder_that_is_being_removed_says_to_the_last_whose_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

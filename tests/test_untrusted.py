@@ -148,6 +148,10 @@ def test_texts_that_are_nested_too_deeply_are_no_texts(tmp_path: Path) -> None:
             read(tmp_path / "a.toml")
     with pytest.raises(DataError, match="nested too deeply"):
         read_manifest(tmp_path / "a.json")
+    for text in (f"cam0: {deep}", f"cam0:\n  T_cam_imu: {'{a: ' * 200}", f"%YAML:1.0\ncam0: {deep}"):
+        (tmp_path / "a.yaml").write_text(text)
+        with pytest.raises(DataError, match="nested too deeply"):
+            read_calibration(tmp_path / "a.yaml")
 
 
 def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -23,6 +24,7 @@ from vid2ev.errors import DataError, UsageError
 LARGEST, PATHS = "VID2EV_LARGEST_MB", "VID2EV_PATHS"
 DEFAULT_MB = 4096
 TEXT_MB = 16  # of a text in which people write, or which says what a recording is
+DEEPEST = 40  # brackets in brackets of YAML
 
 
 def most_bytes() -> int:
@@ -49,6 +51,18 @@ def read_text(path: Path) -> str:
     if size > TEXT_MB << 20:
         raise DataError(f"{path}: {size:,} bytes are too many for such a text; expected at most {TEXT_MB} MB")
     return path.read_text(encoding="utf-8")
+
+
+def check_depth(path: Path, text: str) -> None:
+    """Raise DataError for YAML with more brackets in brackets than anybody writes.
+
+    What reads it looks at all that are open with each word, and calls itself with each of them.
+    """
+    depth = 0
+    for bracket in re.findall(r"[\[\]{}]", text):
+        depth += 1 if bracket in "[{" else -1
+        if depth > DEEPEST:
+            raise DataError(f"{path} is nested too deeply: more than {DEEPEST} brackets are open; get another copy")
 
 
 def json_of(text: str | bytes) -> Any:

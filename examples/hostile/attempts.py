@@ -2,8 +2,8 @@
 
     python -m hostile.attempts READER[,READER...] FOLDER FIRST COUNT        (in examples/)
 
-Attempt n depends on its number and on what attempts before it in this process have found: content with which a reader
-did something new, said a sentence of another wording or gave in at another place, is changed further.
+Attempt n depends on its number and on what attempts before it in this process have found: content with which a line
+of vid2ev or interp ran for the first time, or that was refused with a sentence of another wording, is changed further.
 
 FOLDER/READER/seeds       the valid files, one of which is changed for each attempt
 FOLDER/READER/offending   what was neither read nor refused in a sentence, and the trace of each
@@ -24,16 +24,19 @@ import traceback
 import warnings
 import zlib
 from collections import Counter
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
+from hostile.coverage import Coverage
 
 SECONDS = 20  # of the processor for an attempt
 LONGEST_S = 600  # for one that waits
 SPACE = 6 << 30  # bytes of address space beyond those that the process has when it has read the valid files
 PEAK_MB = 900  # of memory in use beyond those; twice what `VID2EV_LARGEST_MB` is set to, and what reading takes
 LARGEST_MB = 256
-MOST_KINDS = 60  # of content that is changed further, for each valid file
+MOST_KINDS = 60  # of content that is changed further, for each valid file, of what was read and of what was refused
+COVERED = 4  # one of so many attempts is looked at line by line
 TALLY_EVERY = 500
 
 
@@ -54,11 +57,14 @@ class Attempts:
         shutil.rmtree(seeds, ignore_errors=True)
         seeds.mkdir(parents=True)
         self.paths = self.reader.seeds(seeds)
-        self.contents = [[path.read_bytes()] for path in self.paths]
+        self.valid = [path.read_bytes() for path in self.paths]
+        self.new: list[dict[str, list[bytes]]] = [{"valid": [], "read": [], "refused": []} for _ in self.paths]
         self.tally: Counter[str] = Counter()
         self.known: set[str] = set()
+        self.coverage = Coverage()
         for path in self.paths:
-            self.reader.read(path)
+            with self.coverage:
+                self.reader.read(path)
         self._before_kb = kilobytes("VmRSS")
 
     def limit(self) -> None:
@@ -73,22 +79,24 @@ class Attempts:
 
         random = np.random.default_rng([zlib.crc32(self.folder.name.encode()), number])
         at = number % len(self.paths)
-        path, kinds = self.paths[at], self.contents[at]
-        begin = 0 if random.random() < 0.5 else int(random.integers(len(kinds)))
-        content = mutated(kinds[begin], random, [each[0] for each in self.contents])
+        path, valid, new = self.paths[at], self.valid[at], self.new[at]
+        among = new[str(random.choice(["valid", "read", "refused"], p=[0.5, 0.35, 0.15]))]
+        content = mutated(among[int(random.integers(len(among)))] if among else valid, random, self.valid)
         path.write_bytes(content)
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         signal.alarm(LONGEST_S)
-        ended, kind = self._read(path)
+        covered = number % COVERED == 0
+        with self.coverage if covered else nullcontext():
+            ended, kind = self._read(path)
         signal.alarm(0)
         signal.setitimer(signal.ITIMER_PROF, 0)
         self.tally[ended] += 1
-        if kind not in self.known and len(kinds) < MOST_KINDS:
-            self.known.add(kind)
-            kinds.append(content)
-        if ended not in ("read", "refused"):
+        if ended not in new:
             self.keep(path, content, number, kind)
-        path.write_bytes(kinds[0])
+        elif ((covered and self.coverage.found) or kind not in self.known) and len(new[ended]) < MOST_KINDS:
+            self.known.add(kind)
+            new[ended].append(content)
+        path.write_bytes(valid)
 
     def _read(self, path: Path) -> tuple[str, str]:
         """How reading ended, and what tells it from others."""

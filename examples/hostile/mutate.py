@@ -1,6 +1,7 @@
 """Files changed as accidents and enemies change them: `mutated(content, random)` depends on its arguments alone.
 
-Bytes are flipped, cut, moved, doubled, overwritten with the extremes of whole numbers and of floating point; words of
+Half of the changes are slight, one number by a little, so that what comes behind a header is reached.  Of the others,
+bytes are flipped, cut, moved, doubled, overwritten with the extremes of whole numbers and of floating point; words of
 texts are replaced, doubled, exchanged; parts of other files are put in.  Of archives, the members are changed, and the
 archive is packed again with checksums that hold: otherwise nothing but the checksums would ever be tested.
 """
@@ -28,13 +29,21 @@ WORDS = (
     b"&a [*a]", b"*a", b"{'x': 1}", b"1970-01-01",
 )  # fmt: skip
 WORD = re.compile(rb"[-+.\w]+|[^\s\w]")
+NUMBER = re.compile(rb"(?<![\w.])-?\d[\d.]*")
+SLIGHT = 0.5  # of the changes
 PNG = b"\x89PNG\r\n\x1a\n"
 HEAD = 512  # bytes at the start of a file, which every other change is made in: there its structure is
 LONGEST = 1 << 18  # bytes that a file may grow to
 
 
 def mutated(content: bytes, random: np.random.Generator, others: Sequence[bytes] = ()) -> bytes:
-    """The content with some changes, one to four; `others` are files that parts may come from."""
+    """The content with some changes, one to four; `others` are files that parts may come from.  It is another."""
+    while (made := _mutated(content, random, others)) == content:
+        pass
+    return made
+
+
+def _mutated(content: bytes, random: np.random.Generator, others: Sequence[bytes]) -> bytes:
     if content[:4] == b"PK\x03\x04" and random.random() < 0.7:
         return _in_archive(content, random, others)
     if content.startswith(PNG) and random.random() < 0.7:
@@ -53,9 +62,48 @@ def is_text(content: bytes) -> bool:
 
 def _changed(content: bytes, random: np.random.Generator, others: Sequence[bytes], text: bool) -> bytes:
     data = bytearray(content)
+    if random.random() < SLIGHT:
+        _slightly_in_words(data, random) if text else _slightly_in_bytes(data, random)
+        return bytes(data)
     for _ in range((1, 1, 1, 2, 3, 4)[int(random.integers(6))]):
         _in_words(data, random) if text and random.random() < 0.7 else _in_bytes(data, random, others)
     return bytes(data[: max(LONGEST, len(content))])
+
+
+def _slightly_in_bytes(data: bytearray, random: np.random.Generator) -> None:
+    """One byte a little larger or smaller, or two words that change places; not often where files begin."""
+    begin = 0 if random.random() < 0.2 else min(HEAD, len(data) // 2)
+    width = 1 << int(random.integers(0, 4))
+    at, other = (int(random.integers(begin, len(data) + 1)) // width * width for _ in range(2))
+    if random.random() < 0.7:
+        step = (1, 1, 2, 16, 128)[int(random.integers(5))] * (1 if random.random() < 0.5 else -1)
+        data[at : at + 1] = bytes(byte + step & 255 for byte in data[at : at + 1])
+    elif len(data) >= max(at, other) + width:
+        data[at : at + width], data[other : other + width] = data[other : other + width], data[at : at + width]
+
+
+def _slightly_in_words(data: bytearray, random: np.random.Generator) -> None:
+    """One number a little larger, smaller, of another sign, or that of another place."""
+    start = int(random.integers(0, max(len(data) - 4000, 1)))
+    numbers = list(NUMBER.finditer(bytes(data[start : start + 4000])))
+    if not numbers:
+        _in_words(data, random)
+        return
+    one, other = (numbers[int(random.integers(len(numbers)))] for _ in range(2))
+    digit = int(random.integers(one.start(), one.end()))
+    match int(random.integers(0, 5)):
+        case 0 if one[0].startswith(b"-"):
+            changed = one[0][1:]
+        case 0:
+            changed = b"-" + one[0]
+        case 1:
+            changed = other[0]
+        case 2:
+            changed = one[0] + b"0123456789."[(at := int(random.integers(11))) : at + 1]
+        case _:
+            changed = bytearray(one[0])
+            changed[digit - one.start()] = b"0123456789"[int(random.integers(10))]
+    data[start + one.start() : start + one.end()] = changed
 
 
 def _in_bytes(data: bytearray, random: np.random.Generator, others: Sequence[bytes]) -> None:

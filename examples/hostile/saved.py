@@ -51,7 +51,9 @@ def _files(folder: Path) -> list[Path]:
 
 def _begun_recording(folder: Path) -> list[Path]:
     from vid2ev import convert
+    from vid2ev.tracks import dvs
 
+    dvs.plot = lambda *_: None  # (half a second for a picture of what was read)
     (folder / "rig.toml").write_text(RIG)
     for name, options in (("one", OPTIONS), ("rig", _rig_options(folder))):
         try:
@@ -76,12 +78,50 @@ def _resume_recording(path: Path) -> None:
     convert(CLIP, folder / name, resume=True, **(OPTIONS if name == "one" else _rig_options(folder)))
 
 
+def _begun_dataset(folder: Path) -> list[Path]:
+    import json
+    from functools import cache
+
+    from interp.data import dataset
+    from vid2ev.recording.manifest import versions
+
+    job = {"versions": versions(), "spec": _dataset_spec().model_dump(mode="json")}
+    facts = {"made": 1, "disparity_mm": 3.5, "of_scenes": {"a": {"frames": 3}}, "left_out": {}}
+    for name, said in (("begun.partial/job", job), ("done/dataset", job | facts)):
+        (folder / name).parent.mkdir()
+        (folder / f"{name}.json").write_text(json.dumps(said, indent=2))
+    dataset.scenes_of = cache(dataset.scenes_of)  # (the same each time)
+    dataset._all = lambda *_: iter([dataset.Made("a", {}, "not made here")])
+    return [folder / "begun.partial" / "job.json", folder / "done" / "dataset.json"]
+
+
+def _dataset_spec() -> Any:
+    from interp.data.dataset_spec import DatasetSpec
+
+    return DatasetSpec(count=1, size=(16, 12), frames=3)
+
+
+def _resume_dataset(path: Path) -> None:
+    from interp.data.dataset import write_dataset
+    from vid2ev.errors import DataError
+
+    try:
+        write_dataset(path.parent.with_suffix(""), _dataset_spec(), resume=True)
+    except DataError as error:
+        if "not made here" not in str(error):
+            raise
+
+
 def _begun_frames(folder: Path) -> list[Path]:
+    from functools import cache
+
+    from interp.interpolate import after
     from interp.interpolate.whole import interpolate
     from interp.networks import make
     from interp.weights import save
     from vid2ev.recording.exposures import write_codes
 
+    after.load = cache(after.load)  # (the weights are the same each time)
     (folder / "in").mkdir()
     draw = np.random.default_rng(0).integers(0, 256, (12, 40, 3), np.uint8)
     for k in range(6):
@@ -232,6 +272,7 @@ def _read_recording(path: Path) -> None:
 
 READERS: dict[str, tuple[Seeds, Callable[[Path], object]]] = {
     "saved-recording": (_begun_recording, _resume_recording),
+    "saved-dataset": (_begun_dataset, _resume_dataset),
     "saved-frames": (_begun_frames, _resume_frames),
     "saved-evaluation": (_begun_evaluation, _resume_evaluation),
     "saved-training": (_begun_training, _resume_training),

@@ -69,9 +69,8 @@ class KeptRows:
             return None
         found = _read(path, f"remove {path.parent}, and it is made again")
         with as_stated(path):
-            operator.index(found["groups"])
-            for number in dict(found["missing"]).values():
-                operator.index(number)
+            if min(operator.index(count) for count in (found["groups"], *dict(found["missing"]).values())) < 0:
+                raise ValueError("a count below zero")
         return found
 
     def finish(self, sequence: str, about: Mapping[str, Any]) -> None:

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import DataError
-from vid2ev.untrusted import check_bytes, read_text
+from vid2ev.untrusted import check_bytes, check_depth, read_text
 
 PART = 1 << 20  # bytes unpacked at a time
-DEEPEST = 40  # brackets in brackets of metadata.yaml
 LIKELY = 100  # times smaller than what is in them files of events never are
 
 
@@ -24,11 +23,7 @@ def check_bag(metadata: Path) -> None:
         text = read_text(metadata)
     except UnicodeDecodeError as error:
         raise DataError(f"{metadata} is no UTF-8 text; get another copy") from error
-    depth = 0
-    for sign in text:
-        depth += (sign in "[{") - (sign in "]}")
-        if depth > DEEPEST:
-            raise DataError(f"{metadata} is nested more than {DEEPEST} times; get another copy")
+    check_depth(metadata, text)
     for packed in metadata.parent.glob("*.zstd"):  # (those are unpacked to a temporary folder, as a whole)
         _check_packed(packed)
 

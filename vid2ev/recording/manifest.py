@@ -11,6 +11,7 @@ import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,7 @@ def difference(one: Any, other: Any, name: str = "") -> str:
     return "" if one == other else f"{name} = {json.dumps(one)}, not {json.dumps(other)}"
 
 
+@cache
 def _version(name: str) -> str:
     try:
         return version(name)

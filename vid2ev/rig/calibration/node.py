@@ -28,6 +28,7 @@ from vid2ev.errors import DataError
 from vid2ev.rig.camera import nearest_rotation
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.rig_file import read_text
+from vid2ev.untrusted import check_depth
 
 LARGEST = 1e12  # of a number that can be meant
 MOST_ENTRIES = 1000  # of a list of numbers: YAML can say one list a thousand times
@@ -150,6 +151,7 @@ def read_tree(path: Path) -> Node:
     try:
         if text.lstrip().startswith("{") and not first.startswith("%"):
             return Node(path, "", json.loads(text))
+        check_depth(path, text)
         # (the first line of OpenCV 4 is no directive of YAML, for want of a space; lines are counted all the same)
         return Node(path, "", yaml.load(f"\n{rest}" if first.startswith("%YAML") else text, yaml.BaseLoader))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
