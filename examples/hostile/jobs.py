@@ -18,6 +18,7 @@ OPTIONS: dict[str, Any] = {
     "overrides": ["shot_rate_hz=20", "hot_probability=0.01", "frame_rate_hz=900"], "upsample": "linear", "subframes": 2,
     "labels": True, "piece": 3 << 18, "threads": 1, "probe": ["20,16"], "formats": ["hdf5", "evt3"],
 }  # fmt: skip
+FEW: dict[str, Any] = {"count": 2, "frames": 2, "cis_fps": 10.0}
 
 
 @dataclass(frozen=True)
@@ -65,24 +66,30 @@ def _old_recording(_: Path, out: Path) -> None:
     convert(CLIP, out, seed=9, **OPTIONS)
 
 
-def _dataset(_: Path, out: Path, resume: bool) -> None:
+def _prepare_dataset(folder: Path) -> None:
+    from footage_made import pictures, write_film
+
+    write_film(folder / "film" / "film.npz", pictures(30), fps=25)
+
+
+def _dataset(folder: Path, out: Path, resume: bool) -> None:
     from interp.data.dataset import write_dataset
     from interp.data.dataset_spec import DatasetSpec
 
-    write_dataset(out, DatasetSpec(count=2, size=(32, 24), frames=3), resume=resume)
+    write_dataset(out, DatasetSpec(videos=(str(folder / "film" / "film.npz"),), **FEW), resume=resume)
 
 
 def _train(_: Path, out: Path, resume: bool) -> None:
     import small_run
 
-    small_run.session(out, (out / "run.json").exists())
+    small_run.session(out, (out / "run.json").exists(), network={"depths": (2, 2, 2, 2)}, steps=6)
 
 
 def _prepare_eval(folder: Path) -> None:
     from footage_made import pictures, write_hsergb
 
     for seed, name in enumerate("ab"):
-        write_hsergb(folder / "data" / name, pictures(20, seed))
+        write_hsergb(folder / "data" / name, pictures(12, seed))
 
 
 def _eval(folder: Path, out: Path, resume: bool) -> None:
@@ -121,7 +128,7 @@ def _nothing(_: Path) -> None:
 
 JOBS: dict[str, Job] = {
     "convert": Job(_nothing, _convert, ("t", "x", "y", "p", "label", "probe.csv", "frame_us"), _old_recording),
-    "dataset": Job(_nothing, _dataset, ("t", "x", "y", "p", "frame_us", "timestamps.txt")),
+    "dataset": Job(_prepare_dataset, _dataset, ("t", "x", "y", "p", "frame_us", "timestamps.txt")),
     "train": Job(_nothing, _train, ("training.csv",)),
     "eval": Job(_prepare_eval, _eval, ("linear.jsonl", "bridge.jsonl")),
     "interpolate": Job(_prepare_interpolate, _interpolate, ("done.jsonl",), _old_frames),

@@ -60,7 +60,7 @@ def clips(count: int = 2) -> list[tuple[str, dict[str, torch.Tensor]]]:
 
 
 def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range = range(0), **changed: Any) -> Any:
-    """A session of the run; `changed` are values of the recipe and of `Fit`."""
+    """A session of the run; `changed` are values of the recipe and of `Fit`, and `network`, options of the network."""
     from interp.networks import make
     from interp.train.batches import Feed
     from interp.train.fit import Fit
@@ -72,10 +72,13 @@ def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range 
 
     of_fit = {name: changed.pop(name) for name in ("session_s", "stop", "begun_s") if name in changed}
     workers = changed.pop("workers", 0)
+    of_network = changed.pop("network", {})
     few = {"steps": STEPS_OF_RUN, "batch": 4, "save_s": 1e-6, "validations": 2, "threads": 1, "warm_up": 3}
     recipe = Recipe(**(few | changed))
     torch.manual_seed(recipe.seed)
-    learner = FrameFedLearner(NETWORK, make(NETWORK), recipe, Schedule(recipe.warm_up, recipe.rate_end, recipe.steps))  # type: ignore[arg-type]
+    learner = FrameFedLearner(
+        NETWORK, make(NETWORK, **of_network), recipe, Schedule(recipe.warm_up, recipe.rate_end, recipe.steps)
+    )  # type: ignore[arg-type]
     machines = Machines(devices, accelerator="cpu")
     place = RunFolder(folder, {"recipe": recipe.model_dump(mode="json")}, resume, machines.first)
     try:
