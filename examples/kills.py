@@ -168,9 +168,10 @@ class Kills:
         click.echo(f"{self.name}, kill {self.counts['kills']}: {what} {names[:4]}", err=True)
 
     def _tear(self) -> None:
-        """Put half a line at the end of a file that grows."""
+        """Put half a line at the end of a file that grows; not of one that was brought to the disk with all beside."""
         places = [self.out, self.folder / "out.partial"]
-        growing = [file for place in places for name in self.job.growing for file in place.rglob(name)]
+        found = [file for place in places for name in self.job.growing for file in place.rglob(name)]
+        growing = [file for file in found if not any((at / "manifest.json").exists() for at in file.parents)]
         done = (self.out / "manifest.json").exists() or (self.out / "report.md").exists()
         if growing and not done and self.chance.random() < 0.5:
             with open(self.chance.choice(sorted(growing)), "ab") as file:

@@ -154,6 +154,21 @@ def test_texts_that_are_nested_too_deeply_are_no_texts(tmp_path: Path) -> None:
             read_calibration(tmp_path / "a.yaml")
 
 
+def test_a_png_takes_no_room_for_what_it_has_not(tmp_path: Path) -> None:
+    """OpenCV takes 4 GB for this one, whose second part says that it is 2.3 GB long."""
+    import cv2
+
+    place = tmp_path / "a.png"
+    cv2.imwrite(str(place), np.arange(96, dtype=np.uint8).reshape(8, 12))
+    whole = place.read_bytes()
+    place.write_bytes(whole + b"more")
+    assert np.array_equal(read_picture(place).pixels.ravel(), np.arange(96))
+    for damaged in (whole[:33] + b"\x8c" + whole[34:], whole[:-20], whole[:40]):
+        place.write_bytes(damaged)
+        with pytest.raises(DataError, match="cut short"):
+            read_picture(place)
+
+
 def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:
     once = f"&a [{', '.join(['1'] * 2000)}]"
     text = f"cam0:\n  camera_model: pinhole\n  distortion_model: none\n  intrinsics: [{once}{', *a' * 2000}]\n"

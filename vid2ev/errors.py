@@ -36,6 +36,10 @@ class DataError(Vid2evError, OSError):
     exit_code = 1
 
 
+class DiskError(DataError):
+    """A disk that does not take what is to be written: nobody's file is at fault, and all work ends there."""
+
+
 def _quoted(message: str) -> str:
     message = re.sub(r"[\x00-\x1f\x7f-\x9f]+", " ", message)
     return re.sub(r"\S{200,}", lambda word: f"{word[0][:80]}...{word[0][-40:]}", message)

@@ -119,6 +119,21 @@ def check_exr(path: Path) -> None:
     check_bytes(path, bytes_, "its pixels")
 
 
+def check_png(path: Path) -> None:
+    """Raise DataError for a PNG that has a part that goes on beyond the end of the file: OpenCV makes room for as much
+    as it says, up to 4 GB, before it reads.
+    """
+    size, at, kind = path.stat().st_size, len(b"\x89PNG\r\n\x1a\n"), b""
+    with open(path, "rb") as file:
+        while at < size and kind != b"IEND":
+            file.seek(at)
+            head = file.read(8)
+            length, kind = int.from_bytes(head[:4], "big"), head[4:]
+            at += 12 + length
+    if at > size:
+        raise DataError(f"{path}: not an image that can be read (it is cut short); remove it or write it anew")
+
+
 def first_line(error: Exception) -> str:
     """What an error of others says, as a clause."""
     return (str(error).splitlines() or [type(error).__name__])[0][:200]

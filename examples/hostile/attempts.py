@@ -141,6 +141,7 @@ def main(name: str, place: str, first: int, count: int) -> None:
     faulthandler.enable(sys.stderr)
     attempts = Attempts(name, folder)
     warnings.simplefilter("error")
+    warnings.filterwarnings("ignore", "Reading `.npy` or `.npz` file required")  # (numpy's word on files of Python 2)
     attempts.limit()
     for number in range(first, first + count):
         with open(folder / "current", "w") as current:

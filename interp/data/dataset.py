@@ -28,6 +28,7 @@ from vid2ev.cluster.task import Task, Tell
 from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.conversion import telling
+from vid2ev.errors import DiskError
 from vid2ev.recording.disk import lock, sync, whole_file, writing
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
@@ -124,7 +125,7 @@ def _told(coming: Iterator[Made], count: int, report: Report | None) -> Iterator
 
 
 def make_scene(scene: Scene, folder: Path, layout: str, multiple: int, tell: Tell | None = None) -> Made:
-    """One recording in a folder, if it is not there yet."""
+    """One recording in a folder, if it is not there yet.  Raises DiskError, which is no fault of the scene."""
     target = folder / scene.name
     source = target if layout == "own" else folder / "parts" / scene.name
     try:
@@ -139,6 +140,8 @@ def make_scene(scene: Scene, folder: Path, layout: str, multiple: int, tell: Tel
                 write_sequence(Own(source), target, layout)
                 shutil.rmtree(source)
         return Made(scene.name, facts_of(target, multiple, scene))
+    except DiskError:
+        raise
     except (DataError, UsageError) as error:
         return Made(scene.name, {}, str(error))
 
@@ -181,7 +184,8 @@ def _facts(job: dict[str, Any], spec: DatasetSpec, made: list[Made]) -> dict[str
 
 def _publish(made_in: Path, directory: Path, facts: dict[str, Any]) -> None:
     """Put a finished data set in its place, at once."""
-    shutil.rmtree(made_in / "parts", ignore_errors=True)
+    for begun in (made_in / "parts", *made_in.glob("*.partial")):  # (of scenes left out, or killed as they were done)
+        shutil.rmtree(begun, ignore_errors=True)
     for name, text in ((FACTS, json.dumps(facts, indent=2)), ("README.md", card_text(facts))):
         with whole_file(made_in / name) as file:
             file.write(f"{text.rstrip()}\n".encode())

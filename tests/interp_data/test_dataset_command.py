@@ -20,6 +20,7 @@ from interp.data.layouts.own import Own
 from interp.data.recorded import clip_of
 from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
+from vid2ev.errors import DiskError
 
 QUICK = {"count": 2, "size": (32, 24), "frames": 3}
 
@@ -101,6 +102,28 @@ def test_a_film_that_is_too_short_is_refused(film: Path, tmp_path: Path) -> None
     with pytest.raises(UsageError, match="expected at least"):
         write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), slowdown=10))
     assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scene that cannot be made is left out; one that cannot be written is made when there is room again."""
+    from interp.data import dataset as module
+
+    spec, real, made = DatasetSpec(videos=(str(film),), frames=2, count=2), module.convert, list[object]()
+
+    def full(*arguments: object, **options: object) -> None:
+        made.append(arguments)
+        if len(made) == 2:
+            (tmp_path / "set.partial" / "begun.partial").mkdir()
+            raise DiskError("no room")
+        real(*arguments, **options)
+
+    monkeypatch.setattr(module, "convert", full)
+    with pytest.raises(DiskError):
+        write_dataset(tmp_path / "set", spec)
+    assert not (tmp_path / "set").exists()
+    facts = write_dataset(tmp_path / "set", spec, resume=True)
+    assert facts["scenes"] == 2 and not facts["left_out"] and len(made) == 3
+    assert {path.name for path in (tmp_path / "set").iterdir()} == {*facts["of_scenes"], "README.md", "dataset.json"}
 
 
 @pytest.mark.parametrize("layout", ["hsergb", "bsergb"])

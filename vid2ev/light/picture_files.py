@@ -17,8 +17,8 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.primaries import Primaries, primaries_at
-from vid2ev.light.recognise import EXR, TIFF, head_of
-from vid2ev.untrusted import LARGEST, check_exr, first_line
+from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
+from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
 
@@ -70,6 +70,8 @@ def _read(path: Path, page: int, head: bytes, count: int = 1) -> list[np.ndarray
     """Pictures from a page on, as many as there are up to `count`.  Raises DataError if there is none."""
     import cv2
 
+    if head.startswith(PNG):
+        check_png(path)
     flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
     level, too_large = cv2.utils.logging.getLogLevel(), False
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)

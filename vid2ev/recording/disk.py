@@ -14,7 +14,7 @@ from typing import IO
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, DiskError, UsageError
 
 
 def lock(folder: Path) -> int:
@@ -75,13 +75,13 @@ def whole(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing(path: Path, remedy: str = "make room or access there") -> Iterator[None]:
-    """What goes wrong with the disk within becomes one sentence: DataError, with the remedy."""
+    """What goes wrong with the disk within becomes one sentence: DiskError, with the remedy."""
     try:
         yield
     except (DataError, UsageError):
         raise
     except OSError as error:
-        raise DataError(f"{path} cannot be written: {error.strerror or error}; {remedy}") from error
+        raise DiskError(f"{path} cannot be written: {error.strerror or error}; {remedy}") from error
 
 
 def sync(path: Path) -> None:
