@@ -11,8 +11,11 @@ from interp.evaluate.kept import Kept
 from interp.train.run_folder import RunFolder
 from vid2ev import Dvs, convert, load_sensor
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.event_file import Recording
+from vid2ev.outputs import Outputs
 from vid2ev.recording.disk import put_in_place
 from vid2ev.recording.folder import partial_of
+from vid2ev.stream.events import Events
 
 CLIP = "synthetic:moving-edge,size=16x12,fps=100,duration_s=0.08"
 OPTIONS = {"overrides": ["frame_rate_hz=900", "delay_us=3000"], "threads": 1, "piece": 3 << 18}
@@ -74,6 +77,15 @@ def test_a_checkpoint_that_is_cut_short_is_one_sentence(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DataError, match=r"checkpoint.npz is damaged, or not of this recording \(BadZipFile\)"):
         convert(CLIP, tmp_path / "out", resume=True, **OPTIONS)
+
+
+@pytest.mark.parametrize("kind", ["hdf5", "evt3", "csv"])
+def test_events_that_cannot_be_are_not_written(kind: str, tmp_path: Path) -> None:
+    """As a checkpoint with another time in it leaves them."""
+    one = np.ones(2, np.uint8)
+    held = Events(np.array([9, 3]), one.astype(np.uint16), one.astype(np.uint16), one)
+    with pytest.raises(DataError, match="--overwrite starts again"):
+        Outputs(formats=(kind,)).write(tmp_path, Recording((16, 12), 0, 10, 2, lambda: iter([held])))
 
 
 def test_a_sensor_takes_no_state_of_another_kind() -> None:

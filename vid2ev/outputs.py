@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.formats.frame_index import FrameIndex
@@ -120,11 +120,19 @@ class Outputs:
         return files + ["noise_maps.npz"] * self.noise_maps + ["preview.mp4"] * self.preview + ["manifest.json"]
 
     def write(self, folder: Path, recording: Recording) -> None:
-        """Write the files of a recording, but for the preview.  Raises OSError."""
+        """Write the files of a recording, but for the preview.
+
+        Raises OSError, DataError for events that cannot be: what was kept of them to go on from was damaged.
+        """
         files = self.files()
         for kind in self.kinds():
             assert kind.write is not None
-            kind.write(folder / files[kind.name], recording)
+            try:
+                kind.write(folder / files[kind.name], recording)
+            except ValueError as error:
+                raise DataError(
+                    f"{folder}: {error}; what was kept to go on from is damaged, --overwrite starts again"
+                ) from error
         if recording.frame_us is not None and "hdf5" not in self.formats:  # (which has it inside)
             write_frame_index(folder / FRAME_INDEX, recording)
         if self.frames is not None:
