@@ -19,6 +19,11 @@ from safetensors import safe_open
 from interp import pretrained, weights
 from interp.train.curves import read_curve
 
+SCORES = {
+    "hdr": "PSNR in decades of light, beyond the range of the frames / SSIM",
+    "firenet": "PSNR-255 / SSIM, brought to the truth's mean and contrast",
+}
+
 
 @click.command()
 @click.argument("run", type=click.Path(exists=True, file_okay=False, path_type=Path))
@@ -71,7 +76,7 @@ def _card(
         "",
         "## Validation",
         "",
-        *_validation(run, best),
+        *_validation(run, best, SCORES.get(job["network"], "PSNR-255 / SSIM")),
     ]
     for report in reports:
         summary = json.loads((report / "summary.json").read_text())
@@ -79,14 +84,14 @@ def _card(
     return "\n".join(lines) + "\n"
 
 
-def _validation(run: Path, best: int) -> list[str]:
+def _validation(run: Path, best: int, measured: str) -> list[str]:
     """The scores of the best validation beside those of what needs no training."""
     others = json.loads((run / "baselines.json").read_text())
     row = next(row for row in read_curve(run / "validation.csv") if int(row["step"]) == best)
     groups = [key.removesuffix(".psnr") for key in row if key.endswith(".psnr")]
     found = {name: {group: (of[group]["psnr"], of[group]["ssim"]) for group in groups} for name, of in others.items()}
     found["**these weights**"] = {group: (float(row[f"{group}.psnr"]), float(row[f"{group}.ssim"])) for group in groups}
-    lines = [f"| PSNR-255 / SSIM | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
+    lines = [f"| {measured} | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
     for name, of in found.items():
         lines.append(f"| {name} | {' | '.join(f'{psnr:.2f} / {ssim:.3f}' for psnr, ssim in of.values())} |")
     return lines

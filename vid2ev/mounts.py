@@ -119,8 +119,12 @@ class Mount:
         if device.name != "cpu":
             from vid2ev.sensors.dvs_on_card import DvsOnCard
 
-            return DvsOnCard(spec, self.size, self.seed, memory=device.memory, camera=number, labels=labels)
-        return Dvs(spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part)
+            return DvsOnCard(
+                spec, self.size, self.seed, camera=number, labels=labels, memory=device.memory, origin_ns=0
+            )
+        return Dvs(
+            spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part, origin_ns=0
+        )
 
     def cis(self, threads: int = 1, device: Device = CPU) -> Cis:
         """The frame sensor, before its first frame."""

@@ -5,9 +5,10 @@
     else     the frame
 
 `before` is what was found at the frame before.  What a pixel showed while it was within the range is carried on for as
-long as it is beyond.  What was never within begins as it is beyond the range on average, a third above its top, at a
-third of its bottom (60 scenes and photographs, seen by sensors of the paper's ranges: +0.3 and -1.2 nat, medians of the
-mean), and moves as its events and the range allow.
+long as it is beyond.  What was never within begins as it is beyond the range on average, and moves as its events
+and the range allow: a third above the top (60 scenes and photographs, seen by sensors of the paper's ranges: +0.3 nat,
+the median of the mean), and a nat below the bottom, the mean of the log of light that is even between 0 and there
+(measured: -1.2).
 
 Noise of events adds up, and the ends of the range let it go one way only, so that a pixel which is beyond for long
 would drift off.  The distance from that average [nat] shrinks by a fiftieth per frame: shot noise of 5 events/s of
@@ -26,7 +27,7 @@ from interp.precision import in_full_precision
 TOP, BOTTOM = 0.985, 5e-4  # of the range: three standard deviations below its top of the largest noise of the paper's
 # sensors (5.2 LSB of 10 bits), and two codes of 8 bits above its bottom
 DARK, AROUND_PX = 0.0025, 5  # that noise, cut off at 0, is 0.002 in the mean; over so many pixels across
-ABOVE, BELOW = math.log(4 / 3), -math.log(3)  # from the top, from the bottom [nat]
+ABOVE, BELOW = math.log(4 / 3), -1.0  # from the top, from the bottom [nat]
 KEPT = 0.98
 DARKEST, BRIGHTEST = 1e-6, 1e3  # of diffuse white
 
@@ -42,20 +43,21 @@ def carried(
     limits   [B, 2] light of the lowest and the highest code; 0 and 1 unless given
     """
     bottom, top = _ends(frame, limits)
-    above, below = frame >= top, (frame <= bottom) | _dark(frame, bottom, top)
+    above, low = frame >= top, frame <= bottom + (1 - TOP) * (top - bottom)
+    below = (frame <= bottom) | (low & (_around(frame) <= bottom + DARK * (top - bottom)))
     if before is None:
         before = torch.where(above, top * math.exp(ABOVE), torch.where(below, bottom * math.exp(BELOW), frame))
     nats = torch.log(before.clamp(DARKEST, BRIGHTEST)) + change
+    below = below | (low & (nats < bottom.log()))  # (what was below is so until events or more than noise lift it)
     over = _pulled(nats - top.log(), ABOVE).clamp(min=0) + top.log()
     under = _pulled(nats - bottom.log(), BELOW).clamp(max=0) + bottom.log()
     found = torch.where(above, over, under).exp().clamp(DARKEST, BRIGHTEST)
     return torch.where(above | below, found, frame), above | below
 
 
-def _dark(frame: torch.Tensor, bottom: torch.Tensor, top: torch.Tensor) -> torch.Tensor:
-    """Where noise of the sensor lifts single pixels from the bottom of the range."""
-    mean = F.avg_pool2d(frame, AROUND_PX, 1, AROUND_PX // 2, count_include_pad=False)
-    return (frame <= bottom + (1 - TOP) * (top - bottom)) & (mean <= bottom + DARK * (top - bottom))
+def _around(frame: torch.Tensor) -> torch.Tensor:
+    """The mean around each pixel: noise of the sensor lifts single pixels from the bottom of the range."""
+    return F.avg_pool2d(frame, AROUND_PX, 1, AROUND_PX // 2, count_include_pad=False)
 
 
 def _pulled(nats: torch.Tensor, usual: float) -> torch.Tensor:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from interp import pretrained
 from interp.commands.making import bar, contrast_of, kept
 from vid2ev.commands.worker_options import worker_options
 
@@ -34,8 +35,10 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 )  # fmt: skip
 @click.option("--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS", help="Of `vid2ev train`.")
 @click.option(
-    "--hdr", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
-    help="Of `vid2ev train --network hdr`: gives all frames, key frames too, the range that events show.",
+    "--hdr", type=click.Path(exists=True, dir_okay=False), metavar="[WEIGHTS]", is_flag=False,
+    flag_value=pretrained.first(pretrained.HDR),
+    help="Give all frames, key frames too, the range that events show; by weights of `vid2ev train --network hdr`, or"
+    " by those that come with vid2ev.",
 )  # fmt: skip
 @click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR",
     help="What to make; of several sources the folder for all.  [default: NAME_x8.mp4 here]",

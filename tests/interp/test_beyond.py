@@ -47,7 +47,7 @@ def test_light_that_leaves_the_range_is_followed_and_found_again(scale: float) -
 def test_what_was_never_within_begins_as_it_is_on_average() -> None:
     made, beyond = carried(torch.tensor([0.1, 0.5, 0.6])[None, None, None], one(0.0), None, torch.tensor([[0.1, 0.6]]))
     assert beyond.flatten().tolist() == [True, False, True]
-    assert made.flatten().tolist() == pytest.approx([(0.1 + BOTTOM * 0.5) / 3, 0.5, (0.1 + TOP * 0.5) * 4 / 3])
+    assert made.flatten().tolist() == pytest.approx([(0.1 + BOTTOM * 0.5) / math.e, 0.5, (0.1 + TOP * 0.5) * 4 / 3])
 
 
 @given(st.lists(st.tuples(st.floats(-0.2, 1.3), st.floats(-30, 30)), min_size=1, max_size=20))

@@ -14,15 +14,12 @@ from vid2ev.physics.log_curve import log_level, log_level_32
 @inner
 def settle_lanes(block, light, first, count, p0, t_ns, bad, random_phase, planes, flags, num, work):
     """Pixels first ... first + count - 1 of a block of zeros, at most LANE_COUNT, after a long time in their light
-    [count]: no lags, levels about the signal; crossings are counted from the microsecond on in which that is."""
+    [count]: no lags, levels about the signal."""
     lanes, pixels, own, p1 = work.lanes, work.pixels, block[first:], p0 + first
     inputs = own[INPUT * PITCH : INPUT * PITCH + count]
     see_signals(own, inputs, light, lanes, count, flags, num)
     for j in range(count):
         pixels[j], work.live[j] = p1 + j, j
-    if len(flags.crossing_noise):
-        for j in range(count):
-            planes.count[p1 + j] = np.uint32(t_ns // 1000)
     fresh_thresholds(lanes, pixels, work.live, count, planes, flags, num)
     if random_phase:
         for j in range(count):

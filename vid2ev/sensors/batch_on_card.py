@@ -12,7 +12,7 @@ from vid2ev.errors import UsageError
 from vid2ev.sensors.batch import cameras_of
 from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.clock import Clock, Step, pace_of
+from vid2ev.sensors.clock import Clock, Step, first_count, pace_of
 from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
 from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.pixel_planes import pixel_planes
@@ -60,11 +60,15 @@ class DvsBatchOnCard:
         phases = [spec.random_phase for spec in specs]
         self._walk = CardWalk(self._memory, self._flags, self._numbers, size, planes, bad, phases)
         self._clocks: list[Clock] = []
+        self._origins: list[int] = []  # what noise by count is counted from: the first frames [ns]
 
     def restart(self, light: Any, t_ns: Sequence[int]) -> None:
         """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips]."""
-        self._clocks = [Clock(int(t)) for _, t in zip(self._numbers, t_ns, strict=True)]
-        self._walk.settle(light, [clock.t_ns for clock in self._clocks])
+        times = [int(t) for _, t in zip(self._numbers, t_ns, strict=True)]
+        self._origins = self._origins or times
+        counts = [first_count(t, origin) for t, origin in zip(times, self._origins, strict=True)]
+        self._clocks = [Clock(t, count) for t, count in zip(times, counts, strict=True)]
+        self._walk.settle(light, times, counts)
 
     def steps(self, light: Any, t_ns: Any) -> CardEvents:
         """Advance all through frames of light [frames, clips, height, width], linear, at t_ns [frames, clips].

@@ -11,7 +11,7 @@ from vid2ev.kernels.cuda.clips import Candidates, Clips, Listed, Sent, Start, To
 from vid2ev.kernels.layout import TALLIES, Flags, Numbers, Planes
 from vid2ev.kernels.rows import interval_row, sensor_row
 from vid2ev.sensors.card_events import CardEvents, CardSent, Moments, events_of, sent_of
-from vid2ev.sensors.clock import Step
+from vid2ev.sensors.clock import Step, as_counted
 from vid2ev.sensors.proposed import none_proposed, proposed
 
 
@@ -60,8 +60,13 @@ class CardWalk:
         """What has been counted (`layout.TALLIES`)."""
         return self.memory.get(self._totals.counts)
 
-    def settle(self, light: Any, t_ns: Sequence[int]) -> None:
-        """Settle each sensor in a frame of its light [clips, height, width] at its t_ns."""
+    def settle(self, light: Any, t_ns: Sequence[int], counts: Sequence[int]) -> None:
+        """Settle each sensor in a frame of its light [clips, height, width] at its t_ns, where crossings are counted
+        from its count."""
+        if len(self._planes.count) > 1:
+            for k, count in enumerate(counts):
+                first = self.memory.put(np.array([as_counted(count)]))
+                self._planes.count[k * self._pixels : (k + 1) * self._pixels] = first
         start = Start(self.memory.put(np.array(t_ns, np.int64)), self._bad, self._phase)
         seen = self._clips(self.memory.light(light).reshape(1, len(self._numbers), self._pixels), [], np.zeros((1, 1)))
         self.memory.launch(self._kernels.settle, self._total, seen, start, self._planes, self._totals)

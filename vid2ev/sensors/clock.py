@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vid2ev.kernels.layout import Flags, Interval, Numbers
 from vid2ev.sensors.compiled import interval_of
 
@@ -16,14 +18,10 @@ def pace_of(num: Numbers) -> tuple[float, ...]:
 
 
 class Clock:
-    """The clock of a sensor that has settled at t_ns.
+    """The clock of a sensor that has settled at t_ns, where steps are counted from `step`."""
 
-    Steps are counted from the microsecond on in which that is, so that their noise depends on nothing before it, and
-    no two have one number.
-    """
-
-    def __init__(self, t_ns: int, step: int | None = None, leak_since_ns: int | None = None, fresh_noise: bool = True):
-        self.t_ns, self.step, self.fresh_noise = t_ns, t_ns // 1000 if step is None else step, fresh_noise
+    def __init__(self, t_ns: int, step: int, leak_since_ns: int | None = None, fresh_noise: bool = True):
+        self.t_ns, self.step, self.fresh_noise = t_ns, step, fresh_noise
         self.leak_since_ns = t_ns if leak_since_ns is None else leak_since_ns
 
     def __eq__(self, other: object) -> bool:
@@ -38,3 +36,17 @@ class Clock:
         interval = interval_of(flags, num, self.t_ns, t_ns, self.leak_since_ns, self.step, self.fresh_noise)
         self.t_ns, self.step, self.fresh_noise = t_ns, self.step + 1, not interval.noise_resolved
         return interval, risen
+
+
+def first_count(t_ns: int, origin_ns: int) -> int:
+    """What a sensor that settles at t_ns counts steps and crossings from: the microseconds since the origin.
+
+    So what is drawn by count depends on nothing before a cut, and hardly ever twice on one number; and a clip that
+    begins later has the same noise later.
+    """
+    return (t_ns - origin_ns) // 1000
+
+
+def as_counted(count: int) -> np.uint32:
+    """The count as pixels have it."""
+    return np.uint32(count & 0xFFFFFFFF)

@@ -15,7 +15,7 @@ from vid2ev.kernels.rows import interval_rows
 from vid2ev.kernels.work import new_work
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
-from vid2ev.sensors.clock import Clock, Step
+from vid2ev.sensors.clock import Clock, Step, as_counted, first_count
 from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.intake import Intake
@@ -52,6 +52,8 @@ class Dvs:
     skip      let strips of pixels sleep in which nothing can happen; changes nothing but the time it takes
               (`vid2ev.kernels.sleep`)
     part      pixels, in blocks of 2048, that are simulated; the others send nothing, and these what they always do
+    origin_ns   instant from which noise by count is counted: the same for parts of one recording; the first frame's
+              unless given
 
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
@@ -70,6 +72,7 @@ class Dvs:
         transfer: str | None = None,
         skip: bool = True,
         part: Part = WHOLE,
+        origin_ns: int | None = None,
     ):
         check_sensor(size, seed, camera, threads)
         width, height = size
@@ -78,6 +81,7 @@ class Dvs:
         self._tiles = Tiles(-(-width * height // BLOCK), threads, part)
         self._work = [new_work() for _ in range(self._tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
+        self._first_ns = origin_ns
         self._be(spec, seed, camera)
 
     def _be(self, spec: DvsSpec, seed: int, camera: int, flags: Flags | None = None, old: Planes | None = None) -> None:
@@ -90,6 +94,7 @@ class Dvs:
         self._tallies = np.zeros((self._tiles.count, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
+        self._origin_ns = self._first_ns
         self._seen: np.ndarray | None = None  # the light of the last frame, as it was given
         self._leak_since_ns = 0
         self._step = 0
@@ -157,7 +162,7 @@ class Dvs:
 
         There are no events in (previous frame, this frame]; only fixed-rate mode may return some, held back from
         before.  What follows is what a new sensor of the same seed would send whose first frame this is (but for fixed
-        rate, whose event frames go on): noise is drawn by time, or by count from t_ns on.  Raises UsageError as `step`
+        rate, whose event frames go on) and which counts from the same origin.  Raises UsageError as `step`
         does.
         """
         self._intake.check(np.shape(light))
@@ -166,8 +171,10 @@ class Dvs:
         if self._t_ns is None and self._frames is not None:
             self._frames.origin_us = int(t_ns) // 1000
         t_ns = self._later(t_ns, self._t_ns)
-        self._settle(flat, table, t_ns)
-        self._be_at(Clock(t_ns))
+        self._origin_ns = t_ns if self._origin_ns is None else self._origin_ns
+        count = first_count(t_ns, self._origin_ns)
+        self._settle(flat, table, t_ns, count)
+        self._be_at(Clock(t_ns, count))
         if self._delayed is not None:
             self._delayed.forget()
         released = Events.empty(self.labels)
@@ -203,7 +210,7 @@ class Dvs:
             return {}
         self._rouse(np.arange(strip_count(*self.size)))
         state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
-        numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise)]
+        numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise), self._origin_ns]
         state["clock"] = np.array(numbers, np.int64)
         state["tallies"] = self._tallies.sum(axis=0)
         state["polarities"] = self._polarities.copy()
@@ -216,12 +223,12 @@ class Dvs:
         self._sleep.forget()
         self._seen = None
         if not state:
-            self._t_ns = None
+            self._t_ns, self._origin_ns = None, self._first_ns
             return
         for name in STATE_PLANES:
             plane = getattr(self._planes, name)
             plane[...] = entry(state, name, plane.dtype, plane.shape)
-        self._t_ns, self._leak_since_ns, self._step, fresh = clock(state, "clock", 4)
+        self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = clock(state, "clock", 5)
         self._fresh_noise = bool(fresh)
         self._tallies[...] = 0
         self._tallies[0] = entry(state, "tallies", self._tallies.dtype, self._tallies.shape[1:])
@@ -279,7 +286,7 @@ class Dvs:
         """Light [..., height, width] as the walk takes it, with the table of its codes."""
         return self._intake.flat(light)
 
-    def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int) -> None:
+    def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int, count: int) -> None:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
                 first, last, self._bad.size, flat[0], table, t_ns, self._bad, self.spec.random_phase, self._planes,
@@ -287,6 +294,7 @@ class Dvs:
             )  # fmt: skip
 
         self._sleep.forget()
+        self._planes.count[...] = as_counted(count)
         self._tiles.each_blocks(settle)
         self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
 

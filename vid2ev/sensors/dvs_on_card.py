@@ -45,8 +45,10 @@ class DvsOnCard(Dvs):
         camera: int = 0,
         labels: bool = False,
         transfer: str | None = None,
+        origin_ns: int | None = None,
     ):
-        super().__init__(spec, size, seed, camera=camera, labels=labels, transfer=transfer, skip=False)
+        options: dict[str, Any] = {"labels": labels, "transfer": transfer, "origin_ns": origin_ns}
+        super().__init__(spec, size, seed, camera=camera, skip=False, **options)
         self._memory = memory
         self._load()
 
@@ -134,8 +136,8 @@ class DvsOnCard(Dvs):
             raise UsageError(f"light of type {light.dtype}: expected a tensor of floating point, which is linear light")
         return light, np.empty(0, np.float32)
 
-    def _settle(self, flat: Any, table: np.ndarray, t_ns: int) -> None:
-        self._card.settle(flat, [t_ns])
+    def _settle(self, flat: Any, table: np.ndarray, t_ns: int, count: int) -> None:
+        self._card.settle(flat, [t_ns], [count])
 
     def _planes_of_pixels(self) -> Any:
         return pixel_planes([self._planes], self._flags, self._bad.size)
