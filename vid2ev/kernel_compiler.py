@@ -7,13 +7,18 @@ effects are on.  numba prunes branches that are constant before it infers types,
 **Inner functions.** numba optimises each function and makes machine code of it, and again wherever it is called.  What
 only kernels call is here made ready to be inlined, and no more.
 
+**Caches.** numba compiles a function again where its own file has changed, but not where one has that it calls.  Here
+a kernel is of one version of all files that kernels are made of.
+
 **Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
 """
 
 from __future__ import annotations
 
+import functools
 import gc
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from numba import _dynfunc, njit  # type: ignore[attr-defined]
@@ -28,23 +33,38 @@ from numba.core.untyped_passes import RewriteSemanticConstants
 from vid2ev.kernel_flags import Numba, pass_over_flags
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+MADE_OF = ("kernels", "physics", "scenes/rays", "stream")
 INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
 
 
 def compiled(function: Callable) -> Any:
     """A kernel: compiled and cached, for Python and other kernels to call."""
-    return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function))
+    return of_this_version(of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function)))
 
 
 def inlined(function: Callable) -> Any:
     """A law that is put into what calls it, however long it is: so a loop over pixels that does is vector code."""
     options = OPTIONS | {"forceinline": True}
-    return of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **options)(function))
+    return of_this_version(of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **options)(function)))
 
 
 def inner(function: Callable) -> Any:
     """A part of kernels, which only they can call."""
     return of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))
+
+
+def of_this_version(dispatcher: Any) -> Any:
+    """The same; what was compiled of other files is compiled again."""
+    dispatcher._cache._cache_file._source_stamp = source_stamp()
+    return dispatcher
+
+
+@functools.cache
+def source_stamp() -> tuple[tuple[str, int, int], ...]:
+    """Names, times and sizes of the files that kernels are made of."""
+    package = Path(__file__).parent
+    files = [*package.glob("kernel_*.py"), *(each for part in MADE_OF for each in (package / part).glob("*.py"))]
+    return tuple(sorted((file.name, (stat := file.stat()).st_mtime_ns, stat.st_size) for file in files))
 
 
 def of_plain_types(dispatcher: Any) -> Any:
