@@ -115,7 +115,7 @@ def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(sensor: str, n
     spec = load_sensor(sensor, [noise, "photoreceptor_tau_us=300", "follower_tau_us=100"])
     rng = np.random.default_rng(1)
     first, second, third = (rng.uniform(0.1, 1, (12, 20)).astype(F) for _ in range(3))
-    old, new = Dvs(spec, (20, 12), seed=3), Dvs(spec, (20, 12), seed=3)
+    old, new = Dvs(spec, (20, 12), seed=3), Dvs(spec, (20, 12), seed=3, origin_ns=0)
     old.step(first, 0)
     assert len(old.step(second, 10**7)) > 0
     for dvs in (old, new):
