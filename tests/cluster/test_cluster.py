@@ -113,3 +113,9 @@ def test_what_cannot_be_meant_is_said_in_words(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(workers_module, "has_dask", lambda: False)
     with pytest.raises(UsageError, match=r"pip install 'vid2ev\[cluster\]'"), Workers(2).client():
         pass
+
+
+def test_two_programs_share_work_out_at_once() -> None:
+    # (each says in an error if it finds a port taken; what Dask says of that is an error in tests)
+    with Workers(jobs=1).client() as one, Workers(jobs=1).client() as other:
+        assert [one.submit(int, "1").result(), other.submit(int, "2").result()] == [1, 2]

@@ -88,7 +88,8 @@ class Workers:
         with dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries}):
             cluster = LocalCluster(
                 n_workers=self.jobs, threads_per_worker=1, memory_limit=memory, host="127.0.0.1",
-                dashboard_address=None, silence_logs=logging.CRITICAL, env=threads, preload="vid2ev.cluster.deaf",
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},  # (or else one fixed port)
+                silence_logs=logging.CRITICAL, env=threads, preload="vid2ev.cluster.deaf",
             )  # fmt: skip
         with cluster, Client(cluster) as client:
             yield client
