@@ -15,7 +15,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import code_table
-from vid2ev.recording.exposures import KINDS, ExposureFiles, read_codes, write_codes
+from vid2ev.recording.exposures import KINDS, ExposureFiles, read_codes, read_spans, write_codes
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sources import open_source
@@ -184,6 +184,16 @@ def test_finishing_may_be_repeated(tmp_path: Path) -> None:
     again = files(tmp_path / "work")
     again.keep(4)
     assert again.finish(into) == ["raw", "frames", "frames.mp4"] and contents(into) == want
+
+
+def test_what_is_finished_does_not_grow_with_what_it_was_made_of(tmp_path: Path) -> None:
+    folder = written(tmp_path, exposures(3), ["png"])
+    growing = [path for path in tmp_path.rglob("timestamps.txt") if folder not in path.parents]
+    assert growing
+    for path in growing:
+        with open(path, "a", encoding="ascii") as file:
+            file.write("7")
+    assert read_spans(folder / KINDS["png"] / "timestamps.txt").shape == (3, 2)
 
 
 def test_without_links_files_are_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -163,8 +163,12 @@ def read_codes(path: Path) -> np.ndarray:
 
 
 def _linked(source: str, target: str) -> None:
-    """The same file under a second name, or where there are no such names a copy."""
+    """The same file under a second name; a copy where there are no such names, and of what grows: a recording that is
+    finished shares nothing with what may still be written to."""
     try:
-        os.link(source, target)
+        if Path(source).name != TIMESTAMPS:
+            os.link(source, target)
+            return
     except OSError:
-        shutil.copyfile(source, target)
+        pass
+    shutil.copyfile(source, target)
