@@ -31,6 +31,7 @@ from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
+from vid2ev.sources import open_source
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.untrusted import LARGEST, PATHS, beside, most_bytes
 
@@ -284,3 +285,15 @@ def test_what_a_manifest_lacks_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(UsageError), as_stated(tmp_path / "m.json"):
         raise UsageError("as it is")
     assert issubclass(DataError, Vid2evError)
+
+
+@pytest.mark.parametrize("name", ["clip.npy", "clip.npz"])
+def test_an_array_whose_header_has_numbers_for_names_is_one_sentence(name: str, tmp_path: Path) -> None:
+    array = tmp_path / "clip.npy"
+    np.save(array, np.ones((3, 4, 5), np.float32))
+    array.write_bytes(array.read_bytes().replace(b"'descr'", b"1234567"))  # (which numpy cannot put in order)
+    if name == "clip.npz":
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            archive.write(array, "frames.npy")
+    with pytest.raises(DataError, match=r"clip.*write it with numpy"):
+        open_source(tmp_path / name, fps=10)

@@ -73,6 +73,19 @@ def json_of(text: str | bytes) -> Any:
         raise ValueError("nested too deeply") from error
 
 
+def array_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether it is stored column by column, and type of the array of a .npy file that is at its start.
+
+    Raises ValueError for what is none.
+    """
+    version = npy.read_magic(file)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    try:
+        return read(file)  # type: ignore[no-any-return]
+    except TypeError as error:  # (numpy puts the names in there in order without looking what they are)
+        raise ValueError("no header of an array") from error
+
+
 def read_array(file: BinaryIO, path: Path | str) -> np.ndarray:
     """The array of a .npy file that is at its start.
 
@@ -80,9 +93,7 @@ def read_array(file: BinaryIO, path: Path | str) -> np.ndarray:
     objects, too.
     """
     begin = file.tell()
-    version = npy.read_magic(file)
-    header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, _, dtype = header(file)
+    shape, _, dtype = array_header(file)
     check_bytes(path, math.prod(shape) * max(dtype.itemsize, 1), f"an array of shape {list(shape)[:9]}")
     file.seek(begin)
     return npy.read_array(file, allow_pickle=False)

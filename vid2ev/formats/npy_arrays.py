@@ -10,6 +10,8 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 from numpy.lib import format as npy
 
+from vid2ev.untrusted import array_header as header_of
+
 PART = 1 << 18  # rows read at a time
 MOST_OF_A_PART = 1 << 25  # bytes of them
 LARGEST_ROW = 1 << 12  # bytes
@@ -48,9 +50,7 @@ def open_array(file: Any) -> Array:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # (of headers that Python 2 wrote)
-        version = npy.read_magic(file)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = read(file)
+        shape, fortran, dtype = header_of(file)
     row = int(np.prod([1, *shape[1:]], dtype=object)) * dtype.itemsize
     if dtype.hasobject or not 0 < row <= LARGEST_ROW or (fortran and len(shape) > 1):
         raise ValueError(f"{shape}, {dtype}")

@@ -25,7 +25,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.untrusted import check_bytes, read_array
+from vid2ev.untrusted import array_header, check_bytes, read_array
 
 Shape = tuple[int, ...]
 Read = Callable[[int], np.ndarray]
@@ -33,7 +33,8 @@ Read = Callable[[int], np.ndarray]
 FRAMES = ("frames", "images", "video", "light", "arr_0")
 TIMES = re.compile(r"(?:t|times|timestamps)(?:_(s|ms|us|ns))?")
 BROKEN = (  # what numpy and zipfile raise for damaged files
-    OSError, ValueError, EOFError, KeyError, RuntimeError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
+    OSError, ValueError, TypeError, EOFError, KeyError,
+    RuntimeError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 
 
@@ -125,9 +126,7 @@ class NpzStack:
         """Shape, type and whether it is stored column by column, of an array; and where its data begins."""
         try:
             with archive.open(f"{name}.npy") as member:
-                version = np.lib.format.read_magic(member)
-                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                shape, transposed, dtype = read(member)
+                shape, transposed, dtype = array_header(member)  # type: ignore[arg-type]
                 return (shape, dtype, transposed and len(shape) > 1), member.tell()
         except BROKEN as error:
             raise DataError(f"{self.path}: its array '{name}' cannot be read; write it with numpy.savez") from error
