@@ -33,7 +33,7 @@ from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
-from vid2ev.untrusted import LARGEST, PATHS, beside, most_bytes
+from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes
 
 MEGABYTE = 1 << 20
 
@@ -297,3 +297,9 @@ def test_an_array_whose_header_has_numbers_for_names_is_one_sentence(name: str, 
             archive.write(array, "frames.npy")
     with pytest.raises(DataError, match=r"clip.*write it with numpy"):
         open_source(tmp_path / name, fps=10)
+
+
+def test_numbers_too_large_to_be_one_are_none() -> None:
+    assert json_of('{"a": 1e300}') == {"a": 1e300}
+    with pytest.raises(ValueError, match="1e400 is too large"):
+        json_of('{"a": 1e400}')

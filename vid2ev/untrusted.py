@@ -66,11 +66,19 @@ def check_depth(path: Path, text: str) -> None:
 
 
 def json_of(text: str | bytes) -> Any:
-    """What a text in JSON says.  Raises ValueError for what is none, also for what is nested too deeply."""
+    """What a text in JSON says.  Raises ValueError for what is none, also for what is nested too deeply and for numbers
+    too large to be one."""
     try:
-        return json.loads(text)
+        return json.loads(text, parse_float=_finite)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if math.isinf(number):
+        raise ValueError(f"{text[:20]} is too large for a number")
+    return number
 
 
 def array_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
