@@ -17,7 +17,7 @@ from torch import nn
 from interp.blocks.frozen import Frozen
 from interp.networks import NETWORKS, make
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import json_of
+from vid2ev.untrusted import first_line, json_of
 
 WRAPPERS = ("module.", "_orig_mod.")
 
@@ -52,7 +52,7 @@ def load(path: Path) -> nn.Module:
     except DataError:
         raise
     except Exception as error:  # (of options; of torch, for sizes that cannot be)
-        said = (str(error).splitlines() or [type(error).__name__])[0][:200]
+        said = first_line(error)
         raise DataError(f"{path} is of another version of its network ({said}); train it again") from error
     _fill(network, tensors, path)
     return network.eval()

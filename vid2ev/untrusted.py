@@ -153,9 +153,9 @@ def check_png(path: Path) -> None:
         raise DataError(f"{path}: not an image that can be read (it is cut short); remove it or write it anew")
 
 
-def first_line(error: Exception) -> str:
-    """What an error of others says, as a clause."""
-    return (str(error).splitlines() or [type(error).__name__])[0][:200]
+def first_line(error: Exception, most: int | None = 200) -> str:
+    """What an error of others says, as a clause of at most so many characters; None for all of its first line."""
+    return (str(error).splitlines() or [type(error).__name__])[0][:most]
 
 
 def beside(file: Path, name: str) -> Path:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.untrusted import json_of
+from vid2ev.untrusted import first_line, json_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ def read_clip(path: Path) -> Clip:
     except FileNotFoundError:
         raise
     except Exception as error:  # (numpy has a dozen of its own for damaged headers)
-        said = (str(error).splitlines() or [type(error).__name__])[0][:150]
+        said = first_line(error, 150)
         raise DataError(f"{path} is no clip ({said}); remove it, and it is made again") from error
 
 

@@ -35,7 +35,7 @@ from vid2ev.pictures.film import join_films, write_film
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
-from vid2ev.untrusted import json_of, read_arrays
+from vid2ev.untrusted import first_line, json_of, read_arrays
 
 Kind = Literal["mp4", "png", "exr"]
 PIECE = 128  # pictures
@@ -140,7 +140,7 @@ class Shelf:
         except DataError:
             raise
         except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own)
-            said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+            said = first_line(error, 100)
             raise DataError(f"{path} cannot be read ({said}); --overwrite starts again") from error
 
     @contextmanager
@@ -151,7 +151,7 @@ class Shelf:
         except (Vid2evError, OSError):
             raise
         except Exception as error:  # (the networks are those of others, and what they remember is of any shape)
-            said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+            said = first_line(error, 100)
             raise DataError(
                 f"{self._memory(len(self.done))} does not fit what is asked for ({said}); --overwrite starts again"
             ) from error

@@ -50,9 +50,8 @@ class HdrLearner(Learner):
     def parts(self, batch: Batch) -> objectives.Terms:
         """Terms of the loss, of ratios."""
         made, truth = to_ratios(self.made(batch)), to_ratios(batch["truth"])
-        low, high = batch["range"][:, :, None, None, None, None].unbind(1)
-        beyond = (batch["truth"] < low) | (batch["truth"] > high)
-        return objectives.hdr(made, truth, batch["flows"], batch["flows_to_first"], self.features, beyond)
+        above, below = outside(batch)
+        return objectives.hdr(made, truth, batch["flows"], batch["flows_to_first"], self.features, above | below)
 
     def predicted(self, clip: Batch) -> torch.Tensor:
         """Light [T, C, H, W] of one sequence."""
@@ -64,7 +63,7 @@ class HdrLearner(Learner):
         truth = clip["truth"][0]
         top = to_ratios(truth).amax().clamp(min=1)
         whole = [to_ratios(light) / top for light in (images, truth)]
-        beyond = outside(truth, clip["range"][0])
+        beyond = [_last(each[0]) for each in outside(clip)]
         return [
             Scores(
                 psnr(error[above | below], DECADE),
@@ -103,16 +102,26 @@ def decades(images: torch.Tensor, truth: torch.Tensor) -> np.ndarray:
     """Squared errors [T, H, W, C] of light [T, C, H, W] in decades; what is far below a thousandth of diffuse white is
     black."""
     error = (to_ratios(images.clamp(min=0)) - to_ratios(truth)) * math.log10(1 + RATIOS)
-    return np.moveaxis((error.double() ** 2).cpu().numpy(), 1, -1)
+    return _last(error.double() ** 2)
 
 
-def outside(truth: torch.Tensor, limits: torch.Tensor) -> tuple[np.ndarray, np.ndarray]:
-    """Which values [T, H, W, C] of light [T, C, H, W] are above the range [2] of a frame sensor, and which below."""
-    light, (low, high) = np.moveaxis(truth.cpu().numpy(), 1, -1), limits.tolist()
-    return light > high, light < low
+def outside(batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+    """Which values [B, T, C, H, W] of the truth are above the range of the frame sensor, and which below."""
+    low, high = _ends(batch)
+    return batch["truth"] > high, batch["truth"] < low
 
 
 def seen(batch: Batch) -> torch.Tensor:
     """The light [B, T, C, H, W] that a frame sensor took the frames for."""
-    low, high = batch["range"][:, :, None, None, None, None].unbind(1)
+    low, high = _ends(batch)
     return low + batch["clipped"] * (high - low)
+
+
+def _ends(batch: Batch) -> tuple[torch.Tensor, ...]:
+    """The light [B, 1, 1, 1, 1] of codes 0 and 1."""
+    return batch["range"][:, :, None, None, None, None].unbind(1)
+
+
+def _last(values: torch.Tensor) -> np.ndarray:
+    """Values [T, C, H, W] with channels last."""
+    return values.movedim(1, -1).cpu().numpy()

@@ -31,7 +31,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
-from vid2ev.untrusted import read_text
+from vid2ev.untrusted import first_line, read_text
 
 KINDS = {"raw": "raw", "png": "frames", "mp4": "frames.mp4"}  # and what they are called
 TIMESTAMPS, HEADER = "timestamps.txt", "# start_us end_us\n"
@@ -134,7 +134,7 @@ def read_spans(path: Path) -> np.ndarray:
     except DataError:
         raise
     except (OSError, ValueError, OverflowError) as error:
-        said = (str(error).splitlines() or [type(error).__name__])[0][:100]
+        said = first_line(error, 100)
         raise DataError(f"{path}: cannot be read ({said}); expected two times in us on every line") from error
     if not len(spans) or np.abs(spans.astype(np.float64)).max() >= LATEST_US or np.any(spans[:, 1] < spans[:, 0]):
         raise DataError(f"{path}: {len(spans)} exposures, or one that ends before it begins; make the recording again")

@@ -26,7 +26,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
 from vid2ev.rig.depth import DepthScale, between
-from vid2ev.untrusted import check_exr, read_arrays
+from vid2ev.untrusted import check_exr, first_line, read_arrays
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
 NAMES = ("depth", "depths", "disparity", "disparities")
@@ -120,7 +120,9 @@ def _read_arrays(path: Path) -> np.ndarray:
     except DataError:
         raise
     except Exception as error:  # (damaged archives raise almost anything: of zipfile, zlib, struct, numpy)
-        raise DataError(f"{path}: cannot be read ({_first_line(error)}); write it with numpy.save or savez") from error
+        raise DataError(
+            f"{path}: cannot be read ({first_line(error, None)}); write it with numpy.save or savez"
+        ) from error
 
 
 def _read_exr(path: Path) -> np.ndarray:
@@ -139,8 +141,4 @@ def _read_exr(path: Path) -> np.ndarray:
     except DataError:
         raise
     except Exception as error:  # (the library raises RuntimeError, ValueError and more)
-        raise DataError(f"{path}: not an EXR that can be read ({_first_line(error)})") from error
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
+        raise DataError(f"{path}: not an EXR that can be read ({first_line(error, None)})") from error

@@ -25,6 +25,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.rig.depth import DepthScale, between
+from vid2ev.untrusted import first_line
 
 EXAMPLE = "depth-anything/Depth-Anything-V2-Small-hf"
 METRIC = ("zoedepth", "glpn", "depth_pro")
@@ -97,6 +98,6 @@ def _loaded(name: str) -> tuple[Any, Any]:
         processor = AutoImageProcessor.from_pretrained(name, backend="pil")
         model = AutoModelForDepthEstimation.from_pretrained(name, use_safetensors=True)  # (other files can run code)
     except Exception as error:  # (of the hub, of JSON, of safetensors, of configurations)
-        said = (str(error).splitlines() or [type(error).__name__])[0]
+        said = first_line(error, None)
         raise DataError(f"model:{name} cannot be loaded ({said}); give a folder or a name, as {EXAMPLE}") from error
     return processor, model.eval()

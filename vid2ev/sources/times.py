@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import read_array
+from vid2ev.untrusted import first_line, read_array
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
@@ -157,7 +157,7 @@ def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
     except DataError:
         raise
     except Exception as error:  # (numpy has a dozen of its own for damaged headers)
-        said = (str(error).splitlines() or [type(error).__name__])[0][:200]
+        said = first_line(error)
         raise DataError(f"{path}: cannot be read as a .npy array ({said}); write it with numpy.save") from error
     return stamps_of_array(stamps, path)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from interp.data.layouts.sequence import Placed
 from vid2ev.errors import DataError
-from vid2ev.untrusted import read_arrays
+from vid2ev.untrusted import first_line, read_arrays
 
 SCALE = 32.0
 WRAP = 65536
@@ -114,7 +114,7 @@ def columns_of(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     except DataError:
         raise
     except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own)
-        said = (str(error).splitlines() or [type(error).__name__])[0][:150]
+        said = first_line(error, 150)
         raise DataError(f"{path} is no file of events ({said}); expected an npz of x, y, t, p") from error
     lengths = {len(each) for each in columns}
     if len(lengths) > 1:
