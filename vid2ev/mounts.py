@@ -111,9 +111,15 @@ class Mount:
         return f"{self.name}/" if self.name else ""
 
     def dvs(
-        self, labels: bool = False, threads: int = 1, skip: bool = True, device: Device = CPU, part: Part = WHOLE
+        self,
+        labels: bool = False,
+        threads: int = 1,
+        skip: bool = True,
+        device: Device = CPU,
+        part: Part = WHOLE,
+        kind: type[Dvs] = Dvs,
     ) -> Dvs:
-        """The event sensor, before its first frame; of a part of its pixels on a CPU."""
+        """The event sensor, before its first frame; on a CPU of a part of its pixels, or of another kind."""
         assert isinstance(self.sensor.spec, DvsSpec)
         spec, number = self.sensor.spec, self.number
         if device.name != "cpu":
@@ -122,7 +128,7 @@ class Mount:
             return DvsOnCard(
                 spec, self.size, self.seed, camera=number, labels=labels, memory=device.memory, origin_ns=0
             )
-        return Dvs(
+        return kind(
             spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part, origin_ns=0
         )
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.commands.convert import Auto
+from vid2ev.commands.auto import Auto
 from vid2ev.errors import UsageError
 
 if TYPE_CHECKING:

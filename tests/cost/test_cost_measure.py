@@ -181,6 +181,14 @@ def test_what_cannot_be_meant_is_refused(clip: str, options: dict, said: str) ->
         measured(clip, clock=ticks(), **SIMPLE | options)
 
 
+def test_the_reference_draws_the_noise_that_is_drawn_in_a_stretch_from_the_middle(clip: str) -> None:
+    """Noise by count is counted from one instant in all settings; else it would be the largest of their errors."""
+    noisy = {"sensor": "paper", "overrides": ["crossing_noise=0.05"], "start": 0.06, "given": {"max_subframes"}}
+    found = measured(clip, clock=ticks(), **SIMPLE | noisy)
+    (finest,) = [row for row in found.rows if row.rung.name == "finest"]
+    assert found.reference.events > 1000 and finest.errors.distance < 1e-3
+
+
 def test_what_passes_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     once = SimpleNamespace(source=SimpleNamespace(rewindable=False))
     monkeypatch.setattr(Recipe, "of", lambda **_: once)

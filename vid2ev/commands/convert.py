@@ -5,40 +5,15 @@ from __future__ import annotations
 import json
 import math
 import sys
-import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from vid2ev.commands.auto import Auto
 from vid2ev.commands.source_options import source_options
 from vid2ev.commands.worker_options import worker_options
-from vid2ev.errors import UsageError
-
-if TYPE_CHECKING:
-    from vid2ev.cluster.task import GoOn, Tell
-
-
-class Auto(click.ParamType):
-    """A whole number from `least`, or one word."""
-
-    def __init__(self, word: str, least: int, name: str):
-        self.word, self.least, self.name = word, least, name
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        return f"{self.word}|N"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
-        if value == self.word or isinstance(value, int):
-            return value
-        try:
-            number = int(value)
-        except ValueError:
-            self.fail(f"'{value}' is neither '{self.word}' nor a whole number", param, ctx)
-        if number < self.least:
-            self.fail(f"{number} is less than {self.least}", param, ctx)
-        return number
 
 
 @click.command(short_help="Turn a video into the recording of an event camera.")
@@ -197,6 +172,7 @@ def convert(
     """
     from vid2ev import conversion
     from vid2ev.commands import batch
+    from vid2ev.commands.converting import check_shared, chosen_for, convert_on_worker, convert_one
     from vid2ev.commands.progress import given
     from vid2ev.commands.splitting import split_among, split_of
     from vid2ev.commands.worker_options import workers_of
@@ -212,7 +188,7 @@ def convert(
     single = len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/")
     directory = Path(output) if output and single else conversion.default_directory(videos[0])
     if single and workers.scheduler is None and split is None:
-        made = _one(videos[0], directory, dry_run, verbose, quiet, options)
+        made = convert_one(videos[0], directory, dry_run, verbose, quiet, options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
         return
@@ -220,22 +196,22 @@ def convert(
     if not workers.alone:
         options["threads"] = options["threads"] or workers.threads
 
-    def one(video: str, directory: Path) -> dict[str, Any]:
+    def each(video: str, directory: Path) -> dict[str, Any]:
         if split and in_parts and not dry_run:
-            chosen = _chosen(video, directory, quiet, dict(options), given())
+            chosen = chosen_for(video, directory, quiet, dict(options), given())
             return split_among(workers, video, directory, split, quiet, chosen)
-        return _one(video, directory, dry_run, verbose, quiet, dict(options))
+        return convert_one(video, directory, dry_run, verbose, quiet, dict(options))
 
     directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))
     if workers.alone or in_parts or dry_run:
-        results = batch.convert_each(directories, one, quiet)
+        results = batch.convert_each(directories, each, quiet)
     else:
-        check = partial(_check_shared, overwrite=options["overwrite"], resume=options["resume"])
+        check = partial(check_shared, overwrite=options["overwrite"], resume=options["resume"])
         # (What was checked is free, so that going on is beginning, and a task that is tried again goes on.)
         options["resume"] |= not options["overwrite"]
         link_s = 60 * split.number if split else math.inf
-        on_worker = partial(_on_worker, options=options, named=given(), link_s=link_s)
-        results = batch.convert_shared(directories, on_worker, check, workers, quiet)
+        task = partial(convert_on_worker, options=options, named=given(), link_s=link_s)
+        results = batch.convert_shared(directories, task, check, workers, quiet)
     click.echo(
         json.dumps(results, indent=2) if as_json else batch.table(results) * (not quiet), nl=not quiet or as_json
     )
@@ -248,122 +224,3 @@ def _warn_without_gpu() -> None:
 
     if missing := missing_for_cuda():
         click.echo(f"device cuda: {missing}; converting on the CPU", err=True)
-
-
-def _one(
-    video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
-) -> dict[str, Any]:
-    """Convert a video; returns the manifest, of a dry run what it would begin with."""
-    from vid2ev import conversion
-    from vid2ev.commands import summary
-    from vid2ev.commands.progress import bar, given, heard, kept
-
-    budget = options["budget"]
-    if budget is not None:
-        from vid2ev.cost.front import Budget
-
-        Budget.parse(budget)
-    options = _chosen(video, directory, quiet, options, given(), dry_run)
-    if dry_run or verbose:
-        recipe, plan = _plan(video, directory, dict(options))
-        if not quiet:
-            click.echo(plan)
-            if dry_run and budget is not None:
-                click.echo(f"then with the fastest setting within the budget {budget}, by `vid2ev cost`")
-        if dry_run:
-            return recipe
-    live = video == "-" or video.startswith("camera:")
-    with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
-        manifest = conversion.convert(video, directory, report=report, **options)
-    if not quiet:
-        facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
-        click.echo(summary.lines(facts))
-    return manifest
-
-
-def _check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> None:
-    """Raise UsageError for what no worker need try."""
-    from vid2ev.recording.folder import check_free
-
-    if video == "-" or video.startswith("camera:"):
-        raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
-    check_free(directory, overwrite, resume)
-
-
-def _on_worker(
-    tell: Tell, video: str, directory: Path, options: dict[str, Any], named: set[str], link_s: float
-) -> dict[str, Any] | GoOn:
-    """Convert a video, as a task, or go on for so long and then leave it to another; returns the manifest.  `named`:
-    the options of the command line."""
-    from vid2ev import conversion
-    from vid2ev.cluster.task import GoOn
-
-    chosen, until_s = _chosen(video, directory, True, dict(options), named), time.monotonic() + link_s
-    chosen |= {"report": conversion.telling(tell), "pause": lambda: time.monotonic() > until_s}
-    try:
-        return conversion.convert(video, directory, **chosen)
-    except conversion.Paused:
-        options = options | {"resume": True}
-        return GoOn(partial(_on_worker, video=video, directory=directory, options=options, named=named, link_s=link_s))
-
-
-def _chosen(
-    video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str], dry_run: bool = False
-) -> dict[str, Any]:
-    """The options of a conversion, with the setting for its budget if there is one."""
-    budget = options.pop("budget")
-    return options if budget is None or dry_run else _within(budget, video, directory, quiet, options, named)
-
-
-def _within(
-    budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str]
-) -> dict[str, Any]:
-    """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on; those
-    `named` on the command line stay as they are."""
-    from vid2ev.commands.progress import pass_bar
-    from vid2ev.cost.choice import chosen, taken_up
-    from vid2ev.outputs import Outputs
-    from vid2ev.recording.folder import begun_job, check_free
-    from vid2ev.split import begun_part
-
-    check_free(directory, options["overwrite"], options["resume"])
-    job = begun_job(directory) or begun_part(directory) if options["resume"] else {}
-    begun = job.get("budget", {})
-    choice = taken_up(begun, budget)
-    if choice is None:
-        rest = dict(options)
-        Outputs.taken_from(rest)
-        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
-        with pass_bar(quiet) as report:
-            choice = chosen(video, budget, rest, given=named, threads=threads, report=report)
-    if not quiet:
-        click.echo(choice.line)
-    return choice.rung.applied(options) | {"notes": {"budget": choice.note}}
-
-
-def _plan(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[str, Any], str]:
-    """What a conversion would do, for programs and for people; raises what it would raise before its first frame."""
-    from vid2ev import conversion
-    from vid2ev.commands import summary
-    from vid2ev.outputs import Outputs
-    from vid2ev.plan.recordings import check_effects
-    from vid2ev.recipe import Recipe
-    from vid2ev.recording.folder import check_free
-    from vid2ev.sensors.devices import device_for
-    from vid2ev.sensors.tiles import usable_cores
-
-    device = options.pop("device")
-    threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
-    overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
-    effects, tolerance = options.pop("effects"), options.pop("tolerance")
-    options.pop("notes", None)
-    recipe = Recipe.of(video, seed=seed or 0, **options)
-    check_effects(recipe, effects, tolerance)
-    conversion.check_outputs(recipe, outputs)
-    check_free(directory, overwrite, resume)
-    described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
-    files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
-    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
-    facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
-    text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
-    return described | {"outputs": outputs.describe()}, text

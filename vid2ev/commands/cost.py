@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vid2ev.commands.convert import Auto
+from vid2ev.commands.auto import Auto
 from vid2ev.commands.source_options import camera_options, source_options
 
 

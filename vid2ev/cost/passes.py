@@ -25,7 +25,6 @@ from vid2ev.plan.recordings import planned
 from vid2ev.recipe import Recipe
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.dvs import Dvs
-from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 
 MOST_EVENTS = 1 << 26  # of a camera in a pass: 0.9 GB
@@ -37,7 +36,8 @@ class Float64Dvs(Dvs):
 
     def __init__(self, *arguments: Any, **options: Any):
         super().__init__(*arguments, **options | {"skip": False})
-        self._numbers = self._numbers._replace(curve=self._numbers.curve._replace(floor=-math.inf))
+        numbers = self._pixels.numbers
+        self._pixels.numbers = numbers._replace(curve=numbers.curve._replace(floor=-math.inf))
 
 
 @dataclass
@@ -120,12 +120,9 @@ def repeated(events: Events, coarse: int) -> Events:
 
 
 def _sensor(mount: Mount, rung: Rung, threads: int) -> Dvs | Cis:
-    spec = mount.sensor.spec
-    if not isinstance(spec, DvsSpec):
+    if mount.kind == "cis":
         return mount.cis(threads)
-    if rung.float64:
-        return Float64Dvs(spec, mount.size, mount.seed, camera=mount.number, threads=threads)
-    return mount.dvs(threads=threads)
+    return mount.dvs(threads=threads, kind=Float64Dvs if rung.float64 else Dvs)
 
 
 def _sense(sensors: list[Dvs | Cis], instant: Instant, done: Pass, keep: bool) -> None:

@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.kernels.cpu import settle_tile, walk_tile
-from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Planes
-from vid2ev.kernels.naps import rouse
-from vid2ev.kernels.rows import interval_rows
-from vid2ev.kernels.work import new_work
+from vid2ev.kernels.layout import BLOCK
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
-from vid2ev.sensors.clock import Clock, Step, as_counted, first_count
-from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
-from vid2ev.sensors.inside import Inside, inside_of, maps_of
+from vid2ev.sensors.clock import Clock, Step, first_count
+from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.intake import Intake
 from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.pixels import Pixels
 from vid2ev.sensors.sent import Sent
-from vid2ev.sensors.sleep import Sleep
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sensors.tiles import WHOLE, Part, Tiles
+from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.saved import clock, entry
-from vid2ev.stream.still import NOT_TOLD, Still, strip_count, told_of
+from vid2ev.stream.still import NOT_TOLD, Still, told_of
 
 if TYPE_CHECKING:
     from vid2ev.views.grid import Grid
@@ -36,7 +31,6 @@ __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 FRAMES = 16  # at a time: as many keys as stay in the cache
-STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
 
 
 class Dvs:
@@ -75,23 +69,18 @@ class Dvs:
         origin_ns: int | None = None,
     ):
         check_sensor(size, seed, camera, threads)
-        width, height = size
-        self.size, self.labels, self.transfer, self._skip = (width, height), labels, transfer, skip
+        self.size, self.labels, self.transfer = (size[0], size[1]), labels, transfer
         self._intake = Intake(self.size, transfer)
-        self._tiles = Tiles(-(-width * height // BLOCK), threads, part)
-        self._work = [new_work() for _ in range(self._tiles.count)]
-        self._buffers = [np.empty(4096, np.uint64) for _ in range(self._tiles.count)]
+        self._pixels = Pixels(self.size, labels, threads, skip, part)
         self._first_ns = origin_ns
         self._be(spec, seed, camera)
 
-    def _be(self, spec: DvsSpec, seed: int, camera: int, flags: Flags | None = None, old: Planes | None = None) -> None:
-        """A sensor without light; in the planes of an old one of the same effects, if there is one."""
+    def _be(self, spec: DvsSpec, seed: int, camera: int) -> None:
+        """A sensor without light."""
         self.spec, self.seed, self.camera, self.effects = spec, seed, camera, spec.effects()
-        self._flags, self._numbers = flags or flags_of(spec, self.labels), numbers_of(spec, seed, camera)
-        self._planes, self._bad = planes_of(spec, self._flags, self._numbers, *self.size, old)
+        self._pixels.be(spec, seed, camera)
         self._frames = EventFrames(spec, *self.size, self.labels) if spec.frame_rate_hz > 0 else None
         self._delayed = Delayed(spec.delay_us, self.size) if spec.delay_us > 0 else None
-        self._tallies = np.zeros((self._tiles.count, TALLIES), np.int64)
         self._polarities = np.zeros(2, np.int64)
         self._t_ns: int | None = None
         self._origin_ns = self._first_ns
@@ -99,7 +88,6 @@ class Dvs:
         self._leak_since_ns = 0
         self._step = 0
         self._fresh_noise = True
-        self._sleep = Sleep(self._bad.size, self._skip and not self._flags.noise)
 
     def renew(self, spec: DvsSpec, seed: int = 0, camera: int = 0) -> None:
         """Become another sensor, without light yet: what `Dvs(spec, size, seed, camera=camera, ...)` is, for less.
@@ -107,8 +95,7 @@ class Dvs:
         Its arrays serve again if the effects are the same.  Raises UsageError as `Dvs` does.
         """
         check_sensor(self.size, seed, camera, 1)
-        flags = flags_of(spec, self.labels)
-        self._be(spec, seed, camera, flags, self._planes if flags == self._flags else None)
+        self._be(spec, seed, camera)
 
     # ------------------------------------------------------------------------------------------------- light in
 
@@ -124,9 +111,9 @@ class Dvs:
             return self.restart(light, t_ns)
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
-        sent = self._walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
+        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
         self._seen = light
-        return self._passed_on(sent.ordered(0, self._tiles.each), t_ns)
+        return self._passed_on(sent.ordered(0, self._pixels.tiles.each), t_ns)
 
     def steps(self, light: np.ndarray, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames].
@@ -208,11 +195,9 @@ class Dvs:
         """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
         if self._t_ns is None:
             return {}
-        self._rouse(np.arange(strip_count(*self.size)))
-        state = {name: getattr(self._planes, name).copy() for name in STATE_PLANES}
+        state = self._pixels.state()
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise), self._origin_ns]
         state["clock"] = np.array(numbers, np.int64)
-        state["tallies"] = self._tallies.sum(axis=0)
         state["polarities"] = self._polarities.copy()
         for part in (self._frames, self._delayed):
             state |= part.state() if part is not None else {}
@@ -220,18 +205,13 @@ class Dvs:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
-        self._sleep.forget()
+        self._pixels.restore(state)
         self._seen = None
         if not state:
             self._t_ns, self._origin_ns = None, self._first_ns
             return
-        for name in STATE_PLANES:
-            plane = getattr(self._planes, name)
-            plane[...] = entry(state, name, plane.dtype, plane.shape)
         self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = clock(state, "clock", 5)
         self._fresh_noise = bool(fresh)
-        self._tallies[...] = 0
-        self._tallies[0] = entry(state, "tallies", self._tallies.dtype, self._tallies.shape[1:])
         self._polarities[...] = entry(state, "polarities", self._polarities.dtype, self._polarities.shape)
         for part in (self._frames, self._delayed):
             if part is not None:
@@ -239,36 +219,33 @@ class Dvs:
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""
-        self._rouse(np.unique(pixels // STRIP))
-        leak = self._numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
-        return inside_of(pixels, self._planes, self._flags, self._numbers, leak)
+        leak_nat = self._pixels.numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
+        return self._pixels.inside(pixels, leak_nat)
 
     def maps(self) -> dict[str, np.ndarray]:
         """What is frozen in this sensor, each [height, width]: threshold_on and threshold_off [nat], hot, cold, and
         shading (optical gain)."""
-        return maps_of(self._planes, self._flags, self._numbers, self._bad, self.size)
+        return self._pixels.maps()
 
     @property
     def counts(self) -> dict[str, int]:
         """Events sent (`on`, `off`), crossings `swallowed` by the refractory period, pixel-intervals `capped` at
         `max_crossings`, and pixels `not_finite` (or negative, or above 1e30) that were mended."""
-        tallies = self._tallies.sum(axis=0)
         off, on = (int(count) for count in self._polarities)
-        swallowed, capped, not_finite = (int(tallies[k]) for k in (SWALLOWED, CAPPED, NOT_FINITE))
-        return {"on": on, "off": off, "swallowed": swallowed, "capped": capped, "not_finite": not_finite}
+        return {"on": on, "off": off} | self._pixels.tallied()
 
     def forget_counts(self) -> None:
         """Count anew what `counts` has."""
-        self._tallies[...], self._polarities[...] = 0, 0
+        self._pixels.tallies[...], self._polarities[...] = 0, 0
 
     def simulates(self, pixel: tuple[int, int]) -> bool:
         """Whether a pixel (x, y) is in the `part` that is simulated."""
-        return self._tiles.holds((pixel[1] * self.size[0] + pixel[0]) // BLOCK)
+        return self._pixels.tiles.holds((pixel[1] * self.size[0] + pixel[0]) // BLOCK)
 
     @property
     def slept(self) -> tuple[int, int]:
         """How many times a strip of 256 pixels slept through an interval, of how many."""
-        return self._sleep.count
+        return self._pixels.sleep.count
 
     # ------------------------------------------------------------------------------------------------- inside
 
@@ -287,22 +264,13 @@ class Dvs:
         return self._intake.flat(light)
 
     def _settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int, count: int) -> None:
-        def settle(k: int, first: int, last: int) -> None:
-            settle_tile(
-                first, last, self._bad.size, flat[0], table, t_ns, self._bad, self.spec.random_phase, self._planes,
-                self._flags, self._numbers, self._work[k], self._tallies[k],
-            )  # fmt: skip
-
-        self._sleep.forget()
-        self._planes.count[...] = as_counted(count)
-        self._tiles.each_blocks(settle)
-        self._planes.t_last[...] = max(t_ns - self._numbers.refractory_ns - 1, np.iinfo(np.int64).min)
+        self._pixels.settle(flat, table, t_ns, count)
 
     def _steps_to(self, t_ns: Sequence[int]) -> list[Step]:
         """The intervals up to each of these times, which are then over."""
         assert self._t_ns is not None
         clock = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise)
-        steps = [clock.step_to(self._later(t, clock.t_ns), self._flags, self._numbers) for t in t_ns]
+        steps = [clock.step_to(self._later(t, clock.t_ns), self._pixels.flags, self._pixels.numbers) for t in t_ns]
         self._be_at(clock)
         return steps
 
@@ -316,7 +284,7 @@ class Dvs:
             yield Events.empty(self.labels)  # (of the frame in which it settles)
         for sent, times in self._through(light, clip, t_ns):
             for k, t in enumerate(times):
-                yield self._passed_on(sent.ordered(k, self._tiles.each), t)
+                yield self._passed_on(sent.ordered(k, self._pixels.tiles.each), t)
 
     def _through(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[tuple[Sent, list[int]]]:
         """What is sent in the frames of a clip of light [frames, clips, height, width], some at a time; their times."""
@@ -324,30 +292,12 @@ class Dvs:
             self.restart(light[0, clip], t_ns[0])
             light, t_ns = light[1:], t_ns[1:]
         flat, table = self._light(light)
-        clips, some = light.shape[1], 1 if self._sleep.naps.wanted else FRAMES
+        clips, some = light.shape[1], 1 if self._pixels.sleep.naps.wanted else FRAMES
         for first in range(0, len(t_ns), some):
             times = t_ns[first : first + some]
-            yield self._walk(flat, first * clips + clip, clips, table, self._steps_to(times), NOT_TOLD), times
+            steps = self._steps_to(times)
+            yield self._pixels.walk(flat, first * clips + clip, clips, table, steps, NOT_TOLD), times
         self._seen = None
-
-    def _walk(self, light: np.ndarray, row: int, rows: int, table: np.ndarray, steps: list[Step], told: Any) -> Sent:
-        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; one, if strips sleep."""
-        self._sleep.begin(steps[0][0], told)
-        if any(risen > 0.0 for _, risen in steps):
-            self._sleep.wake()
-        floats, ints = interval_rows(steps)
-        ends = np.zeros((self._tiles.count, len(steps)), np.int64)
-
-        def walk(k: int, first: int, last: int) -> np.ndarray:
-            self._buffers[k] = walk_tile(
-                first, last, light, row, rows, table, self._sleep.naps, self._planes, self._flags, self._numbers,
-                floats, ints, ends[k], self._work[k], self._buffers[k], self._tallies[k],
-            )  # fmt: skip
-            return self._buffers[k][: ends[k, -1]]
-
-        parts = self._tiles.each_blocks(walk)
-        self._sleep.end()
-        return Sent(parts, ends, [interval for interval, _ in steps], self.size[0], self.labels)
 
     def _passed_on(self, events: Events, t_ns: int) -> Events:
         """What of the events up to t_ns is sent by then, through all that comes behind the comparator."""
@@ -361,9 +311,3 @@ class Dvs:
         on = int(np.count_nonzero(events.p))
         self._polarities += (len(events) - on, on)
         return events
-
-    def _rouse(self, strips: np.ndarray) -> None:
-        """Bring these strips up to the last frame, if they have slept."""
-        late = self._sleep.late(strips)
-        if late.size:
-            rouse(late, self._bad.size, self._planes, self._sleep.naps, self._flags, self._numbers, self._work[0])

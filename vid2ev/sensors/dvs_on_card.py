@@ -11,9 +11,10 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import PITCH, stride_of
 from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.dvs import STATE_PLANES, Dvs
+from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes
+from vid2ev.sensors.pixels import STATE_PLANES
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -54,9 +55,9 @@ class DvsOnCard(Dvs):
 
     def _load(self) -> None:
         """The sensor onto the device."""
-        self._of_fast, planes = int(stride_of(self._flags)) // PITCH, self._planes_of_pixels()
-        phase = [self.spec.random_phase]
-        self._card = CardWalk(self._memory, self._flags, [self._numbers], self.size, planes, self._bad, phase)
+        flags, numbers, bad = self._pixels.flags, self._pixels.numbers, self._pixels.bad
+        self._of_fast, planes = int(stride_of(flags)) // PITCH, self._planes_of_pixels()
+        self._card = CardWalk(self._memory, flags, [numbers], self.size, planes, bad, [self.spec.random_phase])
 
     def renew(self, spec: DvsSpec, seed: int = 0, camera: int = 0) -> None:
         """`Dvs.renew`."""
@@ -108,7 +109,7 @@ class DvsOnCard(Dvs):
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """`Dvs.restore`: also of what a sensor on a CPU gave."""
         super().restore(state)
-        self._card.upload(self._planes_of_pixels(), self._tallies[0])
+        self._card.upload(self._planes_of_pixels(), self._pixels.tallies[0])
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """`Dvs.inside`."""
@@ -118,7 +119,7 @@ class DvsOnCard(Dvs):
     @property
     def counts(self) -> dict[str, int]:
         """`Dvs.counts`."""
-        self._tallies[0] = self._card.tallies()
+        self._pixels.tallies[0] = self._card.tallies()
         return super().counts
 
     def _light(self, light: Any) -> tuple[Any, np.ndarray]:
@@ -140,16 +141,16 @@ class DvsOnCard(Dvs):
         self._card.settle(flat, [t_ns], [count])
 
     def _planes_of_pixels(self) -> Any:
-        return pixel_planes([self._planes], self._flags, self._bad.size)
+        return pixel_planes([self._pixels.planes], self._pixels.flags, self._pixels.bad.size)
 
     def _download(self) -> None:
         """The state of the device into the planes of the walk on a CPU."""
         planes = self._card.download()
         planes["fast"] = fast_by_block(planes["fast"].reshape(-1, self._of_fast), self._of_fast)
-        if self._planes.rest.size:
+        if self._pixels.planes.rest.size:
             planes["rest"] = by_block(planes["rest"].reshape(-1, 2), 2)
         for name in STATE_PLANES:
-            plane = getattr(self._planes, name)
+            plane = getattr(self._pixels.planes, name)
             if plane.size:
                 plane[...] = planes[name].view(plane.dtype)
-        self._tallies[0] = self._card.tallies()
+        self._pixels.tallies[0] = self._card.tallies()

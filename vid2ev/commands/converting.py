@@ -1,0 +1,107 @@
+"""One video converted, as the command line does it: checked, planned, within its budget, with a bar."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vid2ev.errors import UsageError
+
+if TYPE_CHECKING:
+    from vid2ev.cluster.task import GoOn, Tell
+
+
+def convert_one(
+    video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
+) -> dict[str, Any]:
+    """Convert a video; returns the manifest, of a dry run what it would begin with."""
+    from vid2ev import conversion
+    from vid2ev.commands import summary
+    from vid2ev.commands.dry_run import planned
+    from vid2ev.commands.progress import bar, given, heard, kept
+
+    budget = options["budget"]
+    if budget is not None:
+        from vid2ev.cost.front import Budget
+
+        Budget.parse(budget)
+    options = chosen_for(video, directory, quiet, options, given(), dry_run)
+    if dry_run or verbose:
+        recipe, plan = planned(video, directory, dict(options))
+        if not quiet:
+            click.echo(plan)
+            if dry_run and budget is not None:
+                click.echo(f"then with the fastest setting within the budget {budget}, by `vid2ev cost`")
+        if dry_run:
+            return recipe
+    live = video == "-" or video.startswith("camera:")
+    with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
+        manifest = conversion.convert(video, directory, report=report, **options)
+    if not quiet:
+        facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
+        click.echo(summary.lines(facts))
+    return manifest
+
+
+def check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> None:
+    """Raise UsageError for what no worker need try."""
+    from vid2ev.recording.folder import check_free
+
+    if video == "-" or video.startswith("camera:"):
+        raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
+    check_free(directory, overwrite, resume)
+
+
+def convert_on_worker(
+    tell: Tell, video: str, directory: Path, options: dict[str, Any], named: set[str], link_s: float
+) -> dict[str, Any] | GoOn:
+    """Convert a video, as a task, or go on for so long and then leave it to another; returns the manifest.  `named`:
+    the options of the command line."""
+    from vid2ev import conversion
+    from vid2ev.cluster.task import GoOn
+
+    chosen, until_s = chosen_for(video, directory, True, dict(options), named), time.monotonic() + link_s
+    chosen |= {"report": conversion.telling(tell), "pause": lambda: time.monotonic() > until_s}
+    try:
+        return conversion.convert(video, directory, **chosen)
+    except conversion.Paused:
+        again: dict[str, Any] = {"options": options | {"resume": True}, "named": named, "link_s": link_s}
+        return GoOn(partial(convert_on_worker, video=video, directory=directory, **again))
+
+
+def chosen_for(
+    video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str], dry_run: bool = False
+) -> dict[str, Any]:
+    """The options of a conversion, with the setting for its budget if there is one."""
+    budget = options.pop("budget")
+    return options if budget is None or dry_run else _within(budget, video, directory, quiet, options, named)
+
+
+def _within(
+    budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str]
+) -> dict[str, Any]:
+    """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on; those
+    `named` on the command line stay as they are."""
+    from vid2ev.commands.progress import pass_bar
+    from vid2ev.cost.choice import chosen, taken_up
+    from vid2ev.outputs import Outputs
+    from vid2ev.recording.folder import begun_job, check_free
+    from vid2ev.split import begun_part
+
+    check_free(directory, options["overwrite"], options["resume"])
+    job = begun_job(directory) or begun_part(directory) if options["resume"] else {}
+    begun = job.get("budget", {})
+    choice = taken_up(begun, budget)
+    if choice is None:
+        rest = dict(options)
+        Outputs.taken_from(rest)
+        threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
+        with pass_bar(quiet) as report:
+            choice = chosen(video, budget, rest, given=named, threads=threads, report=report)
+    if not quiet:
+        click.echo(choice.line)
+    return choice.rung.applied(options) | {"notes": {"budget": choice.note}}

@@ -1,0 +1,34 @@
+"""What a conversion would do, without doing it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+
+def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """The recipe for programs, and lines for people; raises what the conversion would raise before its first frame."""
+    from vid2ev import conversion
+    from vid2ev.commands import summary
+    from vid2ev.outputs import Outputs
+    from vid2ev.plan.recordings import check_effects
+    from vid2ev.recipe import Recipe
+    from vid2ev.recording.folder import check_free
+    from vid2ev.sensors.devices import device_for
+    from vid2ev.sensors.tiles import usable_cores
+
+    device = options.pop("device")
+    threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
+    overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
+    effects, tolerance = options.pop("effects"), options.pop("tolerance")
+    options.pop("notes", None)
+    recipe = Recipe.of(video, seed=seed or 0, **options)
+    check_effects(recipe, effects, tolerance)
+    conversion.check_outputs(recipe, outputs)
+    check_free(directory, overwrite, resume)
+    described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
+    files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
+    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
+    facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
+    text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
+    return described | {"outputs": outputs.describe()}, text

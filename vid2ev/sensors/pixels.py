@@ -1,0 +1,121 @@
+"""Pixels: those of an event camera, on a CPU: their planes, the walk over them, and which of them sleep."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vid2ev.kernels.cpu import settle_tile, walk_tile
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Planes
+from vid2ev.kernels.naps import rouse
+from vid2ev.kernels.rows import interval_rows
+from vid2ev.kernels.work import new_work
+from vid2ev.sensors.clock import Step, as_counted
+from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
+from vid2ev.sensors.inside import Inside, inside_of, maps_of
+from vid2ev.sensors.sent import Sent
+from vid2ev.sensors.sleep import Sleep
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sensors.tiles import Part, Tiles
+from vid2ev.stream.saved import entry
+from vid2ev.stream.still import strip_count
+
+STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
+
+
+class Pixels:
+    """The pixels of a sensor of `size` (width, height), between one call of the walk and the next.
+
+    labels, threads, skip and part are as of `Dvs`; `be` has to follow.
+    """
+
+    def __init__(self, size: tuple[int, int], labels: bool, threads: int, skip: bool, part: Part):
+        self.size, self._labels, self._skip, self._total = size, labels, skip, size[0] * size[1]
+        self.tiles = Tiles(-(-self._total // BLOCK), threads, part)
+        self._work = [new_work() for _ in range(self.tiles.count)]
+        self._buffers = [np.empty(4096, np.uint64) for _ in range(self.tiles.count)]
+        self.tallies = np.zeros((self.tiles.count, TALLIES), np.int64)
+        self._planes_of: dict[Flags, Planes] = {}  # (of the last sensor alone)
+
+    def be(self, spec: DvsSpec, seed: int, camera: int) -> None:
+        """Those of another sensor, without light; in the planes of the old one if it had the same effects."""
+        flags = flags_of(spec, self._labels)
+        self.flags, self.numbers, self._random_phase = flags, numbers_of(spec, seed, camera), spec.random_phase
+        self.planes, self.bad = planes_of(spec, flags, self.numbers, *self.size, self._planes_of.get(flags))
+        self._planes_of = {flags: self.planes}
+        self.tallies[...] = 0
+        self.sleep = Sleep(self._total, self._skip and not flags.noise)
+
+    def settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int, count: int) -> None:
+        """Settle in a frame of light, from which noise by count goes on at `count`."""
+
+        def settle(k: int, first: int, last: int) -> None:
+            settle_tile(
+                first, last, self._total, flat[0], table, t_ns, self.bad, self._random_phase, self.planes,
+                self.flags, self.numbers, self._work[k], self.tallies[k],
+            )  # fmt: skip
+
+        self.sleep.forget()
+        self.planes.count[...] = as_counted(count)
+        self.tiles.each_blocks(settle)
+        self.planes.t_last[...] = max(t_ns - self.numbers.refractory_ns - 1, np.iinfo(np.int64).min)
+
+    def walk(self, light: np.ndarray, row: int, rows: int, table: np.ndarray, steps: list[Step], told: Any) -> Sent:
+        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; one, if strips sleep."""
+        self.sleep.begin(steps[0][0], told)
+        if any(risen > 0.0 for _, risen in steps):
+            self.sleep.wake()
+        floats, ints = interval_rows(steps)
+        ends = np.zeros((self.tiles.count, len(steps)), np.int64)
+
+        def walk(k: int, first: int, last: int) -> np.ndarray:
+            self._buffers[k] = walk_tile(
+                first, last, light, row, rows, table, self.sleep.naps, self.planes, self.flags, self.numbers,
+                floats, ints, ends[k], self._work[k], self._buffers[k], self.tallies[k],
+            )  # fmt: skip
+            return self._buffers[k][: ends[k, -1]]
+
+        parts = self.tiles.each_blocks(walk)
+        self.sleep.end()
+        return Sent(parts, ends, [interval for interval, _ in steps], self.size[0], self._labels)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All that later events depend on and that is in the pixels, and what was tallied (copies)."""
+        self._rouse(np.arange(strip_count(*self.size)))
+        state = {name: getattr(self.planes, name).copy() for name in STATE_PLANES}
+        return state | {"tallies": self.tallies.sum(axis=0)}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Take up a state; an empty one is that of pixels without light."""
+        self.sleep.forget()
+        if not state:
+            return
+        for name in STATE_PLANES:
+            plane = getattr(self.planes, name)
+            plane[...] = entry(state, name, plane.dtype, plane.shape)
+        self.tallies[...] = 0
+        self.tallies[0] = entry(state, "tallies", self.tallies.dtype, self.tallies.shape[1:])
+
+    def inside(self, pixels: np.ndarray, leak_nat: float) -> Inside:
+        """What pixels [int, y * width + x] have in them, whose levels have leaked this far."""
+        self._rouse(np.unique(pixels // STRIP))
+        return inside_of(pixels, self.planes, self.flags, self.numbers, leak_nat)
+
+    def maps(self) -> dict[str, np.ndarray]:
+        """What is frozen in them (`Dvs.maps`)."""
+        return maps_of(self.planes, self.flags, self.numbers, self.bad, self.size)
+
+    def tallied(self) -> dict[str, int]:
+        """How many crossings were swallowed, intervals capped, values of light mended."""
+        tallies = self.tallies.sum(axis=0)
+        return {name: int(tallies[k]) for name, k in _TALLIED}
+
+    def _rouse(self, strips: np.ndarray) -> None:
+        """Bring these strips up to the last frame, if they have slept."""
+        late = self.sleep.late(strips)
+        if late.size:
+            rouse(late, self._total, self.planes, self.sleep.naps, self.flags, self.numbers, self._work[0])
+
+
+_TALLIED = (("swallowed", SWALLOWED), ("capped", CAPPED), ("not_finite", NOT_FINITE))
