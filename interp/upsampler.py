@@ -71,14 +71,12 @@ class NetUpsampling:
 
 def make(weights: str | None, subframes: Subframes, max_subframes: int, threshold: float) -> NetUpsampling:
     """The upsampler with the weights of a file, or with those that come with vid2ev.  Raises UsageError."""
-    path = Path(weights) if weights else pretrained.first(pretrained.OF_FRAMES)
+    path = pretrained.path_of(weights) if weights else pretrained.first(pretrained.OF_FRAMES)
     if path is None:
         raise UsageError(
             "upsampling 'net': no network of frames alone comes with this version; give the weights of one with"
             " net:WEIGHTS, or choose flow"
         )
-    if not path.exists():
-        raise UsageError(f"upsampling 'net:{weights}': no such file; give weights of `vid2ev train`, or choose flow")
     return NetUpsampling(path, subframes, max_subframes, threshold)
 
 

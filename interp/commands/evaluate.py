@@ -21,8 +21,9 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 @click.command("eval", short_help="Score what rebuilds frames, as the field does.")
 @click.argument("datasets", nargs=-1, required=True, metavar="DATASET...")
 @click.option(
-    "--network", "networks", multiple=True, metavar="WEIGHTS", type=click.Path(exists=True),
-    help="Score a network: its weights, or the folder of its run; may be repeated.",
+    "--network", "networks", multiple=True, metavar="WEIGHTS",
+    help="Score a network: its weights, the folder of its run, or the name of some that come with vid2ev; may be"
+    " repeated.",
 )  # fmt: skip
 @click.option(
     "--baseline", "baselines", multiple=True, metavar="NAME",

@@ -33,10 +33,9 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     "--method", metavar="NAME", help="nearest, linear, flow, or with events integration, both, bridge, ramps, guided."
     "  [default: the network that comes with vid2ev with events, flow without]",
 )  # fmt: skip
-@click.option("--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS", help="Of `vid2ev train`.")
+@click.option("--network", metavar="WEIGHTS", help="Of `vid2ev train`, or the name of some that come with vid2ev.")
 @click.option(
-    "--hdr", type=click.Path(exists=True, dir_okay=False), metavar="[WEIGHTS]", is_flag=False,
-    flag_value=pretrained.first(pretrained.HDR),
+    "--hdr", metavar="[WEIGHTS]", is_flag=False, flag_value=pretrained.first(pretrained.HDR),
     help="Give all frames, key frames too, the range that events show; by weights of `vid2ev train --network hdr`, or"
     " by those that come with vid2ev.",
 )  # fmt: skip

@@ -18,7 +18,7 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
 @click.argument("events")
 @click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_seen.mp4 here]")
 @click.option(
-    "--network", type=click.Path(exists=True, dir_okay=False), metavar="WEIGHTS",
+    "--network", metavar="WEIGHTS",
     help="Of `vid2ev train --network e2vid` or firenet.  [default: the FireNet that comes with vid2ev]",
 )  # fmt: skip
 @click.option(

@@ -10,16 +10,16 @@ from typing import Any, Protocol, Self
 import numpy as np
 import torch
 
+from interp import pretrained
 from interp.data.tensors import as_tensor
 from interp.evaluate import protocol as protocols
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.identity import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
+from interp.pretrained import OF_RUN
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
-
-WEIGHTS = "weights.safetensors"  # of a run of training
 
 
 class Rebuilder(Protocol):
@@ -74,7 +74,7 @@ class OfMethod:
 def methods_of(
     baselines: Sequence[str], networks: Sequence[str | Path], protocol: protocols.Protocol, device: str = "cpu"
 ) -> list[OfMethod]:
-    """Closed forms by their names, and networks by files of weights or folders of runs; in this order.
+    """Closed forms by their names, and networks by weights (`pretrained.path_of`); in this order.
 
     Raises UsageError for a name that is none and a device that is not there, DataError for a file that holds no network
     which rebuilds frames.
@@ -84,8 +84,8 @@ def methods_of(
     for name in baselines:
         if name not in METHODS:
             raise UsageError(f"baseline '{name}'{nearest(name, METHODS)}: expected some of {', '.join(METHODS)}")
-    paths = [Path(network) / WEIGHTS if Path(network).is_dir() else Path(network) for network in networks]
-    called = [path.parent.name if path.name == WEIGHTS and path.parent.name else path.stem for path in paths]
+    paths = [pretrained.path_of(network) for network in networks]
+    called = [path.parent.name if path.name == OF_RUN and path.parent.name else path.stem for path in paths]
     forms = list(dict.fromkeys(baselines))
     found = [OfMethod(name, {"closed_form": name}, open_method(name, device), protocol, device) for name in forms]
     for name, path in zip(apart([*forms, *called])[len(forms) :], paths, strict=True):

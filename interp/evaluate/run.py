@@ -71,7 +71,7 @@ def evaluate(
     """Score methods on data sets, into a folder.
 
     datasets      folders with recordings (own, HS-ERGB, BS-ERGB), videos, folders of these or of pictures, `scene:NAME`
-    networks      files of weights, or folders of runs of training
+    networks      weights (`interp.pretrained.path_of`)
     baselines     names of closed forms (`interp.methods.METHODS`)
     predictions   folders with pictures that others have made (`predictions.py`)
     simulated     the event camera that looks at films

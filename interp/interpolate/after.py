@@ -21,6 +21,7 @@ from interp.networks.hdr import Hdr, HdrState
 from interp.representation.carried import over
 from interp.weights import load
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.manifest import sha256
 
 
 class After:
@@ -35,6 +36,7 @@ class After:
         if not isinstance(network, Hdr):
             raise DataError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
         self.network, self.device = network, device
+        self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
             raise UsageError(f"--hdr {path} was trained with events, and there are none; leave it out")

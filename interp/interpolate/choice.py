@@ -37,7 +37,7 @@ def choice(
     """
     if name and network:
         raise UsageError(f"--method {name} and --network {network} each say what interpolates; leave out one of them")
-    why = "as asked"
+    network, why = pretrained.path_of(network) if network else None, "as asked"
     if not (name or network):
         # (of frames alone there is a network, too, but it does not beat optical flow)
         network = pretrained.first(pretrained.WITH_EVENTS) if events else None
@@ -50,7 +50,7 @@ def choice(
         raise UsageError(f"method '{method.name}' needs events, and {where} has none; choose flow, or leave it out")
     about: dict[str, Any] = {"method": method.name}
     if network:
-        about |= {"weights": str(network), "sha256": sha256(Path(network))}
+        about |= {"weights": str(network), "sha256": sha256(network)}
     return Choice(method, why, about)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of
 from interp.interpolate.fill import Fill, Filled
@@ -24,7 +25,7 @@ from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.interpolate.tiling import parse_tiling
 from interp.methods import open_method
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.manifest import machine, sha256, versions
+from vid2ev.recording.manifest import machine, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8
@@ -57,8 +58,9 @@ def interpolate(
                a folder of images, with the events of `options.events` or without; or a single frame with events
     output     a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
     multiple   so many times the frames, 8 by default; or `fps`, frames per second of the world's time
-    method, network   a name of `interp.methods.METHODS`, or a file of weights; by default what is best for the source
-    hdr        weights of HDR post-processing, which changes all frames, key frames too
+    method, network   a name of `interp.methods.METHODS`, or weights (`interp.pretrained.path_of`); by default what
+                     is best for the source
+    hdr        weights (`interp.pretrained.path_of`) of HDR post-processing, which changes all frames, key frames too
     format     mp4, png, or exr (linear light); by default as `output` says
     play       frames per second at which the film plays, for slow motion; by default in real time
     tile       none, WIDTHxHEIGHT, or auto: large frames in tiles
@@ -84,7 +86,7 @@ def interpolate(
         "part": {"start_s": options.start_s, "stop_s": options.stop_s},
         "grid": grid.describe(),
         "interpolation": ready.about,
-        "hdr": {"weights": str(hdr), "sha256": sha256(Path(hdr))} if hdr else None,
+        "hdr": ready.after and ready.after.about,
         "tiles": fill.tiling.describe(),
         "cuts": cuts,
         "format": pictures.describe(),
@@ -163,7 +165,7 @@ def prepared(
         chosen = choice_of_one(method, network, str(source))
     else:
         chosen = choice(method, network, has_events, str(source), device)
-    after = After(Path(hdr), has_events, device) if hdr else None
+    after = After(pretrained.path_of(hdr), has_events, device) if hdr else None
     tiling = parse_tiling(tile, take.size, multiple_of(chosen))
     needed = after is not None and after.needs_events
     fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)

@@ -2,6 +2,7 @@
 network.
 
     F_01, F_10 = flow(I0, I1, events?)                                   own, trained before and frozen, or DIS
+    F_t0, F_t1 = of these, or by the light that events tell              `candidates/guided.py`; V then of what agrees
     dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, events, reconstructions?)
     J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
     I_t = J + UNet(I0, I1, J)                                            if refine is unet
@@ -22,7 +23,9 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
-from interp.candidates.guided import motion_between
+from interp.candidates.guided import agreement, flows_to, motion_between
+from interp.candidates.ramps import ramps
+from interp.light import Transfer
 from interp.networks.e2vid import E2vid, E2vidSpec
 from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
 from interp.networks.firenet import FireNet, FireNetSpec
@@ -42,10 +45,12 @@ class RrinSlomoEventsSpec(EventInputSpec):
         default="frames",
         description="of the flow network: all bins as well; 288 parameters and 0.288 kMAC/px a bin, once per pair",
     )
-    flow: Literal[Weights, "dis"] = Field(
+    flow: Literal[Weights, "dis", "guided"] = Field(
         default="own",
         description="pretrained: weights of the network `flow`, frozen; training takes about a third less time; dis:"
-        " the optical flow of DIS between the frames, on the CPU, 0.43 s per pair at 1280x720",
+        " the optical flow of DIS between the frames, on the CPU, 0.43 s per pair at 1280x720; guided: that, and from"
+        " each target to both frames the motion, and what agrees, by the light that events tell, as long again for"
+        " each target",
     )
     prepare: Literal["none", "unet"] = Field(
         default="none",
@@ -62,6 +67,7 @@ class RrinSlomoEventsSpec(EventInputSpec):
         description="a picture from events alone per bin, first, last and target as input: firenet 38 k parameters and"
         " 38 kMAC/px, e2vid 10.7 M and 454, times the number of bins, once per pair",
     )
+    transfer: Transfer = Field(default="srgb", description="how the frames are coded, for flow guided; free")
     reconstruct_weights: Weights = Field(default="own", description="pretrained: weights of that network, frozen")
 
 
@@ -72,7 +78,7 @@ class RrinSlomoEvents(FrameFed):
         super().__init__()
         self.spec: RrinSlomoEventsSpec = spec
         colours, zero = spec.colours, spec.zero_heads
-        self.flow = None if spec.flow == "dis" else self._flow()
+        self.flow = None if spec.flow in ("dis", "guided") else self._flow()
         self.event_input = EventInput(spec.events, spec.bins, prepare=self._prepare if spec.prepare == "unet" else None)
         self.reconstruct = self._reconstruct()
         pictures = 0 if self.reconstruct is None else 3
@@ -98,12 +104,21 @@ class RrinSlomoEvents(FrameFed):
         if self.reconstruct is not None:
             beside, once = [first_last_and_target(once[0], times)], once[1:]
         events = self.event_input.at(pair, once, times)
-        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
-        image, weights = blend(warps, F.logsigmoid(visible), shares_at(times))
+        told = self._told(pair, times)
+        first = None if told is None else flows_to(pair.frame_0, pair.frame_1, told, self.spec.transfer)
+        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale, first)
+        agreed = 0.0 if told is None else agreement(warps, told, self.spec.transfer)
+        image, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
         of_warps = image
         if self.residue is not None:
             image = image + run(self.residue, [pair.frame_0, pair.frame_1, image])
         return Interpolated(image, pair.flows, at, warps, weights, of_warps)
+
+    def _told(self, pair: Pair, times: torch.Tensor) -> torch.Tensor | None:
+        """Light at the targets as events tell it, [B, N, C, H, W], if that guides."""
+        if self.spec.flow != "guided":
+            return None
+        return ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer)
 
     def _flow(self) -> nn.Module:
         spec, bins = self.spec, self.spec.bins if self.spec.flow_input == "frames+events" else 0

@@ -8,11 +8,33 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vid2ev.errors import UsageError, nearest
+
+OF_RUN = "weights.safetensors"  # of a run of training
 HERE = Path(__file__).parent
 WITH_EVENTS = ("rrin_events_guided-small", "rrin_events_guided-tiny")
 OF_FRAMES = ("rrin_light-small", "rrin_light-tiny")
 OF_EVENTS = ("e2vid-small", "e2vid-tiny", "firenet-paper", "firenet-small", "firenet-tiny")
 HDR = ("hdr-small", "hdr-tiny")
+
+
+def path_of(weights: str | Path) -> Path:
+    """A file of weights: itself, that of a run's folder, or by its name one that comes with this version.
+
+    Raises UsageError where there is no such file.
+    """
+    path = Path(weights)
+    if path.is_dir():
+        path = path / OF_RUN
+    if path.exists():
+        return path
+    here = {file.stem: file for file in sorted(HERE.glob("*.safetensors"))}
+    if str(weights) not in here:
+        raise UsageError(
+            f"weights {weights}: no such file, and none of those that come with vid2ev"
+            f"{nearest(str(weights), here)}: {', '.join(here)}"
+        )
+    return here[str(weights)]
 
 
 def first(names: tuple[str, ...]) -> Path | None:

@@ -82,7 +82,8 @@ def reconstruct(
 
     events      any event file that vid2ev reads, or the folder of an event camera's recording
     output      a film, if its name ends in .mp4, or a folder of pictures with timestamps.txt
-    network     weights of E2VID or FireNet; by default those that come with vid2ev, if any do, or else a high-pass
+    network     weights (`interp.pretrained.path_of`) of E2VID or FireNet; by default those that come with vid2ev, if
+                any do, or else a high-pass
                 filter, which `cutoff_hz` asks for, too (`high_pass.py`)
     fps         pictures per second, 30 by default; or `events_per_frame`
     play        pictures per second of the film; by default in real time, or 30 where pictures are of so many events
@@ -219,12 +220,10 @@ def _choice(
     if network and cutoff_hz is not None:
         raise UsageError(f"--network {network} and --cutoff {cutoff_hz:g}: leave out one of them")
     asked = network or cutoff_hz is not None
-    if not asked:
-        network = pretrained.first(pretrained.OF_EVENTS)
-    if network:
+    path = pretrained.path_of(network) if network else None if asked else pretrained.first(pretrained.OF_EVENTS)
+    if path:
         why = "as asked" if asked else "the network that comes with vid2ev"
-        about = {"network": str(network), "sha256": sha256(Path(network))}
-        return OfNetwork(Path(network), size, nats, device), why, about
+        return OfNetwork(path, size, nats, device), why, {"network": str(path), "sha256": sha256(path)}
     why = "as asked" if asked else "the best that needs no training"
     cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz
     return HighPass(size, nats, cutoff), why, {"filter": "high-pass", "cutoff_hz": cutoff}

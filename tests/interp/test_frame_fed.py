@@ -187,6 +187,7 @@ def test_all_ways_with_a_candidate_teach_every_unet(candidate: str, coarse: bool
         {"events": "bins", "prepare": "unet", "flow_input": "frames+events"},
         {"reconstruct": "firenet"},
         {"reconstruct": "e2vid", "events": "bins"},
+        {"flow": "guided"},
     ],
 )
 def test_all_parts_of_the_combined_system_learn(options: dict) -> None:

@@ -119,3 +119,15 @@ def test_coarse_events_do_not_blur_what_moves_as_a_whole() -> None:
         for name in ("bridge", "guided")
     }  # fmt: skip
     assert error["guided"] < error["bridge"] / 4
+
+
+def test_the_combined_system_starts_from_what_is_guided() -> None:
+    """Heads that are zero leave both frames as the light of events has carried and weighed them."""
+    first, second, seen = shifted(0), shifted(3), moving([0, 1, 2, 3])
+    times = torch.tensor([[1 / 3, 2 / 3]])
+    wanted = guided(first, second, ramps(first, second, seen, times)).blend(times)
+    torch.manual_seed(0)
+    made = make("rrin_slomo_events", flow="guided")(first, second, times[0], seen)
+    torch.testing.assert_close(made.images, wanted, atol=1e-6, rtol=0)
+    still = make("rrin_slomo_events", flow="dis")(first, second, times[0], seen)
+    assert not torch.allclose(still.images, wanted, atol=1e-2)

@@ -155,6 +155,8 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
         (["a", "-o", "out.avi"], 2, "cannot be made"),
         (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),
         (["a", "-o", "a"], 2, "exists"),
+        (["a", "--network", "rrin_light"], 2, "did you mean rrin_light-tiny"),
+        (["a", "--hdr=nothing"], 2, "none of those that come"),
         (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
         (["a", "--network", "hdr.safetensors"], 1, "rebuilds no frames"),
         (["a", "--network", "events.safetensors"], 2, "needs events"),
