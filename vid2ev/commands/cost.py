@@ -16,7 +16,7 @@ from vid2ev.commands.source_options import camera_options, source_options
 @click.option(
     "--budget", metavar="LIMIT[,LIMIT...]",
     help="What a setting may cost: vR=0.05 (distance), count=0.01, us=50 (median timing error), lsb=1 (frames),"
-    " time=10x (multiples of real time).  [default: vR=0.05, of frame cameras alone lsb=1]",
+    " time=10x (multiples of the clip's length).  [default: vR=0.05, of frame cameras alone lsb=1]",
 )  # fmt: skip
 @click.option("--duration", "duration_s", type=click.FloatRange(0, min_open=True), metavar="S", help="How much of the"
     " middle of the clip to take.  [default: 30 frames of 640x480, less of larger ones]")  # fmt: skip

@@ -84,7 +84,7 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Progress], bool]]:
-    """A progress bar on a terminal: frames, time left, events per second, and speed against real time."""
+    """A progress bar on a terminal: frames, time left, events per second, and time against the clip's."""
     from tqdm import tqdm
 
     shown: tqdm | None = None
@@ -94,8 +94,9 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
         if shown is None:
             total, first = recipe.source.frames_expected, done.frames - 1
             shown = tqdm(total=total, initial=first, bar_format=FRAMES, leave=False, disable=quiet or None)
-        speed, video_s = done.seconds or 1.0, (done.end_ns - done.start_ns) / 1e9
-        shown.set_postfix_str(f"{done.events / speed:,.0f} events/s, {video_s / speed:.2g} x real time", refresh=False)
+        seconds, video_s = done.seconds or 1.0, max(done.end_ns - done.start_ns, 1) / 1e9
+        text = f"{done.events / seconds:,.0f} events/s, {seconds / video_s:.2g} x the length of the clip"
+        shown.set_postfix_str(text, refresh=False)
         shown.update(done.frames - shown.n)
         return check()
 

@@ -99,7 +99,7 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Time taken, and the share of the event sensors that slept through still light, from a manifest."""
     result = next(iter(manifest["results"].values())) if "results" in manifest else manifest
     seconds, video_s = manifest["run"]["seconds"], result["duration_us"] / 1e6
-    ratio = f", {video_s / seconds:.2g} x real time" if seconds and video_s else ""
+    ratio = f", {seconds / video_s:.2g} x the length of the clip" if seconds and video_s else ""
     threads = manifest["run"]["threads"]
     took = f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}"
     slept, of = map(sum, zip((0, 0), *manifest["run"].get("strips_slept", {}).values(), strict=True))

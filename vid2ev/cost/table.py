@@ -24,7 +24,7 @@ def recommendation(cost: Cost) -> str:
     if best is None:
         return refusal(cost.settings, cost.budget)
     asked = best.rung.arguments() or "nothing to set"
-    return f"within {cost.budget.text}: {best.rung.name} ({asked}), {best.time:.2g} x real time{_errors(best)}"
+    return f"within {cost.budget.text}: {best.rung.name} ({asked}), {best.time:.2g} x the length{_errors(best)}"
 
 
 def cells(cost: Cost) -> list[list[str]]:
@@ -33,7 +33,7 @@ def cells(cost: Cost) -> list[list[str]]:
     dvs = any(row.errors.distance is not None for row in everyone)
     cis = any(row.errors.rms_lsb is not None for row in everyone)
     views = any(row.errors.views is not None for row in everyone)
-    head = ["", "setting", "x real time", "median"]
+    head = ["", "setting", "x length", "median"]
     head += ["vR", "count", "timing, us", "95 %"] * dvs + ["frames, LSB"] * cis + ["views"] * views
     ahead, best = cost.front, cost.recommended
     lines = [[*head, "convert ..."]]

@@ -101,7 +101,7 @@ class Results:
         rows = [_cost_cells(row) for row in found["settings"] if row["front"]]
         self._costs.clear()
         with self._costs:
-            table(["worth its time", "x real time", "vR", "count", "timing", "convert ..."], rows)
+            table(["worth its time", "x length", "vR", "count", "timing", "convert ..."], rows)
             best = found["recommended"] or "none"
             ui.label(f"recommended within {found['budget']}: {best}").classes("v-muted")
 
