@@ -30,6 +30,7 @@ from interp.precision import in_full_precision
 from interp.representation.event_counts import EventCounts, as_voxels
 
 FIRST = 0.5  # share of the first event of a pixel
+LEAST = 1e-6  # of an event: less is none
 RISEN_CHANNELS = 4
 Steps = torch.Tensor  # [B, S, H, W]
 
@@ -64,9 +65,10 @@ def risen(events: EventCounts, times: torch.Tensor) -> Risen:
     off, on = events.off_on.float().unbind(1)
     off_nats, on_nats = events.contrast.float()[..., None, None, None].unbind(1)
     number, change = on + off, on_nats * on - off_nats * off
-    each = change / number.clamp(min=1)  # what an event of the sub-interval stands for
-    share = _shares(number)
-    lost = (1 - share) * (number > 0)
+    each = change / number.clamp(min=LEAST)  # what an event of the sub-interval stands for
+    one = number.clamp(max=1)  # (counts from between pixels have parts of events)
+    share = _shares(number) * one
+    lost = one - share
     number, change = number - lost, change - lost * each
     seen = (times * events.steps + 0.5).floor().long().clamp(0, events.steps)  # sub-intervals whose middle is past
     way, at = _on_the_way(number > 0, seen, times)

@@ -131,6 +131,8 @@ def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
         return OfStill(picture_beside(path), path, options)
     if has_both:
         return OfEventFile(path, options)
-    if options.events and path.is_file() and recognise(path) == "picture":
-        return OfStill(path, options.events, options)
+    if path.is_file() and recognise(path) == "picture":
+        events = options.events or path.with_suffix(".mat")
+        if options.events or is_mat(events):
+            return OfStill(path, events, options)
     return FramesBesideEvents(str(path), options, options.events) if options.events else OfSource(str(path), options)

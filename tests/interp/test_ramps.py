@@ -103,3 +103,21 @@ def test_light_that_rises_steadily_is_nearer_than_by_stairs() -> None:
             off = torch.log(made.flatten() + DARK) - torch.log(dark + DARK) - rise * times[0]
             errors[name] += float(off.square().sum())
     assert errors["ramps"] < 0.7 * errors["bridge"]  # (0.62: straight lines, which parabolas are not)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 1), st.floats(0, 1))
+def test_parts_of_events_are_parts_of_what_events_say(seed: int, part: float, t: float) -> None:
+    """Counts from between pixels: E and N of a pixel's lone events are in proportion, and no count is below zero."""
+    draw = np.random.default_rng(seed)
+    lone, many = np.zeros((1, 2, STEPS, 3, 4)), part * draw.poisson(0.7, (1, 2, STEPS, 3, 4))
+    for y, x in np.ndindex(3, 4):
+        lone[0, draw.integers(2), draw.integers(STEPS), y, x] = 1
+    contrast, times = torch.tensor([[0.1, 0.3]]), torch.tensor([[t]])
+    whole = risen(EventCounts(torch.from_numpy(lone), contrast), times)
+    parts = risen(EventCounts(torch.from_numpy(part * lone), contrast), times)
+    for name in ("change", "left", "number", "more"):
+        torch.testing.assert_close(getattr(parts, name), part * getattr(whole, name), atol=1e-5, rtol=1e-4)
+    found = risen(EventCounts(torch.from_numpy(many), contrast), times)
+    assert found.number.min() >= -1e-5 and found.more.min() >= -1e-5
+    assert torch.isfinite(found.channels()).all()

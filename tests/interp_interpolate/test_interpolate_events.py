@@ -152,14 +152,14 @@ def test_a_blurred_frame_and_its_events_give_back_the_light_of_each_instant() ->
         torch.testing.assert_close(same_frame, frame.expand(3, -1, -1, -1), atol=1e-5, rtol=0)
 
 
-@pytest.mark.parametrize("kind", ["mat", "npz"])
+@pytest.mark.parametrize("kind", ["mat", "mat-beside", "npz"])
 def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path, kind: str) -> None:
     _, events, mean = still_and_events()
     write_codes(tmp_path / "a.png", np.rint(255 * mean / mean.max()).astype(np.uint8))
-    if kind == "mat":
+    if kind != "npz":
         table = np.stack([events.t, events.x, events.y, events.p], 1).astype(np.int64)
         savemat(tmp_path / "a.mat", {"events": table})
-        source, options = tmp_path / "a.mat", Options()
+        source, options = tmp_path / ("a.mat" if kind == "mat" else "a.png"), Options()
     else:
         source, options = tmp_path / "a.png", Options(events=written(tmp_path / "e.npz", events))
     told = interpolate(source, tmp_path / "out", multiple=6, options=options)
