@@ -35,10 +35,10 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 )  # fmt: skip
 @click.option("--network", metavar="WEIGHTS", help="Of `vid2ev train`, or the name of some that come with vid2ev.")
 @click.option(
-    "--hdr", metavar="[WEIGHTS]", is_flag=False, flag_value=pretrained.first(pretrained.HDR),
-    help="Give all frames, key frames too, the range that events show; by weights of `vid2ev train --network hdr`, or"
-    " by those that come with vid2ev.",
+    "--hdr", is_flag=True,
+    help="Give all frames, key frames too, the range that events show, by the weights for it that come with vid2ev.",
 )  # fmt: skip
+@click.option("--hdr-network", metavar="WEIGHTS", help="The same, by weights of `vid2ev train --network hdr`.")
 @click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR",
     help="What to make; of several sources the folder for all.  [default: NAME_x8.mp4 here]",
 )  # fmt: skip
@@ -92,6 +92,8 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
 
     quiet |= as_json
     workers = workers_of(options)
+    asked, given = options.pop("hdr"), options.pop("hdr_network")
+    options["hdr"] = given or (pretrained.first(pretrained.HDR) if asked else None)
     taken = Options(
         start_s=options.pop("start"),
         stop_s=options.pop("stop"),

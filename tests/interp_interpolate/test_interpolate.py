@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 from small_takes import SIZE, STEP_US, images, moving, recording, texture, times_of
 
+from interp import pretrained
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate import frames, interpolate
 from interp.networks import make
@@ -129,7 +130,6 @@ def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
 
 
 def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
-    from interp import pretrained
 
     said: list[str] = []
     interpolate(images(tmp_path / "a", moving(2)), tmp_path / "out", multiple=1, told=said.append)
@@ -156,12 +156,12 @@ def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
         (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),
         (["a", "-o", "a"], 2, "exists"),
         (["a", "--network", "rrin_light"], 2, "did you mean rrin_light-tiny"),
-        (["a", "--hdr=nothing"], 2, "none of those that come"),
+        (["a", "--hdr-network", "nothing"], 2, "none of those that come"),
         (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
         (["a", "--network", "hdr.safetensors"], 1, "rebuilds no frames"),
         (["a", "--network", "events.safetensors"], 2, "needs events"),
-        (["a", "--hdr", "hdr.safetensors"], 2, "leave it out"),
-        (["b", "--hdr", "events.safetensors"], 1, "network hdr"),
+        (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
+        (["b", "--hdr-network", "events.safetensors"], 1, "network hdr"),
         (["b", "--start", "9"], 2, "choose another part"),
         (["bad"], 1, "without times|pictures and"),
     ],
@@ -210,3 +210,11 @@ def test_frames_come_one_by_one_as_they_are_written(tmp_path: Path) -> None:
         assert frame.instant.t_us == t_us
     with pytest.raises(UsageError, match="needs events"):
         frames(images(tmp_path / "a", moving(2)), method="bridge")
+
+
+def test_hdr_stands_anywhere_among_the_arguments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    recording(tmp_path / "b", moving(2))
+    result = CliRunner().invoke(command, ["--hdr", "b", "-x", "2", "--method", "bridge", "--json"])
+    assert result.exit_code == 0, result.output
+    assert Path(json.loads(result.output)["hdr"]["weights"]).stem in pretrained.HDR
