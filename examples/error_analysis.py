@@ -136,6 +136,7 @@ def drawn(rows: Sequence[tuple[Case, Found]]) -> Figure:
 @click.option("-o", "--output", default="error_analysis.jpg", show_default=True)
 def main(methods: tuple[str, ...], gaps: int, output: str) -> None:
     """Score, print, draw."""
+    methods = tuple(sorted(methods, key=lambda name: name not in METHODS))  # (as they are scored)
     rows = []
     click.echo(
         "| cause | | " + " | ".join(Path(name).stem for name in methods) + " |\n" + "|---" * (len(methods) + 2) + "|"

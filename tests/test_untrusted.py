@@ -22,8 +22,9 @@ from interp.train.checkpoints import read_checkpoint
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import open_events
 from vid2ev.light.picture_files import read_picture
+from vid2ev.recording.exposures import read_codes
 from vid2ev.recording.manifest import as_stated, read_manifest
-from vid2ev.recording.truth_files import read_depth, read_flow
+from vid2ev.recording.truth_files import read_depth, read_flow, read_mask
 from vid2ev.rig.calibration import read_calibration
 from vid2ev.rig.depth import DepthScale
 from vid2ev.rig.depth_files import DepthFiles
@@ -166,8 +167,9 @@ def test_a_png_takes_no_room_for_what_it_has_not(tmp_path: Path) -> None:
     assert np.array_equal(read_picture(place).pixels.ravel(), np.arange(96))
     for damaged in (whole[:33] + b"\x8c" + whole[34:], whole[:-20], whole[:40]):
         place.write_bytes(damaged)
-        with pytest.raises(DataError, match="cut short"):
-            read_picture(place)
+        for reads in (read_picture, read_codes, read_mask):
+            with pytest.raises(DataError, match="cut short"):
+                reads(place)
 
 
 def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:

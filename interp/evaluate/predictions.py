@@ -19,6 +19,7 @@ import numpy as np
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.identity import contents, plain
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.picture_files import decoded
 from vid2ev.light.recognise import natural
 
 TRUTH = "gt"
@@ -58,7 +59,7 @@ class Predictions:
 
         if place >= len(self.files):
             return None
-        picture = cv2.imread(str(self.files[place]), cv2.IMREAD_COLOR)
+        picture = next(iter(decoded(self.files[place], cv2.IMREAD_COLOR)), None)
         if picture is None or picture.shape != shape:
             size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
             raise DataError(f"{self.files[place]}: {size}, expected a picture of {shape[1]}x{shape[0]}")

@@ -39,8 +39,7 @@ def pages_of(path: Path) -> int:
 
 def read_picture(path: Path, page: int = 0) -> Picture:
     """A picture, upright.  Raises DataError for a file that holds none, UsageError for an EXR without the package."""
-    head = head_of(path)
-    return _checked(_read_exr(path) if head.startswith(EXR) else Picture(_read(path, page, head)[0]), path)
+    return _checked(_read_exr(path) if head_of(path).startswith(EXR) else Picture(_read(path, page)[0]), path)
 
 
 class PageReader:
@@ -55,7 +54,7 @@ class PageReader:
         if not self._first <= page < self._first + len(self._pages):
             self._first, self._pages = page, []
             one = read_picture(self._path, page).pixels
-            self._pages = [one] if one.nbytes > AHEAD else _read(self._path, page, TIFF[0], AHEAD // one.nbytes)
+            self._pages = [one] if one.nbytes > AHEAD else _read(self._path, page, AHEAD // one.nbytes)
         return _checked(Picture(self._pages[page - self._first]), self._path)
 
 
@@ -66,27 +65,39 @@ def _checked(picture: Picture, path: Path) -> Picture:
     return picture
 
 
-def _read(path: Path, page: int, head: bytes, count: int = 1) -> list[np.ndarray]:
+def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.ndarray]:
+    """What OpenCV makes of a file, blue first, [H, W] or [H, W, C]; of a TIFF pages from `page` on, at most `count`.
+
+    flags   cv2.IMREAD_...
+    Nothing for a file that it cannot read.  Raises DataError for one that claims more memory than it may.
+    """
+    import cv2
+
+    head = head_of(path)
+    if head.startswith(PNG):
+        check_png(path)
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said by who asks)
+    try:
+        if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
+            return list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
+        one = cv2.imread(str(path), flags)
+        return [] if one is None else [one]
+    except cv2.error as error:
+        if "MAX_IMAGE" not in str(error):
+            return []
+        raise DataError(
+            f"{path}: has more pixels than are allowed; if that is meant, set {LARGEST} in the environment"
+        ) from error
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _read(path: Path, page: int, count: int = 1) -> list[np.ndarray]:
     """Pictures from a page on, as many as there are up to `count`.  Raises DataError if there is none."""
     import cv2
 
-    if head.startswith(PNG):
-        check_png(path)
-    flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
-    level, too_large = cv2.utils.logging.getLogLevel(), False
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)
-    try:
-        if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
-            found = list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
-        else:
-            one = cv2.imread(str(path), flags)
-            found = [] if one is None else [one]
-    except cv2.error as error:
-        found, too_large = [], "MAX_IMAGE" in str(error)
-    finally:
-        cv2.utils.logging.setLogLevel(level)
-    if not found and too_large:
-        raise DataError(f"{path}: has more pixels than are allowed; if that is meant, set {LARGEST} in the environment")
+    found = decoded(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page, count)
     if not found:
         raise DataError(f"{path}: not an image that can be read; remove it or write it anew")
     return [pixels if pixels.ndim == 2 else pixels[..., 2::-1] for pixels in found]

@@ -29,6 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.picture_files import decoded
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
 from vid2ev.untrusted import first_line, read_text
@@ -153,13 +154,10 @@ def read_codes(path: Path) -> np.ndarray:
     """The codes of a PNG that `write_codes` wrote.  Raises DataError."""
     import cv2
 
-    try:
-        pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        pixels = None
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16) or pixels.shape[2:] not in ((), (3,)):
+    found = decoded(path, cv2.IMREAD_UNCHANGED)
+    if not found or found[0].dtype not in (np.uint8, np.uint16) or found[0].shape[2:] not in ((), (3,)):
         raise DataError(f"{path}: not a picture that can be read, expected one written here; start again")
-    return pixels if pixels.ndim == 2 else pixels[..., ::-1]
+    return found[0] if found[0].ndim == 2 else found[0][..., ::-1]
 
 
 def _linked(source: str, target: str) -> None:

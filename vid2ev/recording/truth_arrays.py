@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.picture_files import decoded
 from vid2ev.recording.disk import whole_file
 from vid2ev.untrusted import read_arrays, read_text
 
@@ -75,18 +76,11 @@ def read_png(path: Path) -> np.ndarray:
     import cv2
 
     with reading(path):
-        content = np.frombuffer(path.read_bytes(), np.uint8)
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said below)
-    try:
-        picture = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        picture = None
-    finally:
-        cv2.utils.logging.setLogLevel(level)
-    if picture is None:
+        path.stat()
+    found = decoded(path, cv2.IMREAD_UNCHANGED)
+    if not found:
         raise DataError(f"{path}: not a PNG that can be read; get another copy")
-    return picture if picture.ndim == 2 else picture[..., 2::-1]
+    return found[0] if found[0].ndim == 2 else found[0][..., 2::-1]
 
 
 def state_number(path: Path, name: str, value: float) -> None:

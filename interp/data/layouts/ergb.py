@@ -21,6 +21,7 @@ import numpy as np
 from interp.data.layouts.event_parts import EventParts, numbered
 from interp.data.layouts.sequence import Placed
 from vid2ev.errors import DataError
+from vid2ev.light.picture_files import decoded
 
 
 class Names(NamedTuple):
@@ -85,13 +86,10 @@ class Ergb:
         """Picture k, red, green, blue."""
         import cv2
 
-        try:
-            picture = cv2.imread(str(self._images[k]), cv2.IMREAD_COLOR)
-        except cv2.error:
-            picture = None
-        if picture is None:
+        found = decoded(self._images[k], cv2.IMREAD_COLOR)
+        if not found:
             raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
-        return picture[..., ::-1]
+        return found[0][..., ::-1]
 
     def key(self, k: int) -> np.ndarray:
         """Picture k."""
