@@ -38,7 +38,7 @@ class OfFrames:
         events = gap.events if self.needs_events else None
         pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], events)
         some = max(1, AT_ONCE_PX // gap.frame_0[0].numel())
-        return torch.cat([self.network.at(pair, part).images[0] for part in times.split(some)])
+        return _finite(self, torch.cat([self.network.at(pair, part).images[0] for part in times.split(some)]))
 
 
 @dataclass(slots=True)
@@ -65,7 +65,7 @@ class OfEvents:
         voxels = gap.events.voxels(edges[:, :-1], edges[:, 1:], bins)
         images, self.states = self.network.sequence(voxels, self.states)
         laid = F.interpolate(images[0, :-1], gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
-        return laid.expand(-1, len(gap.frame_0), -1, -1)
+        return _finite(self, laid.expand(-1, len(gap.frame_0), -1, -1))
 
 
 def of_weights(path: Path, device: torch.device | str = "cpu", name: str | None = None) -> OfFrames | OfEvents:
@@ -83,8 +83,17 @@ def takes_events(network: FrameFed) -> bool:
     """Whether what a network makes depends on events."""
     spec: Any = network.spec
     if hasattr(spec, "events"):
-        return spec.events != "none"
+        ways = {"events": "none", "flow_input": "frames", "reconstruct": "none"}
+        given = {name: getattr(spec, name, without) for name, without in ways.items()}
+        return given != ways or getattr(spec, "flow", "own") == "guided"
     return bool(spec.bins) or getattr(spec, "candidate", "none") != "none"
+
+
+def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:
+    """The images of a network.  Raises DataError where they are no numbers, which weights can lead to."""
+    if not bool(torch.isfinite(images).all()):
+        raise DataError(f"network '{method.name}' made values that are no numbers; take other weights")
+    return images
 
 
 def _check(method: OfFrames | OfEvents, gap: Gap) -> None:

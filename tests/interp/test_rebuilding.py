@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from torch.nn import functional as F
 from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
 from interp.methods.flow import flow
+from interp.methods.of_networks import of_weights, takes_events
 from interp.networks import make
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
@@ -126,3 +128,29 @@ def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
     save(path, "hdr", make("hdr", "tiny"))
     with pytest.raises(DataError, match="rebuilds no frames"):
         open_method(str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "takes"),
+    [
+        ("rrin", {}, False),
+        ("rrin_events", {}, True),
+        ("rrin_slomo_events", {}, True),
+        ("rrin_slomo_events", {"events": "none"}, False),
+        ("rrin_slomo_events", {"events": "none", "flow": "guided"}, True),
+        ("rrin_slomo_events", {"events": "none", "flow_input": "frames+events"}, True),
+        ("rrin_slomo_events", {"events": "none", "reconstruct": "firenet"}, True),
+    ],
+)
+def test_a_network_needs_events_if_any_part_of_it_does(name: str, options: dict[str, Any], takes: bool) -> None:
+    assert takes_events(make(name, **options)) == takes
+
+
+def test_weights_that_make_no_numbers_are_said(tmp_path: Path) -> None:
+    network = make("rrin")
+    with torch.no_grad():
+        next(network.parameters()).fill_(torch.nan)
+    save(tmp_path / "broken.safetensors", "rrin", network)
+    frame = torch.rand(3, 32, 32)
+    with pytest.raises(DataError, match="'broken' made values that are no numbers"):
+        of_weights(tmp_path / "broken.safetensors").between(Gap(frame, frame, None, 1000), torch.tensor([0.5]))
