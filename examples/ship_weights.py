@@ -3,8 +3,13 @@
     python examples/ship_weights.py RUN [REPORT ...]
 
 writes interp/pretrained/NETWORK-SIZE.safetensors and NETWORK-SIZE.md.  REPORT are folders of `vid2ev eval --network
-interp/pretrained/NETWORK-SIZE.safetensors`, for the scores on the card: run this first, then that, then this again; the
-weights are the same bytes each time.
+NETWORK-SIZE`, for the scores on the card: run this first, then that, then this again; the weights are the same bytes
+each time.
+
+A network that begins as a closed form, with last layers that are zero, may have learnt too much of what it was trained
+on.  With `--share 0.5 --share 1` those layers are tried at both shares of what they are, and the share is kept whose
+validation is best (between zero and tuned weights: M. Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR
+2022).
 """
 
 from __future__ import annotations
@@ -14,10 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import click
+import torch
 from safetensors import safe_open
+from torch import nn
 
 from interp import pretrained, weights
 from interp.train.curves import read_curve
+from interp.train.job import Job
+from interp.train.learner import means, overall
+from interp.train.made_of import learner_of, validation_of
+from interp.train.scores import Scores
 
 SCORES = {
     "hdr": "PSNR in decades of light, beyond the range of the frames / SSIM",
@@ -30,16 +41,58 @@ SCORES = {
 @click.argument("reports", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--machine", default="two cores of a CPU", show_default=True, help="What it was trained on.")
 @click.option("--hours", type=float, required=True, help="How long training took [h].")
-def ship(run: Path, reports: tuple[Path, ...], machine: str, hours: float) -> None:
+@click.option("--share", "shares", type=float, multiple=True, default=(1.0,), help="Of the last layers, to be tried.")
+@click.option("--note", default="", help="A sentence more for the card.")
+@click.option("--clips", type=click.Path(path_type=Path), help="Clips of validation.  [default: those of the run]")
+def ship(
+    run: Path,
+    reports: tuple[Path, ...],
+    machine: str,
+    hours: float,
+    shares: tuple[float, ...],
+    note: str,
+    clips: Path | None,
+) -> None:
     """Weights of RUN, and their card."""
     said = json.loads((run / "run.json").read_text())
-    job, network = said["job"], weights.load(run / "weights.safetensors")
+    job = said["job"]
     with safe_open(run / "weights.safetensors", "pt") as file:
         best = int(file.metadata()["step"])
+    tried = {share: _shared(run, share) for share in shares}
+    tables = {share: _table(job, tried[share], clips or run / "clips" / "validation") for share in shares}
+    kept = max(shares, key=lambda share: overall(tables[share]))
+    for share, table in tables.items():
+        click.echo(f"share {share:g}: {overall(table):.3f} dB, " + ", ".join(_cells(table)))
     path = Path(pretrained.__file__).with_name(f"{job['network']}-{job['size']}.safetensors")
-    weights.save(path, job["network"], network, {"steps": str(best), "seed": str(job["recipe"]["seed"])}, half=True)
-    path.with_suffix(".md").write_text(_card(run, job, said["versions"], best, machine, hours, reports))
+    about = {"steps": str(best), "seed": str(job["recipe"]["seed"]), "share": f"{kept:g}"}
+    weights.save(path, job["network"], tried[kept], about, half=True)
+    card = _card(run, job, said["versions"], best, kept, tables[kept], machine, hours, note, reports)
+    path.with_suffix(".md").write_text(card)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
+
+
+def _shared(run: Path, share: float) -> nn.Module:
+    """The network of a run, its last layers at a share of what they are, with weights of 16 bits."""
+    network = weights.load(run / "weights.safetensors")
+    with torch.no_grad():
+        for name, weight in network.named_parameters():
+            if name.rsplit(".", 2)[-2] == "head":
+                weight.mul_(share)
+            weight.copy_(weight.half())
+    return network
+
+
+@torch.no_grad()
+def _table(job: dict[str, Any], network: nn.Module, clips: Path) -> dict[str, Scores]:
+    """Its scores on the clips of validation."""
+    learner = learner_of(Job.model_validate(job))
+    learner.network = network
+    batches = validation_of(Job.model_validate(job), clips)
+    return means([(group, learner.scored(clip, learner.predicted(clip).float())) for group, clip in batches])
+
+
+def _cells(table: dict[str, Scores]) -> list[str]:
+    return [f"{found.psnr:.2f} / {found.ssim:.3f}" for found in table.values()]
 
 
 def _card(
@@ -47,8 +100,11 @@ def _card(
     job: dict[str, Any],
     versions: dict[str, str],
     best: int,
+    share: float,
+    table: dict[str, Scores],
     machine: str,
     hours: float,
+    note: str,
     reports: tuple[Path, ...],
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
@@ -62,8 +118,8 @@ def _card(
         f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
         f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
         f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; the weights are"
-        f" those of step {best}, whose validation was best, stored in 16 bits."
-        f" Versions: torch {versions['torch']}, lightning {versions['lightning']}.",
+        f" those of step {best}, whose validation was best,{_said_of(share)} stored in 16 bits."
+        f" Versions: torch {versions['torch']}, lightning {versions['lightning']}.{' ' * bool(note)}{note}",
         "",
         "- **Data**: events simulated while training, of "
         f"{clips['scenes'] / total:.0%} rendered scenes ({', '.join(clips['scene_names'])}), "
@@ -76,7 +132,7 @@ def _card(
         "",
         "## Validation",
         "",
-        *_validation(run, best, SCORES.get(job["network"], "PSNR-255 / SSIM")),
+        *_validation(run, table, SCORES.get(job["network"], "PSNR-255 / SSIM")),
     ]
     for report in reports:
         summary = json.loads((report / "summary.json").read_text())
@@ -84,16 +140,17 @@ def _card(
     return "\n".join(lines) + "\n"
 
 
-def _validation(run: Path, best: int, measured: str) -> list[str]:
-    """The scores of the best validation beside those of what needs no training."""
+def _said_of(share: float) -> str:
+    return "" if share == 1 else f" the last layers at {share:g} of what they were (of what was tried the best there),"
+
+
+def _validation(run: Path, table: dict[str, Scores], measured: str) -> list[str]:
+    """The scores of these weights beside those of what needs no training."""
     others = json.loads((run / "baselines.json").read_text())
-    row = next(row for row in read_curve(run / "validation.csv") if int(row["step"]) == best)
-    groups = [key.removesuffix(".psnr") for key in row if key.endswith(".psnr")]
-    found = {name: {group: (of[group]["psnr"], of[group]["ssim"]) for group in groups} for name, of in others.items()}
-    found["**these weights**"] = {group: (float(row[f"{group}.psnr"]), float(row[f"{group}.ssim"])) for group in groups}
-    lines = [f"| {measured} | {' | '.join(groups)} |", "|---" * (len(groups) + 1) + "|"]
-    for name, of in found.items():
-        lines.append(f"| {name} | {' | '.join(f'{psnr:.2f} / {ssim:.3f}' for psnr, ssim in of.values())} |")
+    rows = {name: {group: Scores(**of[group]) for group in table} for name, of in others.items()}
+    lines = [f"| {measured} | {' | '.join(table)} |", "|---" * (len(table) + 1) + "|"]
+    for name, of in (rows | {"**these weights**": table}).items():
+        lines.append(f"| {name} | {' | '.join(_cells(of))} |")
     return lines
 
 

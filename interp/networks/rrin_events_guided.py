@@ -7,7 +7,7 @@
 
 It has U2, U3 and U4 of RRINEvents, and in place of U1, which would have to learn optical flow, the flow of
 `candidates/guided.py` from the target itself; a_k says how far luminance is off there, and m how far to go from C' to
-J, half the way where they agree.  Untrained it is that closed form.
+J, most of the way where they agree.  Untrained it is that closed form.
 
 All networks work at half the resolution (U4 on squares of pixels), and where no event is near they change nothing: what
 stands still is the closed form's.  Without that, static pixels of real clips lost 0.5 dB in 800 steps of training.
@@ -22,7 +22,7 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import agreement, flows_to, half_way, recoloured
+from interp.candidates.guided import agreement, flows_to, recoloured, share_of_carried
 from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
@@ -84,7 +84,7 @@ class RrinEventsGuided(FrameFed):
         logits = self._visible(pair, warps, [at + correction, *seen]) + agreed
         of_warps, weights = blend(warps, logits, shares_at(times))
         start = recoloured(candidate, of_warps, self.spec.transfer)
-        image = self._corrected(pair, start, of_warps, found, half_way(agreed))
+        image = self._corrected(pair, start, of_warps, found, share_of_carried(agreed))
         return Interpolated(image, None, flows, warps, weights, of_warps)
 
     def _visible(self, pair: Pair, warps: torch.Tensor, seen: list[torch.Tensor]) -> torch.Tensor:

@@ -50,7 +50,7 @@ def feed_of(job: Job, cache: Path, step: int, workers: int, jobs: int, report: R
     """
     pool = Pool(cache, job.clips, job.recipe.seed, **job.window.model_dump())
     pool.fill(step * job.recipe.batch, jobs, report)
-    return Feed(_samples(job, pool), _validation(job, cache / "validation"), job.recipe.batch, workers)
+    return Feed(_samples(job, pool), validation_of(job, cache / "validation"), job.recipe.batch, workers)
 
 
 def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
@@ -59,8 +59,8 @@ def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
     return WithFlows(Sequences(pool, job.samples, WITHOUT_END))
 
 
-def _validation(job: Job, cache: Path) -> list[tuple[str, Batch]]:
-    """Clips of two event sensors, each as a batch of its own, with every instant a target."""
+def validation_of(job: Job, cache: Path) -> list[tuple[str, Batch]]:
+    """Clips of two event sensors, each as a batch of its own, with every instant a target; and what they count for."""
     batches = []
     for sensor in MEASURED_WITH:
         clips = job.clips.model_copy(update={"sensors": SENSORS[sensor]})

@@ -11,7 +11,7 @@ from pairs import counts
 from torch.nn import functional as F
 
 from interp.candidates.bridge import DARK
-from interp.candidates.guided import agreement, guided, recoloured
+from interp.candidates.guided import agreement, guided, recoloured, share_of_carried
 from interp.candidates.ramps import ramps
 from interp.light import luminance, to_light
 from interp.methods import Gap, open_method
@@ -81,6 +81,13 @@ def test_what_does_not_agree_counts_little() -> None:
     logits = agreement(torch.stack([target, target + 0.2], 2), target)
     torch.testing.assert_close(logits[:, :, 0], torch.zeros(1, 1, 20, 20))
     torch.testing.assert_close(logits[:, :, 1], torch.full((1, 1, 20, 20), -40 * 0.2))
+
+
+@pytest.mark.parametrize(("footprint", "most"), [(1, 0.8), (2, 0.95)])
+def test_what_agrees_is_mostly_what_was_carried(footprint: int, most: float) -> None:
+    logits = torch.tensor([[0.0, -1.0], [-1.0, -2.0]])[None, None, :, None]  # of two warps, at two pixels
+    found = share_of_carried(logits, footprint).flatten()
+    torch.testing.assert_close(found, most * torch.exp(torch.tensor([0.0, -1.0])))
 
 
 @pytest.mark.parametrize("size", [(8, 30), (16, 16)])
