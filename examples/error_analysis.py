@@ -40,6 +40,7 @@ OTHERS = {
     "low contrast": "low-light", "spin": "spinning-shapes", "highlights": "specular", "flicker": "flicker",
 }  # fmt: skip
 START_S, STOP_S = 0.3, 0.6
+METHODS_TRIED = ("flow", "bridge", "guided", "rrin_events_guided-tiny")
 INK = "#404040"
 
 
@@ -131,7 +132,7 @@ def drawn(rows: Sequence[tuple[Case, Found]]) -> Figure:
 
 
 @click.command(help="Score methods on eight causes of errors, each alone, and draw the last method's.")
-@click.option("--method", "methods", multiple=True, default=("flow", "bridge", "guided"), show_default=True)
+@click.option("--method", "methods", multiple=True, default=METHODS_TRIED, show_default=True)
 @click.option("--gaps", default=3, show_default=True, help="Gaps of each case.")
 @click.option("-o", "--output", default="error_analysis.jpg", show_default=True)
 def main(methods: tuple[str, ...], gaps: int, output: str) -> None:

@@ -24,6 +24,7 @@ from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.interpolate.tiling import parse_tiling
 from interp.methods import open_method
+from interp.representation.carried import footprint_of
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, versions
 
@@ -164,7 +165,8 @@ def prepared(
     if isinstance(take, OfStill):
         chosen = choice_of_one(method, network, str(source))
     else:
-        chosen = choice(method, network, has_events, str(source), device)
+        coarse = take.event_size is not None and footprint_of(take.size, take.event_size) > 1
+        chosen = choice(method, network, has_events, str(source), device, coarse)
     after = After(pretrained.path_of(hdr), has_events, device) if hdr else None
     tiling = parse_tiling(tile, take.size, multiple_of(chosen))
     needed = after is not None and after.needs_events

@@ -74,6 +74,11 @@ def places_of(
     return torch.from_numpy(pixel_map(frame_camera, frame_pose, depth, event_camera, event_pose))
 
 
+def footprint_of(size: tuple[int, int], event_size: tuple[int, int]) -> int:
+    """How many pixels of frames a pixel of an event camera is wide that is laid over them, edge on edge."""
+    return max(1, round(size[0] / event_size[0]))
+
+
 def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> float:
     """How many pixels of the event camera a pixel of the frame is wide, in the middle of all."""
     across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
