@@ -31,7 +31,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--fps", metavar="RATE", help="Frames per second of the scene's time: 960, 30000/1001.")
 @click.option(
     "--method", metavar="NAME", help="nearest, linear, flow, or with events integration, both, bridge, ramps, guided."
-    "  [default: the network that comes with vid2ev with events, flow without]",
+    "  [default: with events the network that comes with vid2ev, guided if they are coarse; flow without]",
 )  # fmt: skip
 @click.option("--network", metavar="WEIGHTS", help="Of `vid2ev train`, or the name of some that come with vid2ev.")
 @click.option(

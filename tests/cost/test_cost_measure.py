@@ -15,8 +15,9 @@ from moving_texture import texture
 from vid2ev import Dvs, Frame, events_of, load_sensor
 from vid2ev.compare.comparison import compare
 from vid2ev.cost.measure import Cost, measured
-from vid2ev.cost.passes import Float64Dvs
+from vid2ev.cost.passes import Float64Dvs, run
 from vid2ev.cost.plot import plot
+from vid2ev.cost.rung import Rung
 from vid2ev.cost.stretch import stretch_of
 from vid2ev.cost.table import cells, recommendation, table
 from vid2ev.errors import UsageError
@@ -183,10 +184,12 @@ def test_what_cannot_be_meant_is_refused(clip: str, options: dict, said: str) ->
 
 def test_the_reference_draws_the_noise_that_is_drawn_in_a_stretch_from_the_middle(clip: str) -> None:
     """Noise by count is counted from one instant in all settings; else it would be the largest of their errors."""
-    noisy = {"sensor": "paper", "overrides": ["crossing_noise=0.05"], "start": 0.06, "given": {"max_subframes"}}
-    found = measured(clip, clock=ticks(), **SIMPLE | noisy)
-    (finest,) = [row for row in found.rows if row.rung.name == "finest"]
-    assert found.reference.events > 1000 and finest.errors.distance < 1e-3
+    options = {"video": clip, "fps": 50, "start": 0.06, "subframes": 4, "tolerance": 0.01}
+    one, other = (
+        Events.concatenate(run(options, Rung("", float64=float64), 1, keep=True).sent[0].events)
+        for float64 in (True, False)
+    )
+    assert len(one) == len(other) > 1000 and np.abs(one.t - other.t).max() <= 1
 
 
 def test_what_passes_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
