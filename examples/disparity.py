@@ -64,7 +64,7 @@ name = "sun"
 kind = "sun"
 direction = [0.3, 0.7, 0.8]
 """
-BASELINES_MM = (0, 5, 10, 15, 20, 30)
+BASELINES_MM = (0, 5, 10, 15, 20)
 START_S, STOP_S = 0.4, 0.7
 PROTOCOL = Protocol(skip=7, insert=7)
 
@@ -98,13 +98,13 @@ def drawn(means_px: Sequence[float], scores: np.ndarray, names: Sequence[str]) -
     """PSNR of each method against mean disparity."""
     figure = Figure(figsize=(5.6, 3.4), layout="constrained")
     axis = figure.subplots()
-    for name, of, style in zip(names, scores.T, ("--", "-", "-", "-"), strict=False):
-        axis.plot(means_px, of, style, marker="o", markersize=3.5, linewidth=1.2, label=name)
+    for name, of in zip(names, scores.T, strict=True):
+        axis.plot(means_px, of, color=INK, marker="o", markersize=3, linewidth=1.1)
+        axis.annotate(name, (means_px[0], of[0]), (0, 5), textcoords="offset points", color=INK, fontsize=8)
     axis.set_xlabel("mean disparity [px]", color=INK)
     axis.set_ylabel("PSNR [dB]", color=INK)
     axis.spines[["top", "right"]].set_visible(False)
     axis.grid(alpha=0.25)
-    axis.legend(frameon=False, fontsize=8)
     return figure
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import struct
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -331,6 +333,18 @@ def test_a_small_chunk_that_swells_without_end_is_refused(tmp_path: Path, compre
     record = struct.pack("<I", len(header)) + header + struct.pack("<I", len(bomb)) + bomb
     (tmp_path / "bomb").write_bytes(content[: head_at - 4] + record)
     refused(tmp_path / "bomb")
+
+
+@pytest.mark.parametrize("content", [None, 1 << 40, 0.5, "text"])
+def test_messages_of_a_base_that_are_no_bytes_are_refused(tmp_path: Path, content: object) -> None:
+    """A number would be taken for how many bytes to make."""
+    with closing(sqlite3.connect(tmp_path / "bag.db3")) as base, base:
+        base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+        columns = "name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT"
+        base.execute(f"CREATE TABLE topics(id INTEGER PRIMARY KEY, {columns})")
+        base.execute("INSERT INTO topics VALUES (1, '/dvs/events', 'dvs_msgs/msg/EventArray', 'cdr', '')")
+        base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 5, ?)", (content,))
+    assert "damaged" in refused(tmp_path / "bag.db3")
 
 
 def test_without_rosbags_one_sentence_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,6 +62,8 @@ class Ros2Bag:
                     raise
                 except Exception as error:  # (what rosbags stumbles over in a damaged file can be anything)
                     raise ValueError("a message cannot be read") from error
+                if not isinstance(content, bytes | bytearray | memoryview):  # (SQLite holds what was put there)
+                    raise ValueError(f"a message is {type(content).__name__}, not bytes")
                 yield connection.topic, bytes(content)
 
     def _opened(self) -> Any:
