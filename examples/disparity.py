@@ -17,16 +17,12 @@ from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
-from error_analysis import CLEAN, INK, TRUTH
+from error_analysis import CLEAN, INK, METHODS_TRIED, TRUTH, scored
 from matplotlib.figure import Figure
 
-from interp.evaluate.protocol import Protocol
-from interp.evaluate.rebuilders import methods_of
-from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS
 from vid2ev import open_source
-from vid2ev.compare.pictures import psnr, squared_error
 from vid2ev.conversion import convert
 
 SCENE = """
@@ -66,7 +62,7 @@ direction = [0.3, 0.7, 0.8]
 """
 BASELINES_MM = (0, 5, 10, 15, 20)
 START_S, STOP_S = 0.4, 0.7
-PROTOCOL = Protocol(skip=7, insert=7)
+SKIP = 7  # of 8 frames
 
 
 def disparity_px(scene: str, baseline_mm: float) -> tuple[float, float]:
@@ -84,14 +80,7 @@ def scores_db(scene: str, baseline_mm: float, methods: Sequence[str]) -> list[fl
         rig, recording = Path(folder) / "rig.toml", Path(folder) / "recording"
         rig.write_text(f"{TRUTH}size = [384, 288]\n\n{dvs}translation_mm = [{baseline_mm}, 0, 0]\n")
         convert(scene, recording, rig=rig, pictures="png", preview=False, start=START_S, stop=STOP_S)
-        forms, files = ([name for name in methods if (name in METHODS) == known] for known in (True, False))
-        rebuilders = {each.name: each for each in methods_of(forms, files, PROTOCOL)}
-        errors: dict[str, list[np.ndarray]] = {name: [] for name in rebuilders}
-        for group in footage_of([str(recording)], PROTOCOL, Simulated.of("clean")).footage[0].groups():
-            for name, each in rebuilders.items():
-                made = each.frames(group)
-                errors[name] += [squared_error(a, b) for a, b in zip(made, group.truth, strict=True)]
-    return [psnr(np.stack(of)) for of in errors.values()]
+        return list(scored(str(recording), methods, SKIP, Simulated.of("clean")).psnr_db.values())
 
 
 def drawn(means_px: Sequence[float], scores: np.ndarray, names: Sequence[str]) -> Figure:
@@ -109,10 +98,7 @@ def drawn(means_px: Sequence[float], scores: np.ndarray, names: Sequence[str]) -
 
 
 @click.command(help="Score methods with an event camera that stands further and further beside the frame camera.")
-@click.option(
-    "--method", "methods", multiple=True, default=("flow", "bridge", "guided", "rrin_events_guided-tiny"),
-    show_default=True,
-)  # fmt: skip
+@click.option("--method", "methods", multiple=True, default=METHODS_TRIED, show_default=True)
 @click.option("--scenes", default=2, show_default=True, help="How many.")
 @click.option("-o", "--output", default="disparity.png", show_default=True)
 def main(methods: tuple[str, ...], scenes: int, output: str) -> None:

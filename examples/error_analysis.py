@@ -99,17 +99,21 @@ class Found:
 
 def found(case: Case, methods: Sequence[str], gaps: int) -> Found:
     """What methods make of a case."""
-    forms, files = ([name for name in methods if (name in METHODS) == known] for known in (True, False))
-    protocol = Protocol(skip=case.skip, insert=case.skip)
-    rebuilders = methods_of(forms, files, protocol)
+    simulated = Simulated.of("clean", start=START_S, stop=STOP_S)
     with TemporaryDirectory() as folder:
-        simulated = Simulated.of("clean", start=START_S, stop=STOP_S)
-        footage = footage_of([case.opened(Path(folder))], protocol, simulated, limit=gaps).footage[0]
-        errors: dict[str, list[np.ndarray]] = {each.name: [] for each in rebuilders}
-        for group in footage.groups():
-            for each in rebuilders:
-                made = each.frames(group)
-                errors[each.name] += [squared_error(a, b) for a, b in zip(made, group.truth, strict=True)]
+        return scored(case.opened(Path(folder)), methods, case.skip, simulated, gaps)
+
+
+def scored(dataset: str, methods: Sequence[str], skip: int, simulated: Simulated, gaps: int | None = None) -> Found:
+    """What methods make of a data set of which `skip` frames of each gap are rebuilt."""
+    forms, files = ([name for name in methods if (name in METHODS) == known] for known in (True, False))
+    protocol = Protocol(skip=skip, insert=skip)
+    rebuilders = methods_of(forms, files, protocol)
+    errors: dict[str, list[np.ndarray]] = {each.name: [] for each in rebuilders}
+    for group in footage_of([dataset], protocol, simulated, limit=gaps).footage[0].groups():
+        for each in rebuilders:
+            made = each.frames(group)
+            errors[each.name] += [squared_error(a, b) for a, b in zip(made, group.truth, strict=True)]
     middle = len(group.positions) // 2
     return Found({name: psnr(np.stack(of)) for name, of in errors.items()}, group.truth[middle], made[middle])
 

@@ -24,6 +24,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from interp.pretrained import OF_RUN
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import lock, whole_file, writing
 from vid2ev.recording.manifest import as_stated, difference, machine, versions
@@ -73,7 +74,7 @@ class RunFolder:
     @property
     def weights(self) -> Path:
         """The network, for use."""
-        return self.path / "weights.safetensors"
+        return self.path / OF_RUN
 
     @property
     def clips(self) -> Path:

@@ -22,6 +22,7 @@ from vid2ev.stream.saved import entry
 from vid2ev.stream.still import strip_count
 
 STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
+TALLIED = (("swallowed", SWALLOWED), ("capped", CAPPED), ("not_finite", NOT_FINITE))
 
 
 class Pixels:
@@ -109,13 +110,10 @@ class Pixels:
     def tallied(self) -> dict[str, int]:
         """How many crossings were swallowed, intervals capped, values of light mended."""
         tallies = self.tallies.sum(axis=0)
-        return {name: int(tallies[k]) for name, k in _TALLIED}
+        return {name: int(tallies[k]) for name, k in TALLIED}
 
     def _rouse(self, strips: np.ndarray) -> None:
         """Bring these strips up to the last frame, if they have slept."""
         late = self.sleep.late(strips)
         if late.size:
             rouse(late, self._total, self.planes, self.sleep.naps, self.flags, self.numbers, self._work[0])
-
-
-_TALLIED = (("swallowed", SWALLOWED), ("capped", CAPPED), ("not_finite", NOT_FINITE))
