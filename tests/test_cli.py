@@ -24,6 +24,7 @@ from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
+LONG = "a" * 300
 QUICK = ["--upsample", "none", "--threads", "1"]
 
 
@@ -261,6 +262,15 @@ def test_sources_that_are_none() -> None:
 def test_a_place_that_cannot_be_written() -> None:
     Path("file").touch()
     refused(1, "cannot be written", "convert", CLIP, "-o", "file/out", *QUICK)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["convert", LONG], ["convert", CLIP, "-o", LONG], ["info", LONG], ["render", LONG], ["compare", LONG, LONG],
+     ["plan", LONG], ["scene", LONG], ["reformat", LONG, "a.h5"], ["convert", CLIP, "--rig", LONG]],
+)  # fmt: skip
+def test_names_that_no_file_can_have(arguments: list[str]) -> None:
+    refused(1, "File name too long; give ", *arguments)
 
 
 def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,7 @@ from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
+from vid2ev.toml_text import parsed_toml
 from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes
 
 MEGABYTE = 1 << 20
@@ -201,6 +202,23 @@ def test_names_in_files_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest
     assert read_rig(rig, to_use=False).cameras[0].sensor == str(tmp_path / "mine.toml")
     monkeypatch.setenv(PATHS, "anywhere")
     assert read_rig(rig).cameras[0].sensor == str(tmp_path / "mine.toml")
+
+
+@pytest.mark.parametrize("name", ["a" * 256, "a/" * 2100, "ä" * 200])
+def test_names_that_no_file_can_have_are_one_sentence(name: str, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'[[objects]]\nkind = "plane"\nsize_m = [1, 1, 0]\ntexture = "{name}"\n', encoding="utf-8")
+    with pytest.raises(UsageError, match="expected the name of a file"):
+        read_scene(scene)
+
+
+def test_whole_numbers_of_toml_have_64_bits(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    for number in ("9" * 400, str(2**63), f"[[{-(2**63) - 1}]]", f"{{ uniform = [0, {'9' * 5000}] }}"):
+        scene.write_text(f"[scene]\nduration_s = {number}\n")
+        with pytest.raises(DataError, match=r"64 at most|integer string"):
+            read_scene(scene)
+    assert parsed_toml(f"a = {2**63 - 1}") == {"a": 2**63 - 1}
 
 
 def test_pictures_that_a_mesh_names_are_beside_it(tmp_path: Path) -> None:

@@ -13,13 +13,27 @@ from typing import Any
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """The tables of a text.  Raises ValueError, in one line, for what is none, or nested too deeply."""
+    """The tables of a text.
+
+    Raises ValueError, in one line, for what is none, or nested too deeply, and for whole numbers beyond 64 bits, which
+    TOML does not have.
+    """
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
+        _check_whole_numbers(tables)
+        return tables
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
     except ValueError as error:  # (numbers of thousands of digits are ValueErrors of their own)
         raise ValueError(str(error).splitlines()[0]) from error
+
+
+def _check_whole_numbers(node: Any) -> None:
+    if isinstance(node, Mapping | list):
+        for child in node.values() if isinstance(node, Mapping) else node:
+            _check_whole_numbers(child)
+    elif isinstance(node, int) and not -(2**63) <= node < 2**63:
+        raise ValueError(f"a whole number of {node.bit_length()} bits: expected 64 at most")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

@@ -25,6 +25,7 @@ LARGEST, PATHS = "VID2EV_LARGEST_MB", "VID2EV_PATHS"
 DEFAULT_MB = 4096
 TEXT_MB = 16  # of a text in which people write, or which says what a recording is
 DEEPEST = 40  # brackets in brackets of YAML
+LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes that file systems, and Linux, allow
 
 
 def most_bytes() -> int:
@@ -159,7 +160,8 @@ def first_line(error: Exception, most: int | None = 200) -> str:
 
 
 def beside(file: Path, name: str) -> Path:
-    """The place of a file that another one names.  Raises UsageError where that is neither in its folder nor below.
+    """The place of a file that another one names.  Raises UsageError where that is neither in its folder nor below, and
+    for names that no file can have.
 
     What counts is the name: a link in the folder may lead anywhere, since whoever made it could read the file.
     """
@@ -170,4 +172,7 @@ def beside(file: Path, name: str) -> Path:
             f"{file} names {name}, which is not in its folder or below; put it there, or set {PATHS}=anywhere in the"
             " environment if the file is to be trusted"
         )
+    longest = max(len(part.encode(errors="replace")) for part in place.split(os.sep))
+    if longest > LONGEST_NAME or len(place.encode(errors="replace")) > LONGEST_PATH:
+        raise UsageError(f"{file} names {name}: expected the name of a file, which has {LONGEST_NAME} bytes at most")
     return Path(place)

@@ -9,7 +9,18 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interp.candidates.beyond import ABOVE, BELOW, BOTTOM, BRIGHTEST, DARKEST, KEPT, TOP, carried
+from interp.candidates.beyond import (
+    ABOVE,
+    BELOW,
+    BELOW_AROUND,
+    BELOW_SHARE,
+    BOTTOM,
+    BRIGHTEST,
+    DARKEST,
+    KEPT,
+    TOP,
+    carried,
+)
 from interp.light import from_ratios, to_ratios
 
 
@@ -36,18 +47,29 @@ def test_light_that_leaves_the_range_is_followed_and_found_again(scale: float) -
     found = followed(light, (0.0, scale))
     for k, (true, made) in enumerate(zip(light, found, strict=True)):
         if k in (2, 3, 4, 7, 8):  # beyond the range, for one, two, three frames
-            end, usual = (TOP, ABOVE) if k < 5 else (BOTTOM, BELOW)
-            farthest = max(abs(math.log(each / end) - usual) for each in ((6.0,) if k < 5 else (1e-4,)))
+            end, usual = (TOP, ABOVE) if k < 5 else (BOTTOM, BELOW + BELOW_SHARE + BELOW_AROUND)
+            farthest = max(abs(math.log(each / end) - usual) for each in ((3.0, 6.0) if k < 5 else (2e-4, 1e-4)))
             pulled = (1 - KEPT) * (k - 1 if k < 5 else k - 6) * farthest
             assert abs(math.log(made / true)) <= pulled + 1e-5
         else:
             assert made == pytest.approx(true, rel=1e-6)
 
 
-def test_what_was_never_within_begins_as_it_is_on_average() -> None:
+def test_what_was_never_within_begins_as_it_is_usually() -> None:
     made, beyond = carried(torch.tensor([0.1, 0.5, 0.6])[None, None, None], one(0.0), None, torch.tensor([[0.1, 0.6]]))
     assert beyond.flatten().tolist() == [True, False, True]
-    assert made.flatten().tolist() == pytest.approx([(0.1 + BOTTOM * 0.5) / math.e, 0.5, (0.1 + TOP * 0.5) * 4 / 3])
+    deep = math.exp(BELOW + (BELOW_SHARE + BELOW_AROUND) / 3)  # (a third of the picture, and of what is around)
+    assert made.flatten().tolist() == pytest.approx([(0.1 + BOTTOM * 0.5) * deep, 0.5, (0.1 + TOP * 0.5) * 4 / 3])
+
+
+def test_the_more_of_a_picture_is_dark_the_darker_it_is_and_most_far_from_what_is_seen() -> None:
+    found = []
+    for dark in (20, 60):  # columns of 80
+        frame = torch.full((1, 1, 40, 80), 0.5)
+        frame[..., :dark] = 0.1
+        found.append(carried(frame, torch.zeros_like(frame), None, torch.tensor([[0.1, 0.6]]))[0][0, 0, 20].log())
+    assert (found[0][:16].diff().abs() < 1e-6).all() and (found[0][15:20].diff() > 0.02).all()
+    torch.testing.assert_close(found[1][:16] - found[0][:16], torch.full((16,), 0.5 * BELOW_SHARE))
 
 
 @given(st.lists(st.tuples(st.floats(-0.2, 1.3), st.floats(-30, 30)), min_size=1, max_size=20))

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from vid2ev.errors import Vid2evError
+from vid2ev.errors import DataError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
 
@@ -43,6 +43,13 @@ class Commands(click.Group):
         except Vid2evError as error:
             click.echo(f"error: {error}", err=True)
             sys.exit(error.exit_code)
+        except OSError as error:
+            if error.filename is None:
+                raise
+            # (no name of a file, a folder that may not be entered: what the system says of it is all that is known)
+            said = DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
+            click.echo(f"error: {said}", err=True)
+            sys.exit(said.exit_code)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -24,7 +23,7 @@ from typing import Any, Literal
 from pydantic import BaseModel
 
 from vid2ev.requests import setting
-from vid2ev.toml_text import toml_value
+from vid2ev.toml_text import parsed_toml, toml_value
 
 SUFFIXES = {
     "us": "us", "ms": "ms", "s": "s", "hz": "Hz", "deg": "deg", "mm": "mm", "m": "m", "px": "px", "e": "e",
@@ -182,8 +181,8 @@ def _is_bare(value: Any) -> bool:
     if not isinstance(value, str) or not value.strip():
         return False
     try:
-        tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError:
+        parsed_toml(f"value = {value}")
+    except ValueError:
         return not _is_number(value)
     return False
 

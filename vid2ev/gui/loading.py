@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from vid2ev.gui.setup import Setup
 from vid2ev.rig.rig_file import read_rig, write_text
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import CIS, DVS, load
+from vid2ev.toml_text import parsed_toml
 
 
 def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
@@ -20,8 +20,8 @@ def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
     The text is kept in `folder` while it is read.  Raises UsageError, DataError.
     """
     try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        tables = parsed_toml(text)
+    except ValueError as error:
         raise DataError(f"{name} is not valid TOML: {error}; correct that line") from error
     path = folder / Path(name).name
     write_text(path, text, overwrite=True)
