@@ -7,22 +7,24 @@ on the luminance of the ramps (`ramps.py`), which is there already, not between 
     F_tk = DIS(luminance of the ramps at t -> luminance of frame k)            nearby, whatever the motion in between
     J    = sum_k w_k g(I_k, F_tk)      w_k ~ s_k exp(-a e_k), s = (1 - t, t), e_k how far luminance is off there
     C    = luminance of the ramps in the colours of J
-    I    = C + m (J - C)               m = 4/5 exp(-a min_k e_k)
+    I    = C + m (J - C)               m = c^2 / (c^2 + j^2)
 
-J is free of the noise of events, C right where nothing in the key frames is, and I is nearer than either: mostly J
-where J agrees. Motion counts where it explains light better than standing still does
-(`vid2ev.upsample.flow.convincing`), so what stands still stays as it is.
+J is free of the noise of events, C right where nothing in the key frames is, and I is nearer than either: the best mix
+of two pictures whose errors have nothing to do with each other, as Wiener's filter is.  c^2 is the mean squared error
+of C, of what the key frames show that events missed (`ramps.in_doubt`); and e^2, of J and C apart, is c^2 + j^2.
+So J counts where C is in doubt, or both agree, and C where it is certain and J is not: flicker, smoke, what comes into
+view.  Motion counts where it explains light better than standing still does (`vid2ev.upsample.flow.convincing`), so
+what stands still stays as it is.
 
 Where a pixel of the event camera looks at k x k pixels of the frames, C has luminance averaged over them and nothing
-finer. So F and e are of luminance averaged alike, a is a / sqrt(k), for C is rougher, and in m 1/5 is 1 / (5 k^2), and
-light carried from key frame to key frame is a third picture in J, of share 1/2; twice over, I in place of C. That is a
-compromise. With k = 3, near things that move slowly: 34.5, 33.2 and 38.0 dB in three scenes, for 30.6, 29.2 and 32.8
-without all this, and 34.6, 34.3 and 39.2 of optical flow alone. With k = 2, where flow is at 27 dB: 33.9 for 34.5, of
-SSIM 0.968 for 0.962.
+finer.  So F and e are of luminance averaged alike, and c^2 in j^2 = e^2 - c^2 of doubts averaged alike, while c^2
+itself knows what C does not show.  What is taken over so many pixels is over k times as many, a is a / sqrt(k), and it
+is done twice: the second time motion is to I in place of C.
 
-Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +2.9 dB and +0.035 with a clean sensor, +2.6 dB and
-+0.046 with a noisy one; 28 parts of seven real videos +1.6 dB and +0.009, +7.9 dB and +0.11; the worst part -0.45 and
-+0.05 dB.
+Measured, PSNR and SSIM over those of the bridge, x8: 16 scenes +3.2 dB and +0.040 with a clean sensor, +3.0 dB and
++0.058 with a noisy one; 28 parts of seven real videos +1.6 dB and +0.011, +10.1 dB and +0.12; the worst part -0.2 and 0
+dB.  With m = 4/5 exp(-a e), whatever the doubt, scenes are 0.4 dB worse, real videos 0 and 2.2 dB.  With k = 2 and 3,
+12 scenes: +2.0 and +1.6 dB; 6 parts of two real videos: +1.0 and +1.2 dB.
 
 DIS runs on the CPU, and has no gradients.
 
@@ -31,6 +33,7 @@ Source: DIS, T. Kroeger et al., "Fast optical flow using dense inverse search", 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,10 +53,10 @@ SMALLEST = 16  # px: DIS refuses less than 12
 CONVINCED_CODES = 0.5  # by how much motion must be better than none
 SHARP = 40.0  # a: weights fall to 1/e where luminance (codes 0 ... 1) is off by a fortieth
 AROUND_PX = 5  # mean of errors over so many pixels
-# m where J agrees.  Against 1/2, 16 scenes gain 0.2 dB with a clean sensor and a noisy one, 16 parts of real videos
-# -0.04 and 1.7 dB; with 1, moving pixels of real videos lose 0.7 dB.  To trust J the more where it is off everywhere,
-# as noise of events is, gains 1.5 dB more of real videos with noise, and loses 1.4 dB of a flickering scene.
-MOSTLY = 0.8
+DOUBT_PX = 17  # and of doubts: lone events of noise are rare
+LEAST_OFF = 0.003  # that J is off by, at the least, codes: less than one of 255
+OF_MEAN = math.pi / 2  # the mean square of a normal distribution by the square of its mean absolute value
+GAMMA, DARKEST = 2.2, 0.02  # d code / d ln light = code / 2.2, of codes that are not quite black
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +64,8 @@ class Guided:
     """Both key frames at N instants.
 
     flows      [B, N, 4, H, W] px: from the target to the first frame (x, y), to the second
-    warps      [B, N, K, C, H, W]: the frames, carried, and the picture beside them, if there is one
-    logits     [B, N, K, H, W]: -a e, how well each agrees with the luminance that was given
+    warps      [B, N, 2, C, H, W]: the frames, carried
+    logits     [B, N, 2, H, W]: -a e, how well each agrees with the luminance that was given
     footprint  k
     """
 
@@ -73,14 +76,16 @@ class Guided:
 
     def blend(self, times: torch.Tensor) -> torch.Tensor:
         """J at times [B, N]."""
-        beside = [torch.full_like(times, 0.5)] * (self.warps.shape[2] - 2)
-        return blend(self.warps, self.logits, torch.stack([1 - times, times, *beside], -1))[0]
+        return blend(self.warps, self.logits, torch.stack([1 - times, times], -1))[0]
 
-    def image(self, pictures: torch.Tensor, times: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
-        """I at times [B, N], of the pictures that it was guided by."""
+    def image(
+        self, pictures: torch.Tensor, doubt: torch.Tensor, times: torch.Tensor, transfer: Transfer = "srgb"
+    ) -> torch.Tensor:
+        """I at times [B, N], of the pictures that it was guided by, and how far their light may be off [nat]."""
         carried = self.blend(times)
         start = recoloured(pictures, carried, transfer)
-        return start + share_of_carried(self.logits, self.footprint) * (carried - start)
+        share = share_of_carried(*errors(self.logits, pictures, doubt, transfer, self.footprint))
+        return start + share * (carried - start)
 
 
 @in_full_precision
@@ -90,16 +95,15 @@ def guided(
     pictures: torch.Tensor,
     transfer: Transfer = "srgb",
     footprint: int = 1,
-    beside: torch.Tensor | None = None,
+    like: torch.Tensor | None = None,
 ) -> Guided:
     """Frames [B, C, H, W] carried to where the luminance of pictures [B, N, C, H, W] is; all are codes.
 
     footprint   k, pixels across that a pixel of the event camera looks at
-    beside      another picture of the targets, [B, N, C, H, W], to be weighed with both
+    like        pictures that look more like the targets, to find motion by
     """
-    flows = flows_to(frame_0, frame_1, pictures, transfer, footprint)
-    made = [warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:]), *([] if beside is None else [beside])]
-    warps = torch.stack(made, 2)
+    flows = flows_to(frame_0, frame_1, pictures if like is None else like, transfer, footprint)
+    warps = torch.stack([warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:])], 2)
     return Guided(flows, warps, agreement(warps, pictures, transfer, footprint), footprint)
 
 
@@ -131,13 +135,33 @@ def agreement(
     """Logits [B, N, K, H, W] of warps [B, N, K, C, H, W] by how far their luminance is from that of pictures."""
     difference = _shown(warps, transfer) - _shown(pictures, transfer)[:, :, None]
     error = averaged(difference, footprint).abs().squeeze(3)
-    mean = F.avg_pool2d(error.flatten(0, 1), AROUND_PX, 1, AROUND_PX // 2, count_include_pad=False)
-    return -SHARP / footprint**0.5 * mean.unflatten(0, error.shape[:2])
+    return -SHARP / footprint**0.5 * _around(error, AROUND_PX, footprint)
 
 
-def share_of_carried(logits: torch.Tensor, footprint: int = 1) -> torch.Tensor:
-    """m [B, N, 1, H, W] of logits [B, N, K, H, W]."""
-    return (1 - (1 - MOSTLY) / footprint**2) * torch.exp(logits.amax(2, keepdim=True))
+@in_full_precision
+def errors(
+    logits: torch.Tensor,
+    pictures: torch.Tensor,
+    doubt: torch.Tensor,
+    transfer: Transfer = "srgb",
+    footprint: int = 1,
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """c^2 and j^2, mean squared errors in codes, [B, N, 1, H, W] each.
+
+    logits    of agreement, [B, N, K, H, W]
+    doubt     how far the light of pictures may be off [B, N, 1, H, W] nat
+    """
+    apart = OF_MEAN * (logits.amax(2, keepdim=True) * footprint**0.5 / SHARP) ** 2
+    per_nat = (_shown(pictures, transfer).clamp(min=DARKEST) / GAMMA) ** 2
+    wrong, seen_wrong = (
+        per_nat * _around(each**2, DOUBT_PX, footprint) for each in (doubt, averaged(doubt, footprint))
+    )
+    return wrong, (apart - seen_wrong).clamp(min=0)
+
+
+def share_of_carried(wrong: torch.Tensor, wrongly_carried: torch.Tensor) -> torch.Tensor:
+    """m of c^2 and j^2."""
+    return wrong / (wrong + wrongly_carried + LEAST_OFF**2)
 
 
 def averaged(values: torch.Tensor, footprint: int) -> torch.Tensor:
@@ -166,6 +190,13 @@ def dense_flow() -> Any:
     dis.setFinestScale(0)
     dis.setVariationalRefinementAlpha(10.0)
     return dis
+
+
+def _around(maps: torch.Tensor, across_px: int, footprint: int) -> torch.Tensor:
+    """Means over squares around each pixel of [B, N, K, H, W], of so many pixels of the event camera."""
+    across = across_px * footprint // 2 * 2 + 1
+    means = F.avg_pool2d(maps.flatten(0, 1), across, 1, across // 2, count_include_pad=False)
+    return means.unflatten(0, maps.shape[:2])
 
 
 def _shown(pictures: torch.Tensor, transfer: Transfer) -> torch.Tensor:

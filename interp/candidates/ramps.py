@@ -53,6 +53,10 @@ class Risen:
         t = times[..., None, None, None]
         return (self.number + EVEN_EVENTS * t) / (self.number + self.more + EVEN_EVENTS)
 
+    def missed(self, before: torch.Tensor, after: torch.Tensor) -> torch.Tensor:
+        """The drift, [B, N, 1, H, W] nat: by how much light changed more than E(1), of L0 and L1 [B, 1, 1, H, W]."""
+        return after - before - self.change - self.left
+
     def channels(self) -> torch.Tensor:
         """All of it as networks take it, [B, N, 4, H, W], about 0 ... 1 where little is."""
         numbers = torch.cat([self.number, self.more], 2)
@@ -96,9 +100,9 @@ def ramps(
     """
     found = risen(events, times) if found is None else found
     lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
-    before, after = (torch.log(luminance(light).clamp(min=0) + DARK)[:, None] for light in lights)
+    before, after = (_log(light) for light in lights)
     drift = found.drift(times)
-    logs = before + found.change + drift * (after - before - found.change - found.left)
+    logs = before + found.change + drift * found.missed(before, after)
     top = torch.maximum(before, after).amax((1, 2, 3, 4), keepdim=True).clamp(min=BRIGHTEST)
     made = (torch.exp(torch.minimum(logs.clamp(min=DARKEST), top)) - DARK).clamp(min=0)
     if around is None:
@@ -107,6 +111,24 @@ def ramps(
     else:
         ratios = ratios_of(to_light(around, transfer))
     return to_codes(coloured(made, ratios), transfer)
+
+
+@in_full_precision
+def in_doubt(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, found: Risen, times: torch.Tensor, transfer: Transfer = "srgb"
+) -> torch.Tensor:
+    """How far L may be off at times [B, N], [B, N, 1, H, W] nat: (L1 - L0 - E(1)) sqrt(w (1 - w)).
+
+    If what is missed came all at once, at any moment of w, that is the square root of the mean squared error.
+    """
+    drift = found.drift(times)
+    before, after = (_log(to_light(frame, transfer)) for frame in (frame_0, frame_1))
+    return found.missed(before, after) * torch.sqrt(drift * (1 - drift))
+
+
+def _log(light: torch.Tensor) -> torch.Tensor:
+    """L [B, 1, 1, H, W] of light [B, C, H, W]."""
+    return torch.log(luminance(light).clamp(min=0) + DARK)[:, None]
 
 
 def _shares(number: Steps) -> Steps:

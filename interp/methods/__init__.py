@@ -13,7 +13,7 @@ line in `METHODS`.
     both          events integrated from both, with weights 1 - t and t: the complementary filter
     bridge        the same with the drift spread in proportion to events: the closed form to beat
     ramps         the bridge with light on its way between events, instead of in stairs
-    guided        the key frames carried to where the light of the ramps is, half and half where they agree
+    guided        the key frames carried to where the light of the ramps is, and mixed with these as either is in doubt
 """
 
 from __future__ import annotations

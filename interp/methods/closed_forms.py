@@ -9,8 +9,7 @@ from typing import Self
 import torch
 
 from interp.candidates.guided import guided
-from interp.candidates.ramps import ramps
-from interp.methods.flow import flow
+from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.methods.gap import Gap
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
@@ -69,13 +68,12 @@ def of_events(form: Form) -> Law:
 def guided_by_ramps(
     frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, times: torch.Tensor
 ) -> torch.Tensor:
-    """Ramps in the colours of carried frames, half and half with these where they agree (`candidates.guided`)."""
-    pictures = ramps(frame_0, frame_1, events, times)
-    if events.footprint == 1:
-        return guided(frame_0, frame_1, pictures).image(pictures, times)
-    each = zip(frame_0, frame_1, times, strict=True)
-    beside = torch.stack([flow(Gap(first, last, None, 0), at) for first, last, at in each])
-    for _ in range(ROUNDS):
-        found = guided(frame_0, frame_1, pictures, footprint=events.footprint, beside=beside)
-        pictures = found.image(pictures, times)
-    return pictures
+    """Ramps in the colours of carried frames, mixed with these as either is in doubt (`candidates.guided`)."""
+    found = risen(events, times)
+    pictures = ramps(frame_0, frame_1, events, times, found=found)
+    doubt = in_doubt(frame_0, frame_1, found, times)
+    images = pictures
+    for _ in range(1 if events.footprint == 1 else ROUNDS):
+        carried = guided(frame_0, frame_1, pictures, footprint=events.footprint, like=images)
+        images = carried.image(pictures, doubt, times)
+    return images

@@ -73,20 +73,10 @@ def of_weights(path: Path, device: torch.device | str = "cpu", name: str | None 
     network: Any = load(path).to(device)
     name = name or path.stem
     if isinstance(network, FrameFed):
-        return OfFrames(name, network, takes_events(network))
+        return OfFrames(name, network, network.spec.takes_events)
     if isinstance(network, EventFed):
         return OfEvents(name, network)
     raise DataError(f"{path} holds a network that rebuilds no frames in between; give one of frames or of events")
-
-
-def takes_events(network: FrameFed) -> bool:
-    """Whether what a network makes depends on events."""
-    spec: Any = network.spec
-    if hasattr(spec, "events"):
-        ways = {"events": "none", "flow_input": "frames", "reconstruct": "none"}
-        given = {name: getattr(spec, name, without) for name, without in ways.items()}
-        return given != ways or getattr(spec, "flow", "own") == "guided"
-    return bool(spec.bins) or getattr(spec, "candidate", "none") != "none"
 
 
 def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:

@@ -35,6 +35,10 @@ class EventInputSpec(FrameFedSpec):
     )
     bins: int = Field(default=5, ge=1, le=64, description="of events, in each half or between the frames; see events")
 
+    @property
+    def takes_events(self) -> bool:
+        return self.events != "none"
+
 
 class BinWalk(nn.Module):
     """A GRU of 8 channels that walks over bins: as many again, each with what was before it."""

@@ -97,6 +97,10 @@ class RrinEventsSpec(FrameFedSpec):
         default="srgb", description="how the frames are coded: srgb or linear; for the candidate"
     )
 
+    @property
+    def takes_events(self) -> bool:
+        return bool(self.bins) or self.candidate != "none"
+
 
 class RrinEvents(FrameFed):
     """RRINEvents; without events RRIN."""

@@ -70,6 +70,11 @@ class RrinSlomoEventsSpec(EventInputSpec):
     transfer: Transfer = Field(default="srgb", description="how the frames are coded, for flow guided; free")
     reconstruct_weights: Weights = Field(default="own", description="pretrained: weights of that network, frozen")
 
+    @property
+    def takes_events(self) -> bool:
+        elsewhere = self.flow_input != "frames" or self.flow == "guided" or self.reconstruct != "none"
+        return super().takes_events or elsewhere
+
 
 class RrinSlomoEvents(FrameFed):
     """RRINSloMoEvents; pretrained parts are loaded with `interp.weights.load_part`."""

@@ -42,3 +42,8 @@ class FrameFedSpec(NetworkSpec):
         default=True,
         description="heads of flows and residues start at 0, so that training starts at a cross-fade; free",
     )
+
+    @property
+    def takes_events(self) -> bool:
+        """Whether what the network makes depends on events."""
+        return True

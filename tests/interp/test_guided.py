@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from pairs import counts
 from torch.nn import functional as F
 
 from interp.candidates.bridge import DARK
-from interp.candidates.guided import agreement, guided, recoloured, share_of_carried
-from interp.candidates.ramps import ramps
+from interp.candidates.guided import GAMMA, SHARP, agreement, errors, guided, recoloured, share_of_carried
+from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_light
 from interp.methods import Gap, open_method
 from interp.networks import make
@@ -83,11 +84,43 @@ def test_what_does_not_agree_counts_little() -> None:
     torch.testing.assert_close(logits[:, :, 1], torch.full((1, 1, 20, 20), -40 * 0.2))
 
 
-@pytest.mark.parametrize(("footprint", "most"), [(1, 0.8), (2, 0.95)])
-def test_what_agrees_is_mostly_what_was_carried(footprint: int, most: float) -> None:
-    logits = torch.tensor([[0.0, -1.0], [-1.0, -2.0]])[None, None, :, None]  # of two warps, at two pixels
-    found = share_of_carried(logits, footprint).flatten()
-    torch.testing.assert_close(found, most * torch.exp(torch.tensor([0.0, -1.0])))
+def share_of(*of: Any, **options: Any) -> torch.Tensor:
+    return share_of_carried(*errors(*of, **options))
+
+
+@pytest.mark.parametrize(("doubt", "wrong"), [(0.2, 0.0), (0.2, 0.05), (0.05, 0.1), (0.02, 0.2)])
+def test_the_mix_is_the_best_of_two_whose_errors_are_independent(doubt: float, wrong: float) -> None:
+    """Light that is off by normal noise of a known size, and a carried picture that is off by another."""
+    torch.manual_seed(0)
+    truth = torch.full((1, 1, 1, 200, 200), 0.5)
+    seen, carried = truth + doubt * truth / GAMMA * torch.randn_like(truth), truth + wrong * torch.randn_like(truth)
+    share = share_of(agreement(carried[:, :, None], seen), seen, torch.full_like(seen, doubt))
+
+    def off(share: torch.Tensor | float) -> float:
+        return float((seen + share * (carried - seen) - truth).square().mean())
+
+    # (e^2 is of 25 pixels that are around, which know it to a third: that costs a tenth of what the filter takes away)
+    assert off(share) < 1.2 * min(off(k / 50) for k in range(51)) + 0.1 * off(0)
+
+
+def test_what_is_certain_is_kept_and_what_agrees_is_carried() -> None:
+    target = torch.full((1, 1, 1, 40, 40), 0.5)
+    agrees, apart = torch.zeros(1, 1, 2, 40, 40), torch.full((1, 1, 2, 40, 40), -SHARP * 0.2)
+    certain, doubted = torch.zeros_like(target), torch.full_like(target, 0.15)
+    assert not share_of(apart, target, certain).any()  # flicker: both frames know nothing of it
+    assert float(share_of(agrees, target, doubted).min()) > 0.98
+    assert float(share_of(apart, target, doubted).max()) < 0.03
+
+
+def test_light_of_coarse_pixels_is_in_doubt_by_what_it_does_not_show() -> None:
+    target = torch.full((1, 1, 1, 60, 60), 0.5)
+    stripes = 0.3 * (torch.arange(60) % 2 * 2 - 1.0).expand_as(target)  # as fine as pixels: nothing is left of 2 x 2
+    agrees = torch.zeros(1, 1, 2, 60, 60)
+    apart = agrees - SHARP / 2**0.5 * 0.02
+    fine, coarse = (share_of(apart, target, stripes, footprint=each).mean() for each in (1, 2))
+    assert 0.6 < float(fine) <= 1 and float(coarse) > 0.85
+    even = share_of(apart, target, torch.full_like(target, 0.02), footprint=2)
+    assert float(even.max()) < 0.1
 
 
 @pytest.mark.parametrize("size", [(8, 30), (16, 16)])
@@ -103,6 +136,22 @@ def test_a_fresh_guided_network_is_the_closed_form() -> None:
         images = make("rrin_events_guided")(first, last, times, events).images[0]
     expected = open_method("guided").between(Gap(first[0], last[0], events, 33_333), times)
     torch.testing.assert_close(images, expected, atol=1e-5, rtol=0)
+
+
+def test_what_is_certain_stays_whatever_was_learnt() -> None:
+    """Key frames are alike and events between them cancel: nobody is in doubt what light was in between."""
+    frame = texture(1)[..., :SIDE, :SIDE]
+    off_on = torch.zeros(1, 2, STEPS, SIDE, SIDE, dtype=torch.int32)
+    off_on[:, 1, 8], off_on[:, 1, 10], off_on[:, 0, 20], off_on[:, 0, 22] = 1, 1, 1, 1
+    events, times = EventCounts(off_on, torch.full((1, 2), C)), torch.tensor([0.4, 0.5])
+    torch.manual_seed(0)
+    network = make("rrin_events_guided", colours=1, zero_heads=False)
+    sure = ramps(frame, frame, events, times[None])
+    half = risen(events, times[None])
+    assert float(in_doubt(frame, frame, half, times[None]).abs().max()) < C / 2
+    with torch.no_grad():
+        off = (network(frame, frame, times, events).images - sure).abs()
+    assert float((sure - frame[:, None]).abs().mean()) > 0.03 > 3 * float(off.mean())
 
 
 def test_it_stands_light_that_is_not_finite() -> None:

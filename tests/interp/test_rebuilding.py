@@ -13,8 +13,8 @@ from torch.nn import functional as F
 from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
 from interp.methods.flow import flow
-from interp.methods.of_networks import of_weights, takes_events
-from interp.networks import make
+from interp.methods.of_networks import of_weights
+from interp.networks import make, spec_of
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
 from vid2ev import Frame
@@ -143,7 +143,7 @@ def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_a_network_needs_events_if_any_part_of_it_does(name: str, options: dict[str, Any], takes: bool) -> None:
-    assert takes_events(make(name, **options)) == takes
+    assert spec_of(name, **options).takes_events == takes
 
 
 def test_weights_that_make_no_numbers_are_said(tmp_path: Path) -> None:
