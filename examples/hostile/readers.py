@@ -331,14 +331,11 @@ def _read_manifest(path: Path) -> None:
     from vid2ev.errors import Vid2evError
     from vid2ev.recording.manifest import is_of_job, read_manifest
 
-    try:
-        is_of_job(path, {"source": {"kind": "x"}}, path.parent, overwrite=True)
-        read_manifest(path)
-    except Vid2evError as error:
-        check(error)
     done = CliRunner().invoke(info, [str(path.parent)])
     if done.exception and not isinstance(done.exception, SystemExit | Vid2evError):
         raise done.exception
+    is_of_job(path, {"source": {"kind": "x"}}, path.parent, overwrite=True)
+    read_manifest(path)
 
 
 READERS: dict[str, Reader] = {f"events-{name}": _events(name) for name in event_seeds.READABLE}
