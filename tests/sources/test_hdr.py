@@ -99,7 +99,7 @@ def by_the_book(planes: list[np.ndarray], bits: int, full: bool, transfer: str) 
 
 
 @pytest.mark.parametrize(("codec", "name", "options"), [
-    # (with more threads its times of decoding are no numbers once in thousands of runs)
+    # (with more threads a packet has had no time of decoding, once)
     ("libx265", "a.mkv", {"x265-params": "lossless=1:bframes=0:frame-threads=1:pools=none:log-level=none"}),
     ("ffv1", "a.mkv", {}),
 ])  # fmt: skip
