@@ -84,7 +84,8 @@ class Guided:
         """I at times [B, N], of the pictures that it was guided by, and how far their light may be off [nat]."""
         carried = self.blend(times)
         start = recoloured(pictures, carried, transfer)
-        share = share_of_carried(*errors(self.logits, pictures, doubt, transfer, self.footprint))
+        wrong, seen_wrong = off_by(pictures, doubt, transfer, self.footprint)
+        share = part_of(wrong, carried_off_by(self.logits, seen_wrong, self.footprint))
         return start + share * (carried - start)
 
 
@@ -139,29 +140,30 @@ def agreement(
 
 
 @in_full_precision
-def errors(
-    logits: torch.Tensor,
-    pictures: torch.Tensor,
-    doubt: torch.Tensor,
-    transfer: Transfer = "srgb",
-    footprint: int = 1,
+def off_by(
+    pictures: torch.Tensor, doubt: torch.Tensor, transfer: Transfer = "srgb", footprint: int = 1
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """c^2 and j^2, mean squared errors in codes, [B, N, 1, H, W] each.
+    """c^2, mean squared errors of pictures [B, N, C, H, W] in codes, [B, N, 1, H, W]; and of these averaged alike.
 
-    logits    of agreement, [B, N, K, H, W]
-    doubt     how far the light of pictures may be off [B, N, 1, H, W] nat
+    doubt   how far their light may be off [B, N, 1, H, W] nat
     """
-    apart = OF_MEAN * (logits.amax(2, keepdim=True) * footprint**0.5 / SHARP) ** 2
     per_nat = (_shown(pictures, transfer).clamp(min=DARKEST) / GAMMA) ** 2
-    wrong, seen_wrong = (
-        per_nat * _around(each**2, DOUBT_PX, footprint) for each in (doubt, averaged(doubt, footprint))
-    )
-    return wrong, (apart - seen_wrong).clamp(min=0)
+    wrong = per_nat * _around(doubt**2, DOUBT_PX, footprint)
+    if footprint == 1:
+        return wrong, wrong
+    return wrong, per_nat * _around(averaged(doubt, footprint) ** 2, DOUBT_PX, footprint)
 
 
-def share_of_carried(wrong: torch.Tensor, wrongly_carried: torch.Tensor) -> torch.Tensor:
-    """m of c^2 and j^2."""
-    return wrong / (wrong + wrongly_carried + LEAST_OFF**2)
+@in_full_precision
+def carried_off_by(logits: torch.Tensor, seen_wrong: torch.Tensor, footprint: int = 1) -> torch.Tensor:
+    """j^2 [B, N, 1, H, W] of logits of agreement [B, N, K, H, W], and of c^2 averaged alike."""
+    apart = OF_MEAN * (logits.amax(2, keepdim=True) * footprint**0.5 / SHARP) ** 2
+    return (apart - seen_wrong).clamp(min=0)
+
+
+def part_of(one: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
+    """Of c^2 and j^2: m; of j^2 and c^2: 1 - m, but none where C and J are no farther apart than C is in doubt."""
+    return one / (one + other + LEAST_OFF**2)
 
 
 def averaged(values: torch.Tensor, footprint: int) -> torch.Tensor:

@@ -24,7 +24,7 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import LEAST_OFF, SHARP, agreement, errors, flows_to, recoloured, share_of_carried
+from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, off_by, part_of, recoloured
 from interp.candidates.ramps import RISEN_CHANNELS, Risen, in_doubt, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
@@ -81,21 +81,18 @@ class RrinEventsGuided(FrameFed):
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
         first = flows_to(pair.frame_0, pair.frame_1, candidate, self.spec.transfer)
         doubt = in_doubt(pair.frame_0, pair.frame_1, found, times, self.spec.transfer)
-
-        def weighed(warps: torch.Tensor) -> tuple[torch.Tensor, tuple[torch.Tensor, torch.Tensor]]:
-            agreed = agreement(warps, candidate, self.spec.transfer)
-            return agreed, errors(agreed, candidate, doubt, self.spec.transfer)
-
-        unsure = pair.once[1][:, None] * share_to_mend(*weighed(warped(pair, first))[1]).detach()
+        wrong, _ = off_by(candidate, doubt, self.spec.transfer)
+        tried = agreement(warped(pair, first), candidate, self.spec.transfer)
+        unsure = pair.once[1][:, None] * part_of(carried_off_by(tried, wrong), wrong).detach()
         at = self.scale.down(first) / self.scale.factor
         correction = self.scale.down(unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
         flows = first + self.scale.flow_up(correction)
         warps = warped(pair, flows)
-        agreed, off = weighed(warps)
+        agreed = agreement(warps, candidate, self.spec.transfer)
         logits = self._visible(unsure, warps, [at + correction, *seen]) + agreed
         of_warps, weights = blend(warps, logits, shares_at(times))
         start = recoloured(candidate, of_warps, self.spec.transfer)
-        image = self._corrected(pair, start, of_warps, found, *off)
+        image = self._corrected(pair, start, of_warps, found, wrong, carried_off_by(agreed, wrong))
         return Interpolated(image, None, flows, warps, weights, of_warps)
 
     def _visible(self, unsure: torch.Tensor, warps: torch.Tensor, seen: list[torch.Tensor]) -> torch.Tensor:
@@ -116,11 +113,6 @@ class RrinEventsGuided(FrameFed):
         offs = SHARP * torch.cat([wrong, wrongly_carried], 2).detach().sqrt()
         seen = [pair.frame_0, pair.frame_1, draft, start, torch.cat([found.channels(), offs], 2)]
         said = pair.once[1][:, None] * run(self.residue, seen)
-        share = share_of_carried(wrong, wrongly_carried * torch.exp(-said[:, :, -1:].clamp(-MOST, MOST)))
-        spread = (wrong * share_to_mend(wrong, wrongly_carried)).detach().sqrt()
+        share = part_of(wrong, wrongly_carried * torch.exp(-said[:, :, -1:].clamp(-MOST, MOST)))
+        spread = (wrong * part_of(wrongly_carried, wrong)).detach().sqrt()
         return start + share * (draft - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])
-
-
-def share_to_mend(wrong: torch.Tensor, wrongly_carried: torch.Tensor) -> torch.Tensor:
-    """1 - m, of c^2 and j^2; none where C and J are no farther apart than C is in doubt."""
-    return wrongly_carried / (wrong + wrongly_carried + LEAST_OFF**2)

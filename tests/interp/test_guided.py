@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from pairs import counts
 from torch.nn import functional as F
 
 from interp.candidates.bridge import DARK
-from interp.candidates.guided import GAMMA, SHARP, agreement, errors, guided, recoloured, share_of_carried
+from interp.candidates.guided import GAMMA, SHARP, agreement, carried_off_by, guided, off_by, part_of, recoloured
 from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_light
 from interp.methods import Gap, open_method
@@ -84,8 +83,9 @@ def test_what_does_not_agree_counts_little() -> None:
     torch.testing.assert_close(logits[:, :, 1], torch.full((1, 1, 20, 20), -40 * 0.2))
 
 
-def share_of(*of: Any, **options: Any) -> torch.Tensor:
-    return share_of_carried(*errors(*of, **options))
+def share_of(logits: torch.Tensor, pictures: torch.Tensor, doubt: torch.Tensor, footprint: int = 1) -> torch.Tensor:
+    wrong, seen_wrong = off_by(pictures, doubt, footprint=footprint)
+    return part_of(wrong, carried_off_by(logits, seen_wrong, footprint))
 
 
 @pytest.mark.parametrize(("doubt", "wrong"), [(0.2, 0.0), (0.2, 0.05), (0.05, 0.1), (0.02, 0.2)])
