@@ -46,7 +46,7 @@ def choice(
     network, why = pretrained.path_of(network) if network else None, "as asked"
     if not (name or network):
         # (of frames alone there is a network, too, but it does not beat optical flow; and the one with events has not
-        # learnt from coarse ones, of which `guided` makes 3 dB more)
+        # learnt from coarse ones, of which `guided` makes 1 dB more)
         network = pretrained.first(pretrained.WITH_EVENTS) if events and not coarse else None
         name = None if network else BEST if events else FALLBACK
         seen = f"there are {'coarse ' * coarse}events" if events else "there are no events"
