@@ -24,11 +24,11 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, off_by, part_of, recoloured
-from interp.candidates.ramps import RISEN_CHANNELS, Risen, in_doubt, ramps, risen
+from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, part_of, recoloured
+from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
-from interp.networks.gate import gate_of
+from interp.networks.gate import doubts, gate_of
 from interp.networks.spec import Depth, FrameFedSpec
 from interp.representation.event_counts import EventCounts
 
@@ -80,10 +80,8 @@ class RrinEventsGuided(FrameFed):
         seen = [self.scale.down(each) for each in (pair.frame_0, pair.frame_1, candidate)]
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
         first = flows_to(pair.frame_0, pair.frame_1, candidate, self.spec.transfer)
-        doubt = in_doubt(pair.frame_0, pair.frame_1, found, times, self.spec.transfer)
-        wrong, _ = off_by(candidate, doubt, self.spec.transfer)
-        tried = agreement(warped(pair, first), candidate, self.spec.transfer)
-        unsure = pair.once[1][:, None] * part_of(carried_off_by(tried, wrong), wrong).detach()
+        wrong, unsure = doubts(pair, candidate, found, first, times, self.spec.transfer)
+        unsure = pair.once[1][:, None] * unsure
         at = self.scale.down(first) / self.scale.factor
         correction = self.scale.down(unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
         flows = first + self.scale.flow_up(correction)

@@ -2,7 +2,8 @@
 network.
 
     F_01, F_10 = flow(I0, I1, events?)                                   own, trained before and frozen, or DIS
-    F_t0, F_t1 = of these, or by the light that events tell              `candidates/guided.py`; V then of what agrees
+    F_t0, F_t1 = of these, or by the light that events tell              `candidates/guided.py`; V then of what agrees,
+                                                                         and UNets change only what does not
     dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, events, reconstructions?)
     J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
     I_t = J + UNet(I0, I1, J)                                            if refine is unet
@@ -13,6 +14,7 @@ for the others.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import torch
@@ -24,13 +26,14 @@ from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
 from interp.candidates.guided import agreement, flows_to, motion_between
-from interp.candidates.ramps import ramps
+from interp.candidates.ramps import ramps, risen
 from interp.light import Transfer
 from interp.networks.e2vid import E2vid, E2vidSpec
 from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
 from interp.networks.firenet import FireNet, FireNetSpec
 from interp.networks.flow import FlowNetwork, FlowNetworkSpec
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at
+from interp.networks.gate import doubts, gate_of
 from interp.networks.refinement import refined
 
 MULTIPLE = 16  # of sides: five levels of flow
@@ -76,6 +79,25 @@ class RrinSlomoEventsSpec(EventInputSpec):
         return super().takes_events or elsewhere
 
 
+@dataclass(frozen=True, slots=True)
+class _Guide:
+    """What events tell of N targets, if that guides.
+
+    light    [B, N, C, H, W], as codes of this transfer
+    flows    [B, N, 4, H, W] px, by it
+    unsure   [B, N, 1, H, W], 0 ... 1, how much a network may change there
+    """
+
+    transfer: Transfer
+    light: torch.Tensor | None = None
+    flows: torch.Tensor | None = None
+    unsure: torch.Tensor | float = 1.0
+
+    def agreement(self, warps: torch.Tensor) -> torch.Tensor | float:
+        """Logits of warps by their light."""
+        return 0.0 if self.light is None else agreement(warps, self.light, self.transfer)
+
+
 class RrinSlomoEvents(FrameFed):
     """RRINSloMoEvents; pretrained parts are loaded with `interp.weights.load_part`."""
 
@@ -109,21 +131,25 @@ class RrinSlomoEvents(FrameFed):
         if self.reconstruct is not None:
             beside, once = [first_last_and_target(once[0], times)], once[1:]
         events = self.event_input.at(pair, once, times)
-        told = self._told(pair, times)
-        first = None if told is None else flows_to(pair.frame_0, pair.frame_1, told, self.spec.transfer)
-        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale, first)
-        agreed = 0.0 if told is None else agreement(warps, told, self.spec.transfer)
-        image, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
+        guide = self._guide(pair, times)
+        at, warps, visible = refined(
+            self.combined, pair, times, [*events, *beside], self.spec.flow_scale, guide.flows, guide.unsure
+        )
+        image, weights = blend(warps, F.logsigmoid(visible) + guide.agreement(warps), shares_at(times))
         of_warps = image
         if self.residue is not None:
-            image = image + run(self.residue, [pair.frame_0, pair.frame_1, image])
+            image = image + guide.unsure * run(self.residue, [pair.frame_0, pair.frame_1, image])
         return Interpolated(image, pair.flows, at, warps, weights, of_warps)
 
-    def _told(self, pair: Pair, times: torch.Tensor) -> torch.Tensor | None:
-        """Light at the targets as events tell it, [B, N, C, H, W], if that guides."""
+    def _guide(self, pair: Pair, times: torch.Tensor) -> _Guide:
+        transfer = self.spec.transfer
         if self.spec.flow != "guided":
-            return None
-        return ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer)
+            return _Guide(transfer)
+        found = risen(pair.events, times)
+        told = ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found)
+        flows = flows_to(pair.frame_0, pair.frame_1, told, transfer)
+        _, unsure = doubts(pair, told, found, flows, times, transfer)
+        return _Guide(transfer, told, flows, gate_of(pair)[:, None] * unsure)
 
     def _flow(self) -> nn.Module:
         spec, bins = self.spec, self.spec.bins if self.spec.flow_input == "frames+events" else 0

@@ -187,7 +187,6 @@ def test_all_ways_with_a_candidate_teach_every_unet(candidate: str, coarse: bool
         {"events": "bins", "prepare": "unet", "flow_input": "frames+events"},
         {"reconstruct": "firenet"},
         {"reconstruct": "e2vid", "events": "bins"},
-        {"flow": "guided"},
     ],
 )
 def test_all_parts_of_the_combined_system_learn(options: dict) -> None:
@@ -196,6 +195,21 @@ def test_all_parts_of_the_combined_system_learn(options: dict) -> None:
     for name, parameter in made.named_parameters():
         assert parameter.grad is not None and torch.isfinite(parameter.grad).all(), name
         assert parameter.grad.any(), name
+
+
+def test_a_guided_combined_system_learns_from_a_flash_and_changes_nothing_elsewhere() -> None:
+    """Light that comes and goes between two frames that are alike is nowhere in them, and no motion explains it."""
+    frame, lit = frames(1, (32, 48))[0], (slice(8, 24), slice(8, 20))
+    flash = torch.zeros(1, 2, 16, 32, 48, dtype=torch.uint8)
+    flash[:, 1, 4, *lit] = flash[:, 0, 12, *lit] = 3  # ON, then OFF
+    made = network("rrin_slomo_events", flow="guided")
+    images = made(frame, frame, [0.5], EventCounts(flash, torch.full((1, 2), 0.15))).images
+    images.square().sum().backward()
+    for name, parameter in made.named_parameters():
+        assert parameter.grad is not None and torch.isfinite(parameter.grad).all(), name
+        assert parameter.grad.any(), name
+    torch.testing.assert_close(images[0, 0, :, :, 40:], frame[0, :, :, 40:], atol=1e-6, rtol=0)
+    assert not torch.allclose(images[0, 0, :, *lit], frame[0, :, *lit], atol=1e-3)
 
 
 def test_frozen_parts_are_not_taught_and_stay_as_in_use() -> None:

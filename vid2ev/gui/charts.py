@@ -73,7 +73,7 @@ def cost_chart(found: dict[str, Any]) -> dict[str, Any]:
         {
             "value": [row["time"], max(row["distance"], LEAST)],
             "name": row["name"],
-            "label": {"show": row["front"], "position": "right", "formatter": "{b}", **TEXT},
+            "label": {"show": row["front"], "position": "top", "formatter": "{b}", **TEXT},
             "itemStyle": {
                 "color": ACCENT if row["name"] == found["recommended"] else MUTED,
                 "opacity": 1 if row["front"] else 0.45,
