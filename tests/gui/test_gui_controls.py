@@ -28,6 +28,7 @@ def test_each_field_has_a_control_that_says_what_it_means(model: type[BaseModel]
         assert control.meaning and "[" not in control.label
         assert control.kind != "choice" or len(control.choices) > 1
         assert control.kind != "vector" or control.places in (2, 3)
+    assert len({control.label for control in controls}) == len(controls)
 
 
 @pytest.mark.parametrize("kind", [DVS, CIS], ids=lambda kind: kind.table)

@@ -20,7 +20,7 @@ def course_chart(course: Course | None) -> dict[str, Any]:
     if course is None:
         return {"series": []}
     t_ms = 1e-6 * (course.t_ns - course.t_ns[0])
-    line = {"type": "line", "showSymbol": False, "animation": False}
+    line = {"type": "line", "symbol": "none", "animation": False}
     below = {"xAxisIndex": 1, "yAxisIndex": 1}
     step = line | below | {"step": "end", "lineStyle": {"width": 1, "type": "dashed"}}
     series = [
@@ -29,7 +29,12 @@ def course_chart(course: Course | None) -> dict[str, Any]:
         step | {"name": "OFF level", "data": _pairs(t_ms, course.level_off), "color": OFF},
         line
         | below
-        | {"name": "filtered", "data": _pairs(t_ms, course.filtered), "color": MUTED, "lineStyle": {"width": 1}},
+        | {
+            "name": "filtered",
+            "data": _pairs(t_ms, course.filtered),
+            "color": MUTED,
+            "lineStyle": {"width": 1, "type": "dotted"},
+        },
         line | below | {"name": "signal", "data": _pairs(t_ms, course.signal), "color": ACCENT},
     ]
     sent_ms = 1e-3 * course.events.t - 1e-6 * course.t_ns[0]
@@ -50,9 +55,8 @@ def course_chart(course: Course | None) -> dict[str, Any]:
             "top": 0,
             "right": 0,
             "textStyle": TEXT,
-            "itemWidth": 14,
+            "itemWidth": 26,
             "itemHeight": 8,
-            "icon": "roundRect",
         },
         "tooltip": {"trigger": "axis"},
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},

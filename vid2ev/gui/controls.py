@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from pydantic import BaseModel
@@ -46,6 +47,7 @@ class Control:
     choices   the words of a choice
     places    the numbers of a vector
     optional  whether it may be left out
+    alike     whether the name of another differs from its own by the unit alone
     """
 
     key: str
@@ -60,12 +62,12 @@ class Control:
     choices: tuple[str, ...] = ()
     places: int = 0
     optional: bool = False
+    alike: bool = False
 
     @property
     def label(self) -> str:
-        """The name as words, without the unit."""
-        stem, _, suffix = self.key.rpartition("_")
-        return (stem if stem and suffix in SUFFIXES else self.key).replace("_", " ")
+        """The name as words, without the unit unless that tells it from another."""
+        return (self.key if self.alike else _stem(self.key)).replace("_", " ")
 
     @property
     def limits(self) -> str:
@@ -100,8 +102,9 @@ def controls_of(model: type[BaseModel], without: Iterable[str] = ()) -> tuple[Co
     schema = model.model_json_schema()
     groups = _groups(model)
     required = schema.get("required", [])
+    stems = Counter(map(_stem, schema["properties"]))
     return tuple(
-        _control(key, said, schema.get("$defs", {}), groups[key], key in required)
+        replace(_control(key, said, schema.get("$defs", {}), groups[key], key in required), alike=stems[_stem(key)] > 1)
         for key, said in schema["properties"].items()
         if key not in without
     )
@@ -119,6 +122,11 @@ def reach(control: Control, seen: Iterable[Any]) -> tuple[float, float, float] |
     step = max(step, 1.0) if control.kind == "whole" else step
     low = -high if control.low is None else max(control.low, -high)
     return (step if 0 < low < step or control.above else low), high, step
+
+
+def _stem(key: str) -> str:
+    stem, _, suffix = key.rpartition("_")
+    return stem if stem and suffix in SUFFIXES else key
 
 
 def _control(key: str, said: Mapping[str, Any], known: Mapping[str, Any], group: str, required: bool) -> Control:
