@@ -6,9 +6,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import h5py
-import hdf5plugin  # noqa: F401  (registers the filters)
+import hdf5plugin
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -151,6 +152,27 @@ def test_files_of_others_without_size_and_index_are_read(tmp_path: Path) -> None
     assert describe_events(tmp_path / "other.h5")["size"] is None
 
 
+@pytest.mark.parametrize(
+    "packing",
+    [
+        {"compression": "gzip", "shuffle": True, "fletcher32": True},
+        {"compression": "lzf"},
+        hdf5plugin.BZip2(),
+        hdf5plugin.Bitshuffle(cname="lz4"),
+        hdf5plugin.Blosc(cname="zstd"),
+        hdf5plugin.LZ4(),
+        hdf5plugin.Zstd(),
+    ],
+    ids=lambda packing: str(packing.get("compression", type(packing).__name__)),
+)
+def test_files_that_others_packed_are_read(tmp_path: Path, packing: Any) -> None:
+    t = np.arange(5000)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        for name, values in {"t": 10 * t, "x": t % 320, "y": t % 240, "p": t % 2}.items():
+            file.create_dataset(f"events/{name}", data=values.astype(np.uint16), chunks=(1000,), **packing)
+    assert sum(events.x.astype(int).sum() for events in read_events(tmp_path / "other.h5")) == (t % 320).sum()
+
+
 def refused(path: Path) -> str:
     with pytest.raises(Vid2evError) as raised:
         list(read_events(path))
@@ -190,6 +212,18 @@ def test_a_file_with_broken_chunks_is_refused(tmp_path: Path) -> None:
     content[chunk.byte_offset : chunk.byte_offset + chunk.size] = bytes(chunk.size)
     (tmp_path / "broken.h5").write_bytes(content)
     refused(tmp_path / "broken.h5")
+
+
+@pytest.mark.parametrize(
+    ("was", "now"), [(b"\7\0blosc", b"\0\0blosc"), (b"\x01\x7d\x08\0", b"\x11\x7d\x08\0")], ids=["numbers", "filter"]
+)
+def test_what_may_not_be_unpacked_is_refused(tmp_path: Path, was: bytes, now: bytes) -> None:
+    """Blosc's filter reads numbers that are not there; SZ's (32017) takes lengths from the file: both crashed."""
+    write(tmp_path / "events.h5", events_at(np.arange(1000)))
+    content = (tmp_path / "events.h5").read_bytes()
+    assert was in content
+    (tmp_path / "events.h5").write_bytes(content.replace(was, now, 1))
+    assert "filter 32" in refused(tmp_path / "events.h5")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on the size of files")

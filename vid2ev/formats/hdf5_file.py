@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import h5py
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
+# gzip, shuffle, Fletcher-32, bzip2, LZF, Blosc, LZ4, bitshuffle, Zstandard: others may trust what they unpack
+FILTERS = {1: 0, 2: 0, 3: 0, 307: 0, 32000: 0, 32001: 4, 32004: 0, 32008: 3, 32015: 0}  # -> numbers that each reads
 
 
 @contextmanager
@@ -53,7 +55,15 @@ def is_inside(dataset: h5py.Dataset, path: Path) -> bool:
 
 
 def check_chunks(dataset: h5py.Dataset, path: Path) -> None:
-    """Raise DataError where a part that is unpacked at a time is too large."""
+    """Raise DataError where a part that is unpacked at a time is too large, or packed in a way that is not safe."""
+    packed = dataset.id.get_create_plist()
+    for number in range(packed.get_nfilters()):
+        code, _, values, _ = packed.get_filter(number)
+        if len(values) < FILTERS.get(code, math.inf):
+            raise DataError(
+                f"{path}: {dataset.name} is packed by HDF5's filter {code} with {len(values)} numbers, which is not"
+                " read; get another copy, or pack it with gzip, Blosc or Zstandard (h5repack)"
+            )
     check_bytes(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize, f"a chunk of {dataset.name}")
 
 
