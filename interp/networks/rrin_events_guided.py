@@ -24,16 +24,12 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, part_of, recoloured
-from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
+from interp.candidates.ramps import RISEN_CHANNELS
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
-from interp.networks.gate import doubts, gate_of
+from interp.networks.guide import OFFS, guide_of
 from interp.networks.spec import Depth, FrameFedSpec
 from interp.representation.event_counts import EventCounts
-
-DEVIATIONS = 3.0  # that a correction may be
-MOST = 10.0  # of n
 
 
 class RrinEventsGuidedSpec(FrameFedSpec):
@@ -65,52 +61,32 @@ class RrinEventsGuided(FrameFed):
         self.refine = Unet(3 * colours + 4 + events, 4, layouts[0], zero)
         self.masks = Unet(5 * colours + 4 + events, 2, layouts[1], zero)
         self.residue = HalfSized(
-            4 * colours + RISEN_CHANNELS + 2, colours + 1, rrin_layout(spec.depths[2] - 1, 2 * spec.base), zero
+            4 * colours + RISEN_CHANNELS + OFFS, colours + 1, rrin_layout(spec.depths[2] - 1, 2 * spec.base), zero
         )
         self.multiple = 2 * 2 ** (max(spec.depths) - 1)
 
     def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
-        """Counts at half the resolution, and the gate."""
-        return pair.events.pooled(self.scale.factor).off_on, gate_of(pair)
+        """Counts at half the resolution."""
+        return (pair.events.pooled(self.scale.factor).off_on,)
 
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
-        found = risen(pair.events, times)
-        candidate = ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, found=found)
-        seen = [self.scale.down(each) for each in (pair.frame_0, pair.frame_1, candidate)]
+        guide = guide_of(pair, times, self.spec.transfer)
+        seen = [self.scale.down(each) for each in (pair.frame_0, pair.frame_1, guide.light)]
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
-        first = flows_to(pair.frame_0, pair.frame_1, candidate, self.spec.transfer)
-        wrong, unsure = doubts(pair, candidate, found, first, times, self.spec.transfer)
-        unsure = pair.once[1][:, None] * unsure
-        at = self.scale.down(first) / self.scale.factor
-        correction = self.scale.down(unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
-        flows = first + self.scale.flow_up(correction)
+        at = self.scale.down(guide.flows) / self.scale.factor
+        correction = self.scale.down(guide.unsure) * run(self.refine, [at, *seen]) * self.spec.flow_scale
+        flows = guide.flows + self.scale.flow_up(correction)
         warps = warped(pair, flows)
-        agreed = agreement(warps, candidate, self.spec.transfer)
-        logits = self._visible(unsure, warps, [at + correction, *seen]) + agreed
-        of_warps, weights = blend(warps, logits, shares_at(times))
-        start = recoloured(candidate, of_warps, self.spec.transfer)
-        image = self._corrected(pair, start, of_warps, found, wrong, carried_off_by(agreed, wrong))
-        return Interpolated(image, None, flows, warps, weights, of_warps)
+        agreed = guide.agreement(warps)
+        logits = self._visible(guide.unsure, warps, [at + correction, *seen]) + agreed
+        carried, weights = blend(warps, logits, shares_at(times))
+        start = guide.coloured(carried)
+        seen = [pair.frame_0, pair.frame_1, carried, start, torch.cat([guide.found.channels(), guide.offs(agreed)], 2)]
+        image = guide.image(start, carried, agreed, run(self.residue, seen))
+        return Interpolated(image, None, flows, warps, weights, carried)
 
     def _visible(self, unsure: torch.Tensor, warps: torch.Tensor, seen: list[torch.Tensor]) -> torch.Tensor:
         """ln V of both warps, [B, N, 2, H, W]."""
         logits = run(self.masks, [*seen, *(self.scale.down(warp) for warp in warps.unbind(2))])
         return unsure * F.logsigmoid(self.scale.up(logits))
-
-    def _corrected(
-        self,
-        pair: Pair,
-        start: torch.Tensor,
-        draft: torch.Tensor,
-        found: Risen,
-        wrong: torch.Tensor,
-        wrongly_carried: torch.Tensor,
-    ) -> torch.Tensor:
-        """The image, from C' and J, and from how far either may be off: c^2, j^2."""
-        offs = SHARP * torch.cat([wrong, wrongly_carried], 2).detach().sqrt()
-        seen = [pair.frame_0, pair.frame_1, draft, start, torch.cat([found.channels(), offs], 2)]
-        said = pair.once[1][:, None] * run(self.residue, seen)
-        share = part_of(wrong, wrongly_carried * torch.exp(-said[:, :, -1:].clamp(-MOST, MOST)))
-        spread = (wrong * part_of(wrongly_carried, wrong)).detach().sqrt()
-        return start + share * (draft - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])

@@ -2,11 +2,11 @@
 network.
 
     F_01, F_10 = flow(I0, I1, events?)                                   own, trained before and frozen, or DIS
-    F_t0, F_t1 = of these, or by the light that events tell              `candidates/guided.py`; V then of what agrees,
-                                                                         and UNets change only what does not
+    F_t0, F_t1 = of these, or by the light that events tell              `guide.py`; V then of what agrees as well
     dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, events, reconstructions?)
     J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
     I_t = J + UNet(I0, I1, J)                                            if refine is unet
+        = C' + m (J - C') + 3 s tanh(UNet(I0, I1, J, C', c, j))          if the light that events tell, C, guides
 
 Source: Radomski et al., section III.A.3; depths are not given there: 5 levels for flow, 4 for the combined UNet, 3
 for the others.
@@ -14,7 +14,6 @@ for the others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import torch
@@ -25,15 +24,14 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
-from interp.candidates.guided import agreement, flows_to, motion_between
-from interp.candidates.ramps import ramps, risen
+from interp.candidates.guided import motion_between
 from interp.light import Transfer
 from interp.networks.e2vid import E2vid, E2vidSpec
 from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
 from interp.networks.firenet import FireNet, FireNetSpec
 from interp.networks.flow import FlowNetwork, FlowNetworkSpec
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at
-from interp.networks.gate import doubts, gate_of
+from interp.networks.guide import OFFS, Guide, guide_of
 from interp.networks.refinement import refined
 
 MULTIPLE = 16  # of sides: five levels of flow
@@ -53,7 +51,7 @@ class RrinSlomoEventsSpec(EventInputSpec):
         description="pretrained: weights of the network `flow`, frozen; training takes about a third less time; dis:"
         " the optical flow of DIS between the frames, on the CPU, 0.43 s per pair at 1280x720; guided: that, and from"
         " each target to both frames the motion, and what agrees, by the light that events tell, as long again for"
-        " each target",
+        " each target; untrained it is the closed form `guided`, and only what that is not sure of is changed",
     )
     prepare: Literal["none", "unet"] = Field(
         default="none",
@@ -79,25 +77,6 @@ class RrinSlomoEventsSpec(EventInputSpec):
         return super().takes_events or elsewhere
 
 
-@dataclass(frozen=True, slots=True)
-class _Guide:
-    """What events tell of N targets, if that guides.
-
-    light    [B, N, C, H, W], as codes of this transfer
-    flows    [B, N, 4, H, W] px, by it
-    unsure   [B, N, 1, H, W], 0 ... 1, how much a network may change there
-    """
-
-    transfer: Transfer
-    light: torch.Tensor | None = None
-    flows: torch.Tensor | None = None
-    unsure: torch.Tensor | float = 1.0
-
-    def agreement(self, warps: torch.Tensor) -> torch.Tensor | float:
-        """Logits of warps by their light."""
-        return 0.0 if self.light is None else agreement(warps, self.light, self.transfer)
-
-
 class RrinSlomoEvents(FrameFed):
     """RRINSloMoEvents; pretrained parts are loaded with `interp.weights.load_part`."""
 
@@ -111,7 +90,8 @@ class RrinSlomoEvents(FrameFed):
         pictures = 0 if self.reconstruct is None else 3
         channels = 4 * colours + 8 + self.event_input.channels + pictures
         self.combined = Unet(channels, 6, rrin_layout(4, spec.base), zero)
-        self.residue = Unet(3 * colours, colours, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
+        taken, said = (4 * colours + OFFS, colours + 1) if spec.flow == "guided" else (3 * colours, colours)
+        self.residue = Unet(taken, said, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
         self.multiple = MULTIPLE
 
     def flows_of(self, pair: Pair) -> torch.Tensor:
@@ -131,25 +111,28 @@ class RrinSlomoEvents(FrameFed):
         if self.reconstruct is not None:
             beside, once = [first_last_and_target(once[0], times)], once[1:]
         events = self.event_input.at(pair, once, times)
-        guide = self._guide(pair, times)
-        at, warps, visible = refined(
-            self.combined, pair, times, [*events, *beside], self.spec.flow_scale, guide.flows, guide.unsure
-        )
-        image, weights = blend(warps, F.logsigmoid(visible) + guide.agreement(warps), shares_at(times))
-        of_warps = image
+        if self.spec.flow == "guided":
+            return self._guided(pair, times, guide_of(pair, times, self.spec.transfer), [*events, *beside])
+        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
+        carried, weights = blend(warps, F.logsigmoid(visible), shares_at(times))
+        image = carried
         if self.residue is not None:
-            image = image + guide.unsure * run(self.residue, [pair.frame_0, pair.frame_1, image])
-        return Interpolated(image, pair.flows, at, warps, weights, of_warps)
+            image = image + run(self.residue, [pair.frame_0, pair.frame_1, image])
+        return Interpolated(image, pair.flows, at, warps, weights, carried)
 
-    def _guide(self, pair: Pair, times: torch.Tensor) -> _Guide:
-        transfer = self.spec.transfer
-        if self.spec.flow != "guided":
-            return _Guide(transfer)
-        found = risen(pair.events, times)
-        told = ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found)
-        flows = flows_to(pair.frame_0, pair.frame_1, told, transfer)
-        _, unsure = doubts(pair, told, found, flows, times, transfer)
-        return _Guide(transfer, told, flows, gate_of(pair)[:, None] * unsure)
+    def _guided(self, pair: Pair, times: torch.Tensor, guide: Guide, beside: list[torch.Tensor]) -> Interpolated:
+        """Images at times [B, N], from the closed form on."""
+        at, warps, visible = refined(
+            self.combined, pair, times, beside, self.spec.flow_scale, guide.flows, guide.unsure
+        )
+        agreed = guide.agreement(warps)
+        carried, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
+        start = guide.coloured(carried)
+        said = torch.zeros_like(start[:, :, :1]).expand(-1, -1, start.shape[2] + 1, -1, -1)
+        if self.residue is not None:
+            said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, guide.offs(agreed)])
+        image = guide.image(start, carried, agreed, said)
+        return Interpolated(image, pair.flows, at, warps, weights, carried)
 
     def _flow(self) -> nn.Module:
         spec, bins = self.spec, self.spec.bins if self.spec.flow_input == "frames+events" else 0

@@ -178,12 +178,13 @@ def test_coarse_events_do_not_blur_what_moves_as_a_whole() -> None:
 
 
 def test_the_combined_system_starts_from_what_is_guided() -> None:
-    """Heads that are zero leave both frames as the light of events has carried and weighed them."""
+    """Heads that are zero leave the closed form as it is, with the UNet of the residue or without it."""
     first, second, seen = shifted(0), shifted(3), moving([0, 1, 2, 3])
-    times = torch.tensor([[1 / 3, 2 / 3]])
-    wanted = guided(first, second, ramps(first, second, seen, times)).blend(times)
+    times = torch.tensor([1 / 3, 2 / 3])
+    wanted = open_method("guided").between(Gap(first[0], second[0], seen, 1), times)
     torch.manual_seed(0)
-    made = make("rrin_slomo_events", flow="guided")(first, second, times[0], seen)
-    torch.testing.assert_close(made.images, wanted, atol=1e-6, rtol=0)
-    still = make("rrin_slomo_events", flow="dis")(first, second, times[0], seen)
-    assert not torch.allclose(still.images, wanted, atol=1e-2)
+    for refine in ("unet", "none"):
+        made = make("rrin_slomo_events", flow="guided", refine=refine)(first, second, times, seen)
+        torch.testing.assert_close(made.images[0], wanted, atol=1e-6, rtol=0)
+    still = make("rrin_slomo_events", flow="dis")(first, second, times, seen)
+    assert not torch.allclose(still.images[0], wanted, atol=1e-2)

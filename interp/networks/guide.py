@@ -1,0 +1,74 @@
+"""What the closed form `guided` tells a network: light at the targets, motion, and what either may be off by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to, off_by, part_of, recoloured
+from interp.candidates.ramps import Risen, in_doubt, ramps, risen
+from interp.light import Transfer
+from interp.networks.frame_fed import Pair, warped
+from interp.networks.gate import gate_of
+
+DEVIATIONS = 3.0  # that a correction may be
+MOST = 10.0  # of n
+OFFS = 2  # channels that say what light and carried frames may be off by
+
+
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """N targets, before a network.
+
+    light    C, of the ramps [B, N, C, H, W], codes of this transfer
+    found    what events say there
+    flows    [B, N, 4, H, W] px, from there to both frames
+    wrong    c^2 [B, N, 1, H, W]
+    near     [B, 1, 1, H, W], 0 ... 1: where events are
+    unsure   [B, N, 1, H, W], 0 ... 1: where events are, and frames carried by these flows are not to be believed
+    """
+
+    transfer: Transfer
+    light: torch.Tensor
+    found: Risen
+    flows: torch.Tensor
+    wrong: torch.Tensor
+    near: torch.Tensor
+    unsure: torch.Tensor
+
+    def agreement(self, warps: torch.Tensor) -> torch.Tensor:
+        """Logits [B, N, 2, H, W] of warps by how near their luminance is."""
+        return agreement(warps, self.light, self.transfer)
+
+    def coloured(self, carried: torch.Tensor) -> torch.Tensor:
+        """C' [B, N, C, H, W]: C in the colours of J."""
+        return recoloured(self.light, carried, self.transfer)
+
+    def offs(self, agreed: torch.Tensor) -> torch.Tensor:
+        """c and j [B, N, 2, H, W], as a network takes them; `agreed` are the logits of the frames that make J."""
+        return SHARP * torch.cat([self.wrong, carried_off_by(agreed, self.wrong)], 2).detach().sqrt()
+
+    def image(
+        self, start: torch.Tensor, carried: torch.Tensor, agreed: torch.Tensor, said: torch.Tensor
+    ) -> torch.Tensor:
+        """I, of C' and J: C' + m (J - C') + 3 s tanh(r), m = c^2 / (c^2 + j^2 e^-n), 1/s^2 = 1/c^2 + 1/j^2.
+
+        said   r and then n of a network, [B, N, C + 1, H, W]; zero is the closed form
+        """
+        off = carried_off_by(agreed, self.wrong)
+        said = self.near * said
+        share = part_of(self.wrong, off * torch.exp(-said[:, :, -1:].clamp(-MOST, MOST)))
+        spread = (self.wrong * part_of(off, self.wrong)).detach().sqrt()
+        return start + share * (carried - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])
+
+
+def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer) -> Guide:
+    """What is known of a pair at times [B, N]."""
+    found = risen(pair.events, times)
+    light = ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found)
+    flows = flows_to(pair.frame_0, pair.frame_1, light, transfer)
+    wrong, _ = off_by(light, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer), transfer)
+    carried = carried_off_by(agreement(warped(pair, flows), light, transfer), wrong)
+    near = gate_of(pair)[:, None]
+    return Guide(transfer, light, found, flows, wrong, near, near * part_of(carried, wrong).detach())
