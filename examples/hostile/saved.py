@@ -262,8 +262,9 @@ def _read_recording(path: Path) -> None:
     folder = next(parent for parent in path.parents if parent.name in ("own", "hs"))
     sequence = open_sequence(folder)
     windows(sequence, 2)
-    sequence.frame(1)
-    sequence.key(1)
+    last = min(1, len(sequence.times_us) - 1)
+    sequence.frame(last)
+    sequence.key(last)
     start_us, stop_us = sequence.covered_us
     sequence.events(start_us, stop_us).within(sequence.event_size)
     if folder.name == "own":

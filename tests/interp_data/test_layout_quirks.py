@@ -184,6 +184,17 @@ def test_lines_that_are_no_times_are_counted(tmp_path: Path) -> None:
     assert sequence.remarks == ["3 lines of timestamp.txt are no times"]
 
 
+def test_a_picture_whose_line_is_no_time_is_left_out_and_others_keep_theirs(tmp_path: Path) -> None:
+    lines = [f"{STEP_US * (k + 1)}\n" for k in range(6)]
+    written(tmp_path / "seq", times="".join(lines))
+    whole = open_sequence(tmp_path / "seq")
+    written(tmp_path / "torn", times="".join([*lines[:2], "30000O\n", *lines[3:]]))
+    torn = open_sequence(tmp_path / "torn")
+    assert torn.times_us.tolist() == [t for t in whole.times_us.tolist() if t != 3 * STEP_US]
+    np.testing.assert_array_equal(torn.frame(2), whole.frame(3))
+    assert torn.remarks == ["1 lines of timestamp.txt are no times"]
+
+
 def test_windows_in_which_something_is_missing_are_counted(tmp_path: Path) -> None:
     times = [1, 2, 3, 3, 5, 6, 7, 8, 9, 10, 11, 12]
     written(tmp_path / "seq", images=12, times="".join(f"{STEP_US * t}\n" for t in times))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +102,18 @@ def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Pa
     focal_px = read_manifest(tmp_path / "own")["rig"]["cameras"][1]["intrinsics"]["focal_px"][0]
     for group in Recording(open_sequence(tmp_path / "own"), Protocol(3, 3), "own").groups():
         assert group.cameras == (400.0, pytest.approx(focal_px * 0.013 / 2), 500.0)
+
+
+def test_a_lens_without_a_size_is_one_sentence(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.npz", pictures(12))
+    here = Camera(name="cis", kind="cis", sensor="paper", set={"frame_rate_hz": 250.0, "exposure_us": 400.0})
+    rig = Rig(cameras=(Camera(name="dvs", kind="dvs"), here))
+    convert(tmp_path / "film.npz", tmp_path / "own", rig=rig, pictures="png", preview=False)
+    said = read_manifest(tmp_path / "own")
+    said["rig"]["cameras"][1]["intrinsics"]["size"][0] = 0
+    (tmp_path / "own" / "manifest.json").write_text(json.dumps(said))
+    with pytest.raises(DataError, match="does not say what it should"):
+        open_sequence(tmp_path / "own")
 
 
 def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path) -> None:

@@ -54,17 +54,21 @@ class Ergb:
     def __init__(self, folder: Path, layout: str):
         names = LAYOUTS[layout]
         self.name, self.folder, self.remarks = folder.name, folder, list[str]()
-        self._images = numbered(folder / names.images, ".png")
-        stamps = self._stamps(folder / names.images)
-        if not self._images or not len(stamps):
-            raise DataError(f"{folder}: {len(self._images)} pictures and {len(stamps)} times; expected some of both")
-        if len(self._images) != len(stamps):
+        pictures, stamps = numbered(folder / names.images, ".png"), self._stamps(folder / names.images)
+        if len(stamps) != len(pictures):  # (a line for each: then lines that are no times have pictures, too)
+            stamps = [t_us for t_us in stamps if t_us is not None]
+        if not pictures or not stamps:
+            raise DataError(f"{folder}: {len(pictures)} pictures and {len(stamps)} times; expected some of both")
+        if len(pictures) != len(stamps):
+            some = min(len(pictures), len(stamps))
             self.remarks.append(
-                f"{len(self._images)} pictures and {len(stamps)} times: the first {min(len(self._images), len(stamps))}"
-                " are taken for pairs"
+                f"{len(pictures)} pictures and {len(stamps)} times: the first {some} are taken for pairs"
             )
-        count = min(len(self._images), len(stamps))
-        self._images, self.times_us = self._images[:count], stamps[:count]
+        timed = [(picture, t_us) for picture, t_us in zip(pictures, stamps, strict=False) if t_us is not None]
+        if not timed:
+            raise DataError(f"{folder}: no picture has a time; expected one to a line of {STAMPS[0]}")
+        self._images = [picture for picture, _ in timed]
+        self.times_us = np.array([t_us for _, t_us in timed], np.int64)
         self.size = self.frame(0).shape[1::-1]
         self.event_size = self.size
         self._parts = EventParts(folder / names.events, self.size)
@@ -99,20 +103,22 @@ class Ergb:
         """The events in (start_us, stop_us]."""
         return self._parts.between(start_us, stop_us)
 
-    def _stamps(self, folder: Path) -> np.ndarray:
-        """The times [us] of the pictures; what is no number is counted."""
+    def _stamps(self, folder: Path) -> list[int | None]:
+        """The times [us] of the pictures; None of lines that say something else, which are counted."""
         path = next((folder / name for name in STAMPS if (folder / name).exists()), None)
         if path is None:
             raise DataError(f"{folder}: no {STAMPS[0]}; expected the times of its pictures, one to a line")
-        times, strange = [], 0
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                time_us = round(float(line.split()[0])) if line.strip() else None
-            except (ValueError, OverflowError):
-                time_us, strange = None, strange + 1
-            if time_us is not None and abs(time_us) >= LATEST_US:
-                time_us, strange = None, strange + 1
-            times.append(time_us)
-        if strange:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        times = [_time_us(line) for line in lines if line.strip()]
+        if strange := times.count(None):
             self.remarks.append(f"{strange} lines of {path.name} are no times")
-        return np.array([t for t in times if t is not None], np.int64)
+        return times
+
+
+def _time_us(line: str) -> int | None:
+    """The time that a line begins with, None if it is none."""
+    try:
+        t_us = round(float(line.split()[0]))
+    except (ValueError, OverflowError):
+        return None
+    return t_us if abs(t_us) < LATEST_US else None

@@ -123,7 +123,8 @@ def _apart(folder: Path, *names: str) -> bool:
 def _sight(camera: dict[str, Any]) -> np.ndarray:
     """Place, direction and lens as numbers: those of the lens in widths of the picture."""
     lens = camera["intrinsics"]
-    across, edge = lens["size"][0], (np.array(lens["centre_px"]) + 0.5, lens["focal_px"])
+    across = range(1, MOST_PIXELS)[int(lens["size"][0]) - 1]
+    edge = (np.array(lens["centre_px"]) + 0.5, lens["focal_px"])
     bent = np.zeros(8)
     bent[: len(lens["distortion"])] = lens["distortion"]
     return np.concatenate([camera["translation_m"], *camera["rotation"], np.ravel(edge) / across, bent])
