@@ -100,15 +100,22 @@ def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
     if sensor is None or (sensor["kind"] == "cis" and _pictures_in(folder) is None):
         return None
     numbers = sensor["parameters"]
-    width, height = (range(1, MOST_PIXELS)[int(side) - 1] for side in sensor["size"])
+    width, height = (_whole(side, 1, MOST_PIXELS) for side in sensor["size"])
     facts = {"kind": sensor["kind"], "folder": folder, "size": (width, height)}
     if sensor["kind"] == "cis":
         return facts | {"folder": _pictures_in(folder), "rate_hz": float(numbers["frame_rate_hz"]), "numbers": numbers}
-    begin, length = (range(-LATEST_US, LATEST_US)[int(said[key]) + LATEST_US] for key in ("start_us", "duration_us"))
+    begin, length = (_whole(said[key], -LATEST_US, LATEST_US) for key in ("start_us", "duration_us"))
     contrast = tuple(float(numbers[key]) for key in ("threshold_off", "threshold_on"))
     if not all(0 < each < 100 for each in contrast):
         raise ValueError(f"thresholds {contrast}")
     return facts | {"contrast": contrast, "span_us": (begin, begin + length)}
+
+
+def _whole(said: Any, least: int, most: int) -> int:
+    """A whole number of a manifest.  Raises TypeError, ValueError for one that is none, or out of its limits."""
+    if not least <= int(said) <= most:
+        raise ValueError(f"{said}, not {least} ... {most}")
+    return int(said)
 
 
 def _apart(folder: Path, *names: str) -> bool:
@@ -123,7 +130,7 @@ def _apart(folder: Path, *names: str) -> bool:
 def _sight(camera: dict[str, Any]) -> np.ndarray:
     """Place, direction and lens as numbers: those of the lens in widths of the picture."""
     lens = camera["intrinsics"]
-    across = range(1, MOST_PIXELS)[int(lens["size"][0]) - 1]
+    across = _whole(lens["size"][0], 1, MOST_PIXELS)
     edge = (np.array(lens["centre_px"]) + 0.5, lens["focal_px"])
     bent = np.zeros(8)
     bent[: len(lens["distortion"])] = lens["distortion"]
