@@ -35,6 +35,7 @@ LONGEST_S = 600  # for one that waits
 SPACE = 6 << 30  # bytes of address space beyond those that the process has when it has read the valid files
 PEAK_MB = 900  # of memory in use beyond those; twice what `VID2EV_LARGEST_MB` is set to, and what reading takes
 LARGEST_MB = 256
+FILE_MB = 512  # of a file that is written
 MOST_KINDS = 60  # of content that is changed further, for each valid file, of what was read and of what was refused
 COVERED = 4  # one of so many attempts is looked at line by line
 TALLY_EVERY = 500
@@ -72,6 +73,7 @@ class Attempts:
         size = (kilobytes("VmSize") << 10) + SPACE
         resource.setrlimit(resource.RLIMIT_AS, (size, resource.RLIM_INFINITY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_MB << 20, resource.RLIM_INFINITY))
 
     def attempt(self, number: int) -> None:
         """Change a file, read it, and note how that ended."""
@@ -90,6 +92,8 @@ class Attempts:
             ended, kind = self._read(path)
         signal.alarm(0)
         signal.setitimer(signal.ITIMER_PROF, 0)
+        if any(file.stat().st_size == FILE_MB << 20 for file in self.folder.rglob("*") if file.is_file()):
+            ended, kind = "filled", "a file as large as it may be"
         self.tally[ended] += 1
         if ended not in new:
             self.keep(path, content, number, kind)

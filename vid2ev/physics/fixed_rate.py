@@ -103,6 +103,10 @@ class EventFrames:
 
 def omission(scene: Scene, spec: Any) -> Omission:
     """The readout's clock."""
-    late_us = 1e6 / spec.frame_rate_hz * (0.5 if spec.rounding == "nearest" else 1.0)
     why = "all times are those of the readout; never left out"
-    return omitted(scene, spec, math.inf, f"at most {late_us:.3g} us", why)
+    return omitted(scene, spec, math.inf, f"at most {latest_us(spec):.3g} us", why)
+
+
+def latest_us(spec: Any) -> float:
+    """How much later than what it tells of an event may be."""
+    return 1e6 / spec.frame_rate_hz * (0.5 if spec.rounding == "nearest" else 1.0) if spec.frame_rate_hz > 0 else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from vid2ev.formats.event_file import BLOCK, Picture, Recording
 from vid2ev.outputs import Outputs
+from vid2ev.physics.fixed_rate import latest_us
 from vid2ev.recording.columns import EventColumns, column_files
 from vid2ev.recording.disk import write_npz
 from vid2ev.recording.folder import Folder
@@ -163,7 +165,13 @@ class DvsTrack:
             self.folder.write(f"{self._within}{PROBE}", lines)
 
     def _recording(self, start_us: int, duration_us: int) -> Recording:
-        """What event files are written from."""
+        """What event files are written from.  Raises DataError for times that a damaged checkpoint has made up: where
+        nothing happens, some formats write on and on."""
+        frame_us = np.fromfile(self.folder.written(f"{self._within}{FRAME_US}"), np.int64)
+        with self.folder.taking_up():
+            end_us = frame_us[-1] + math.ceil(latest_us(self.dvs.spec))
+            if not (start_us == frame_us[0] and start_us + duration_us <= end_us):
+                raise ValueError("times that are not those of its frames")
         return Recording(
             self.dvs.size,
             start_us,
@@ -172,5 +180,5 @@ class DvsTrack:
             lambda: self._columns.blocks(BLOCK),
             self.dvs.labels,
             self._pictures if self.outputs.want_frames else None,
-            np.fromfile(self.folder.written(f"{self._within}{FRAME_US}"), np.int64),
+            frame_us,
         )
