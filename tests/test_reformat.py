@@ -118,11 +118,14 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
         (["whole.h5", "whole.h5/out.h5"], 1, "cannot be written"),
         (["wide.h5", "out.raw"], 2, "cannot hold 4000x3 pixels, at most 2048x2048; choose --format hdf5"),
         (["long.h5", "out.h5", "--format", "v2e-hdf5"], 2, "minutes"),
+        (["far.csv", "out.h5"], 1, "11,574 days as hdf5 would take"),
+        (["far.csv", "out.raw", "--format", "evt3"], 1, "choose --format aedat4"),
     ],
     ids=str,
 )
 def test_what_cannot_be_is_one_sentence(recording: Path, arguments: list[str], exit_code: int, sentence: str) -> None:
     Path("noise.raw").write_bytes(np.random.default_rng(0).bytes(5000))
+    Path("far.csv").write_text("t,x,y,p\n0,1,1,1\n1000000000000000,2,2,0\n")
     one = np.zeros(2, np.uint16)
     write = format_named("hdf5").write
     assert write is not None

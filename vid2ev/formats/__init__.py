@@ -19,6 +19,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
 from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
+from vid2ev.untrusted import LARGEST, most_bytes
 
 __all__ = [
     "FORMATS",
@@ -159,7 +160,9 @@ def _note_disorder(file: EventFile, disorder: Disorder) -> None:
 
 
 def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:
-    """Raise UsageError, which names a format that can, unless a format can hold pixels and times as these."""
+    """Raise UsageError, which names a format that can, unless a format can hold pixels and times as these; DataError
+    where times are so far apart that files would be full of nothing: a single damaged one is enough for that."""
+    _check_idle(kind, duration_us or 0)
     limits = kind.largest
     if limits and (size[0] > limits[0] or size[1] > limits[1]):
         what, most = f"{size[0]}x{size[1]} pixels", f"{limits[0]}x{limits[1]}"
@@ -168,6 +171,17 @@ def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = N
     else:
         return
     raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format hdf5")
+
+
+def _check_idle(kind: Format, duration_us: int) -> None:
+    """Raise DataError where times when nothing happens would take more than files may."""
+    claimed = kind.idle_bytes * duration_us // 10**6
+    if claimed > most_bytes():
+        days, claimed_mb = duration_us / 8.64e10, (claimed >> 20) + 1
+        raise DataError(
+            f"{days:,.0f} days as {kind.name} would take {claimed_mb:,} MB for times when nothing happens; choose"
+            f" --format aedat4, take a part of it, or if that is meant set {LARGEST}={claimed_mb} in the environment"
+        )
 
 
 def recognise(path: str | Path) -> Format | None:

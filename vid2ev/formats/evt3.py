@@ -60,5 +60,6 @@ FORMAT = Format(
     open=open_events,
     write=write_events,
     largest=(2048, 2048),
+    idle_bytes=488,  # a word of 2 bytes in 4096 us
     keeps=frozenset({"size", "start"}),
 )

@@ -184,5 +184,6 @@ FORMAT = Format(
     open=Hdf5Events,
     write=write_events,
     largest=((1 << 16) - 1, (1 << 16) - 1),
+    idle_bytes=34,  # the index of milliseconds, packed
     keeps=frozenset({"labels", "size", "start"}),
 )
