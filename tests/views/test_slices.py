@@ -122,6 +122,11 @@ def test_areas_refuse_events_outside_of_the_sensor() -> None:
         list(Area(5, 4).pieces(recording_of(outside)))
 
 
+def test_a_damaged_time_does_not_make_slices_without_end() -> None:
+    with pytest.raises(UsageError, match="11,574 days have 100,000,000,000 of them"):
+        Duration(Fraction(10_000)).pieces(recording_of(events_at([0, 10**15])))
+
+
 def test_source_needs_frames() -> None:
     with pytest.raises(UsageError, match="duration:10ms"):
         list(Source().pieces(recording_of(events_at([1]))))

@@ -37,6 +37,8 @@ from vid2ev.errors import UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.stream.events import Events
 
+MOST_SLICES = 10**9
+
 
 @dataclass(frozen=True, slots=True)
 class Piece:
@@ -63,8 +65,14 @@ class Duration:
     us: Fraction
 
     def pieces(self, recording: Recording) -> Iterator[Piece]:
-        """Holds no more than a block of events."""
+        """Holds no more than a block of events.  Raises UsageError for more slices than anyone looks at: one damaged
+        time is enough for that."""
         slices = max(1, -int(-recording.duration_us // self.us))
+        if slices > MOST_SLICES:
+            raise UsageError(
+                f"slices '{self}': {recording.duration_us / 8.64e10:,.0f} days have {slices:,} of them, expected at"
+                f" most {MOST_SLICES:,}; choose longer ones, or a part with --start and --stop"
+            )
         edges = (recording.start_us + int(k * self.us // 1) for k in range(1, slices + 1))
         return _between(recording, edges)
 
