@@ -208,3 +208,16 @@ def test_seeds_up_to_64_bits_are_distinct():
 def test_threads_beyond_the_pixels_are_fine():
     assert len(play(clean(), [0, 1_000_000], np.array([[[0.1]], [[1.0]]], np.float32), threads=64)) == 15
     assert isinstance(Dvs(clean(), (1, 1), threads=64), Dvs)
+
+
+@pytest.mark.parametrize("name", ["default", "clean", "everything", "after, tracking"])
+def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(name: str) -> None:
+    _, (first, second, third) = clip(3)
+    old, new = (start(SENSORS[name], first, seed=3, origin_ns=0) for _ in range(2))
+    old.step(first, 0)
+    assert len(old.step(second, 10**7)) > 0
+    for dvs in (old, new):
+        assert len(dvs.restart(third, 2 * 10**7)) == 0
+    one, other = (dvs.step(first, 3 * 10**7) for dvs in (old, new))
+    assert len(one) > 0
+    assert_same(one, other)

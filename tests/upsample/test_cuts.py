@@ -109,27 +109,6 @@ def test_light_taken_up_anywhere_knows_the_cuts(tmp_path: Path, start: int) -> N
     assert cuts(instants(recipe, start)) == [t_ns for t_ns in cuts(instants(recipe)) if t_ns > start * 10**7]
 
 
-@pytest.mark.parametrize("noise", ["crossing_noise=0.03", "photoreceptor_noise=0.05"])
-@pytest.mark.parametrize("sensor", ["ideal", "paper", "v2e-noisy"])
-def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(sensor: str, noise: str) -> None:
-    spec = load_sensor(sensor, [noise, "photoreceptor_tau_us=300", "follower_tau_us=100"])
-    rng = np.random.default_rng(1)
-    first, second, third = (rng.uniform(0.1, 1, (12, 20)).astype(F) for _ in range(3))
-    old, new = Dvs(spec, (20, 12), seed=3), Dvs(spec, (20, 12), seed=3, origin_ns=0)
-    old.step(first, 0)
-    assert len(old.step(second, 10**7)) > 0
-    for dvs in (old, new):
-        assert len(dvs.restart(third, 2 * 10**7)) == 0
-    one, other = (dvs.step(first, 3 * 10**7) for dvs in (old, new))
-    assert_same(one, other)
-
-
-def assert_same(one: Events, other: Events) -> None:
-    assert len(one) and len(one) == len(other)
-    for name in "txyp":
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-
-
 def test_a_restart_lets_event_frames_go_on() -> None:
     spec = load_sensor("ideal", ["frame_rate_hz=50"])
     dvs = Dvs(spec, (2, 1))
