@@ -50,7 +50,7 @@ def serve(source: str, folder: Path) -> tuple[subprocess.Popen, str]:
         port = free.getsockname()[1]
     command = [sys.executable, "-c", PROGRAM, source, "--port", str(port), "--no-browser"]
     environment = os.environ | {"NICEGUI_STORAGE_PATH": str(folder)}
-    served = subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL)
+    served = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
     end_s = time.monotonic() + PATIENT_S
     while time.monotonic() < end_s and served.poll() is None:
         with socket.socket() as probe:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import pickle
 import time
+from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,7 @@ from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
+from vid2ev.gui.worker import _serve
 from vid2ev.instants import Instant
 from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.dvs import Dvs
@@ -38,6 +42,16 @@ def previewer() -> Previewer:
 @pytest.fixture
 def setup() -> Setup:
     return setup_of(SMALL).with_preset(0, "ideal")
+
+
+@pytest.mark.parametrize("source", [SMALL, "missing.mp4"])
+def test_a_preview_that_nobody_waits_for_ends_without_a_word(source: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when a page is closed while its picture is made."""
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    ours, theirs = Pipe()
+    ours.send(Request(replace(setup_of(SMALL).with_preset(0, "ideal"), source=source), number=1))
+    ours.close()
+    _serve(theirs, SimpleNamespace(value=1))
 
 
 def test_light_is_made_again_only_where_something_changed_that_decides_it(setup: Setup) -> None:

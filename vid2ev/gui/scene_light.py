@@ -26,7 +26,7 @@ from vid2ev.stream.frames import LUMINANCE, Frame
 MOST = 48  # pictures of a part
 RUN_IN_S = 0.03  # before it
 SPARSER = 4  # is the grid there
-ROUGH_S = 0.35  # until what is there is shown
+ROUGH_S = 0.25  # until what is there is shown
 ROUGH = 9  # pictures that come before the run-in
 KNOT_S = 1 / 128  # from one look at motion to the next
 KEPT_BYTES = 200_000_000

@@ -10,6 +10,7 @@ import multiprocessing
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Lock, Thread
@@ -34,6 +35,10 @@ Reply = Answer | Plans | Refused
 
 class Superseded(Exception):
     """Something newer was asked for."""
+
+
+class Gone(Exception):
+    """Nobody listens any more."""
 
 
 class Worker:
@@ -122,10 +127,11 @@ class Planner(Thread):
                 self._send(plans_of(light, number, check))
             except Superseded:
                 pass
-            except OSError:  # (nobody listens any more)
+            except Gone:
                 return
             except Exception as error:  # (the pictures are there, whatever happens to the plan)
-                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
+                with suppress(Gone):
+                    self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
 
 
 def _serve(pipe: Connection, newest: Any) -> None:
@@ -139,25 +145,31 @@ def _serve(pipe: Connection, newest: Any) -> None:
 
     def send(reply: Any) -> None:
         with sending:
-            pipe.send(reply)
+            try:
+                pipe.send(reply)
+            except OSError:
+                raise Gone from None
 
     previewer, planner = Previewer(check), Planner(send, lambda: newest.value)
     planner.start()
-    while True:
-        try:
-            request = pipe.recv()
-        except (EOFError, OSError):
-            return
-        number = request.number
-        try:
-            check()
-            for answer in previewer.answers(request):
-                send(answer)
-            planner.plan(previewer.light(request), number)
-        except Superseded:
-            pass
-        except Vid2evError as error:
-            send(Refused(number, str(error)))
-        except Exception as error:  # a page goes on, whatever happens in its preview
-            send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
-        send(None)
+    with suppress(Gone):
+        while True:
+            try:
+                request = pipe.recv()
+            except (EOFError, OSError):
+                return
+            number = request.number
+            try:
+                check()
+                for answer in previewer.answers(request):
+                    send(answer)
+                planner.plan(previewer.light(request), number)
+            except Superseded:
+                pass
+            except Vid2evError as error:
+                send(Refused(number, str(error)))
+            except Gone:
+                raise
+            except Exception as error:  # a page goes on, whatever happens in its preview
+                send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
+            send(None)
