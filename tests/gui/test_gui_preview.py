@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import pickle
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from multiprocessing import Pipe
@@ -52,6 +54,34 @@ def test_a_preview_that_nobody_waits_for_ends_without_a_word(source: str, monkey
     ours.send(Request(replace(setup_of(SMALL).with_preset(0, "ideal"), source=source), number=1))
     ours.close()
     _serve(theirs, SimpleNamespace(value=1))
+
+
+PARENT = """
+import sys, time
+from vid2ev.gui.warming import Warming
+if __name__ == "__main__":
+    warming = Warming()
+    warming.enter()
+    warming.begin()
+    print(warming._process.pid, flush=True)
+    time.sleep(600)
+"""
+
+
+def test_what_compiles_for_later_ends_with_the_program_even_if_that_is_killed(tmp_path: Path) -> None:
+    """It holds the program's output: whoever reads that waits for it."""
+    (tmp_path / "parent.py").write_text(PARENT)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    with subprocess.Popen([sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE, env=environment) as parent:
+        assert parent.stdout is not None
+        warming = int(parent.stdout.readline())
+        parent.kill()
+        assert parent.stdout.read() == b""
+    for _ in range(600):
+        if not Path(f"/proc/{warming}").exists():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it is there after a minute")
 
 
 def test_light_is_made_again_only_where_something_changed_that_decides_it(setup: Setup) -> None:

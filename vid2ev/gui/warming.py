@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import signal
 from multiprocessing.connection import Connection
+from threading import Thread
 from typing import Any
 
 from vid2ev.gui.stand_in import see_something, usual
@@ -64,6 +65,7 @@ class Warming:
 def _warm(pipe: Connection) -> None:
     """Compile the usual sensors."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
     os.nice(19)
     for spec in usual():
         see_something(spec)
@@ -71,3 +73,11 @@ def _warm(pipe: Connection) -> None:
             pipe.send(flags_of(spec, False))
         except OSError:
             return
+
+
+def _end_with_parent() -> None:
+    """End at once when the program does, whatever ended it; what is compiled half is compiled another time."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(0)
