@@ -10,7 +10,6 @@ from interp.candidates.guided import SHARP, agreement, carried_off_by, flows_to,
 from interp.candidates.ramps import Risen, in_doubt, ramps, risen
 from interp.light import Transfer
 from interp.networks.frame_fed import Pair, warped
-from interp.networks.gate import gate_of
 
 DEVIATIONS = 3.0  # that a correction may be
 MOST = 10.0  # of n
@@ -45,30 +44,31 @@ class Guide:
         """C' [B, N, C, H, W]: C in the colours of J."""
         return recoloured(self.light, carried, self.transfer)
 
-    def offs(self, agreed: torch.Tensor) -> torch.Tensor:
-        """c and j [B, N, 2, H, W], as a network takes them; `agreed` are the logits of the frames that make J."""
-        return SHARP * torch.cat([self.wrong, carried_off_by(agreed, self.wrong)], 2).detach().sqrt()
+    def carried_off_by(self, agreed: torch.Tensor) -> torch.Tensor:
+        """j^2 [B, N, 1, H, W]; `agreed` are the logits of the frames that make J."""
+        return carried_off_by(agreed, self.wrong)
 
-    def image(
-        self, start: torch.Tensor, carried: torch.Tensor, agreed: torch.Tensor, said: torch.Tensor
-    ) -> torch.Tensor:
-        """I, of C' and J: C' + m (J - C') + 3 s tanh(r), m = c^2 / (c^2 + j^2 e^-n), 1/s^2 = 1/c^2 + 1/j^2.
+    def offs(self, off: torch.Tensor) -> torch.Tensor:
+        """c and j [B, N, 2, H, W] of j^2, as a network takes them."""
+        return SHARP * torch.cat([self.wrong, off], 2).detach().sqrt()
+
+    def image(self, start: torch.Tensor, carried: torch.Tensor, off: torch.Tensor, said: torch.Tensor) -> torch.Tensor:
+        """I, of C', J and j^2: C' + m (J - C') + 3 s tanh(r), m = c^2 / (c^2 + j^2 e^-n), 1/s^2 = 1/c^2 + 1/j^2.
 
         said   r and then n of a network, [B, N, C + 1, H, W]; zero is the closed form
         """
-        off = carried_off_by(agreed, self.wrong)
         said = self.near * said
         share = part_of(self.wrong, off * torch.exp(-said[:, :, -1:].clamp(-MOST, MOST)))
         spread = (self.wrong * part_of(off, self.wrong)).detach().sqrt()
         return start + share * (carried - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])
 
 
-def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer) -> Guide:
-    """What is known of a pair at times [B, N]."""
+def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Tensor) -> Guide:
+    """What is known of a pair at times [B, N]; `gate` is that of the pair (`gate.py`)."""
     found = risen(pair.events, times)
     light = ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found)
     flows = flows_to(pair.frame_0, pair.frame_1, light, transfer)
     wrong, _ = off_by(light, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer), transfer)
     carried = carried_off_by(agreement(warped(pair, flows), light, transfer), wrong)
-    near = gate_of(pair)[:, None]
+    near = gate[:, None]
     return Guide(transfer, light, found, flows, wrong, near, near * part_of(carried, wrong).detach())

@@ -27,6 +27,7 @@ from interp.blocks.unet import HalfSized, Unet, rrin_layout
 from interp.candidates.ramps import RISEN_CHANNELS
 from interp.light import Transfer
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
+from interp.networks.gate import gate_of
 from interp.networks.guide import OFFS, guide_of
 from interp.networks.spec import Depth, FrameFedSpec
 from interp.representation.event_counts import EventCounts
@@ -66,12 +67,12 @@ class RrinEventsGuided(FrameFed):
         self.multiple = 2 * 2 ** (max(spec.depths) - 1)
 
     def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:
-        """Counts at half the resolution."""
-        return (pair.events.pooled(self.scale.factor).off_on,)
+        """Counts at half the resolution, and the gate."""
+        return pair.events.pooled(self.scale.factor).off_on, gate_of(pair)
 
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
-        guide = guide_of(pair, times, self.spec.transfer)
+        guide = guide_of(pair, times, self.spec.transfer, pair.once[1])
         seen = [self.scale.down(each) for each in (pair.frame_0, pair.frame_1, guide.light)]
         seen.append(EventCounts(pair.once[0], pair.events.contrast).halves(times, self.spec.bins))
         at = self.scale.down(guide.flows) / self.scale.factor
@@ -81,9 +82,9 @@ class RrinEventsGuided(FrameFed):
         agreed = guide.agreement(warps)
         logits = self._visible(guide.unsure, warps, [at + correction, *seen]) + agreed
         carried, weights = blend(warps, logits, shares_at(times))
-        start = guide.coloured(carried)
-        seen = [pair.frame_0, pair.frame_1, carried, start, torch.cat([guide.found.channels(), guide.offs(agreed)], 2)]
-        image = guide.image(start, carried, agreed, run(self.residue, seen))
+        start, off = guide.coloured(carried), guide.carried_off_by(agreed)
+        seen = [pair.frame_0, pair.frame_1, carried, start, torch.cat([guide.found.channels(), guide.offs(off)], 2)]
+        image = guide.image(start, carried, off, run(self.residue, seen))
         return Interpolated(image, None, flows, warps, weights, carried)
 
     def _visible(self, unsure: torch.Tensor, warps: torch.Tensor, seen: list[torch.Tensor]) -> torch.Tensor:

@@ -31,6 +31,7 @@ from interp.networks.event_input import EventInput, EventInputSpec, first_last_a
 from interp.networks.firenet import FireNet, FireNetSpec
 from interp.networks.flow import FlowNetwork, FlowNetworkSpec
 from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at
+from interp.networks.gate import gate_of
 from interp.networks.guide import OFFS, Guide, guide_of
 from interp.networks.refinement import refined
 
@@ -112,7 +113,9 @@ class RrinSlomoEvents(FrameFed):
             beside, once = [first_last_and_target(once[0], times)], once[1:]
         events = self.event_input.at(pair, once, times)
         if self.spec.flow == "guided":
-            return self._guided(pair, times, guide_of(pair, times, self.spec.transfer), [*events, *beside])
+            return self._guided(
+                pair, times, guide_of(pair, times, self.spec.transfer, gate_of(pair)), [*events, *beside]
+            )
         at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
         carried, weights = blend(warps, F.logsigmoid(visible), shares_at(times))
         image = carried
@@ -127,11 +130,11 @@ class RrinSlomoEvents(FrameFed):
         )
         agreed = guide.agreement(warps)
         carried, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
-        start = guide.coloured(carried)
+        start, off = guide.coloured(carried), guide.carried_off_by(agreed)
         said = torch.zeros_like(start[:, :, :1]).expand(-1, -1, start.shape[2] + 1, -1, -1)
         if self.residue is not None:
-            said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, guide.offs(agreed)])
-        image = guide.image(start, carried, agreed, said)
+            said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, guide.offs(off)])
+        image = guide.image(start, carried, off, said)
         return Interpolated(image, pair.flows, at, warps, weights, carried)
 
     def _flow(self) -> nn.Module:
