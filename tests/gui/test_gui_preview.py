@@ -53,7 +53,9 @@ def test_a_preview_that_nobody_waits_for_ends_without_a_word(source: str, monkey
     ours, theirs = Pipe()
     ours.send(Request(replace(setup_of(SMALL).with_preset(0, "ideal"), source=source), number=1))
     ours.close()
-    _serve(theirs, SimpleNamespace(value=1))
+    with pytest.raises(SystemExit) as ended:
+        _serve(theirs, SimpleNamespace(value=1))
+    assert ended.value.code is None
 
 
 PARENT = """

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Lock, Thread
@@ -35,10 +35,6 @@ Reply = Answer | Plans | Refused
 
 class Superseded(Exception):
     """Something newer was asked for."""
-
-
-class Gone(Exception):
-    """Nobody listens any more."""
 
 
 class Worker:
@@ -127,11 +123,8 @@ class Planner(Thread):
                 self._send(plans_of(light, number, check))
             except Superseded:
                 pass
-            except Gone:
-                return
             except Exception as error:  # (the pictures are there, whatever happens to the plan)
-                with suppress(Gone):
-                    self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
+                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
 
 
 def _serve(pipe: Connection, newest: Any) -> None:
@@ -147,29 +140,26 @@ def _serve(pipe: Connection, newest: Any) -> None:
         with sending:
             try:
                 pipe.send(reply)
-            except OSError:
-                raise Gone from None
+            except OSError:  # (nobody listens any more: this thread ends, and with the main one the process)
+                sys.exit()
 
     previewer, planner = Previewer(check), Planner(send, lambda: newest.value)
     planner.start()
-    with suppress(Gone):
-        while True:
-            try:
-                request = pipe.recv()
-            except (EOFError, OSError):
-                return
-            number = request.number
-            try:
-                check()
-                for answer in previewer.answers(request):
-                    send(answer)
-                planner.plan(previewer.light(request), number)
-            except Superseded:
-                pass
-            except Vid2evError as error:
-                send(Refused(number, str(error)))
-            except Gone:
-                raise
-            except Exception as error:  # a page goes on, whatever happens in its preview
-                send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
-            send(None)
+    while True:
+        try:
+            request = pipe.recv()
+        except (EOFError, OSError):
+            return
+        number = request.number
+        try:
+            check()
+            for answer in previewer.answers(request):
+                send(answer)
+            planner.plan(previewer.light(request), number)
+        except Superseded:
+            pass
+        except Vid2evError as error:
+            send(Refused(number, str(error)))
+        except Exception as error:  # a page goes on, whatever happens in its preview
+            send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
+        send(None)
