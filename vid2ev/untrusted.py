@@ -23,6 +23,7 @@ from vid2ev.errors import DataError, UsageError
 
 LARGEST, PATHS = "VID2EV_LARGEST_MB", "VID2EV_PATHS"
 DEFAULT_MB = 4096
+DIGITS = 9  # of a limit [MB]
 TEXT_MB = 16  # of a text in which people write, or which says what a recording is
 DEEPEST = 40  # brackets in brackets of YAML
 LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes that file systems, and Linux, allow
@@ -31,7 +32,7 @@ LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes that file systems, and Linux, al
 def most_bytes() -> int:
     """What one file may put into memory at a time.  Raises UsageError for a limit that is no number."""
     text = os.environ.get(LARGEST, str(DEFAULT_MB))
-    if not text.isdecimal() or len(text) > 9:
+    if not text.isdecimal() or len(text) > DIGITS:
         raise UsageError(f"{LARGEST}={text[:40]}: expected a whole number of megabytes, such as {DEFAULT_MB}")
     return int(text) << 20
 
@@ -42,8 +43,13 @@ def check_bytes(path: Path | str, count: int, what: str = "its content") -> None
         claimed, most = -(-count >> 20), most_bytes() >> 20
         raise DataError(
             f"{path}: {what} would take {claimed:,} MB of memory, and {most:,} are allowed; if that is meant, set"
-            f" {LARGEST}={claimed if claimed < 10**9 else 10**9} in the environment"
+            f" {limit_for(count)}"
         )
+
+
+def limit_for(count: int) -> str:
+    """What to set so that so many bytes are allowed."""
+    return f"{LARGEST}={min(-(-count >> 20), 10**DIGITS - 1)} in the environment"
 
 
 def read_text(path: Path) -> str:

@@ -19,7 +19,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
 from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
-from vid2ev.untrusted import LARGEST, most_bytes
+from vid2ev.untrusted import limit_for, most_bytes
 
 __all__ = [
     "FORMATS",
@@ -177,10 +177,9 @@ def _check_idle(kind: Format, duration_us: int) -> None:
     """Raise DataError where times when nothing happens would take more than files may."""
     claimed = kind.idle_bytes * duration_us // 10**6
     if claimed > most_bytes():
-        days, claimed_mb = duration_us / 8.64e10, (claimed >> 20) + 1
         raise DataError(
-            f"{days:,.0f} days as {kind.name} would take {claimed_mb:,} MB for times when nothing happens; choose"
-            f" --format aedat4, take a part of it, or if that is meant set {LARGEST}={claimed_mb} in the environment"
+            f"{duration_us / 8.64e10:,.0f} days as {kind.name} would take {-(-claimed >> 20):,} MB for times when"
+            f" nothing happens; choose --format aedat4, take a part of it, or if that is meant set {limit_for(claimed)}"
         )
 
 
