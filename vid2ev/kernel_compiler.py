@@ -5,7 +5,10 @@ effects are on.  numba prunes branches that are constant before it infers types,
 `len(flags.noise)` is a constant.  `FlagsAreConstants` tells it, so what is off is not even looked at.
 
 **Inner functions.** numba optimises each function and makes machine code of it, and again wherever it is called.  What
-only kernels call is here made ready to be inlined, and no more.
+kernels call is here made ready to be inlined, and no more, also where Python calls it as well.
+
+**Passes.** Of numba's passes over a function those are left out that look for what kernels do not have: closures,
+`with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
 **Caches.** numba compiles a function again where its own file has changed, but not where one has that it calls.  Here
 a kernel is of one version of all files that kernels are made of.
@@ -24,12 +27,28 @@ from typing import Any
 from numba import _dynfunc, njit  # type: ignore[attr-defined]
 from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import FunctionPass, LoweringPass, PassManager, register_pass
 from numba.core.ir_utils import get_definition, guard
-from numba.core.typed_passes import NativeLowering
-from numba.core.untyped_passes import RewriteSemanticConstants
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NoPythonSupportedFeatureValidation,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
 
+from vid2ev.kernel_call_types import kept_call_types
 from vid2ev.kernel_flags import Numba, pass_over_flags
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -39,18 +58,29 @@ INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
 
 def compiled(function: Callable) -> Any:
     """A kernel: compiled and cached, for Python and other kernels to call."""
-    return of_this_version(of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function)))
+    return _for_python_and_kernels(function, {})
 
 
 def inlined(function: Callable) -> Any:
     """A law that is put into what calls it, however long it is: so a loop over pixels that does is vector code."""
-    options = OPTIONS | {"forceinline": True}
-    return of_this_version(of_plain_types(njit(cache=True, pipeline_class=KernelCompiler, **options)(function)))
+    return _for_python_and_kernels(function, {"forceinline": True})
 
 
 def inner(function: Callable) -> Any:
     """A part of kernels, which only they can call."""
-    return of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS)(function))
+    return _for_kernels(function, {})
+
+
+def _for_kernels(function: Callable, options: dict[str, Any]) -> Any:
+    return of_plain_types(njit(pipeline_class=KernelCompiler, **INNER_OPTIONS, **options)(function))
+
+
+def _for_python_and_kernels(function: Callable, options: dict[str, Any]) -> Any:
+    """A function for Python, cached; kernels take it as an inner one, for which no machine code is made."""
+    dispatcher = njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS, **options)(function)
+    part = _for_kernels(function, options)
+    dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
+    return of_this_version(dispatcher)
 
 
 def of_this_version(dispatcher: Any) -> Any:
@@ -78,6 +108,9 @@ FlagsAreConstants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types
 
 class InnerLibrary(JITCodeLibrary):
     """The code of an inner function: optimised only as far as loops vectorise, and without machine code."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout  # (the rest is done once all is linked)
 
     def _optimize_final_module(self) -> None:
         # (without it, what is inlined into a loop late keeps that loop from being vectorised)
@@ -109,6 +142,26 @@ class CallableByKernels(LoweringPass):
         return True
 
 
+PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    FlagsAreConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    ReconstructSSA,
+    DeadBranchPrune,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    NoPythonSupportedFeatureValidation,
+    IRLegalization,
+    NativeLowering,
+    CallableByKernels,
+    NoPythonBackend,
+)
+
+
 class KernelCompiler(CompilerBase):
     """numba's own compiler with these changes."""
 
@@ -123,14 +176,15 @@ class KernelCompiler(CompilerBase):
         collects = gc.isenabled()
         gc.disable()
         try:
-            return super().compile_extra(function)
+            with kept_call_types():
+                return super().compile_extra(function)
         finally:
             if collects:
                 gc.enable()
 
     def define_pipelines(self) -> list:
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.add_pass_after(FlagsAreConstants, RewriteSemanticConstants)
-        passes.add_pass_after(CallableByKernels, NativeLowering)
+        passes = PassManager("kernel")
+        for each in PASSES:
+            passes.add_pass(each, each.__name__)
         passes.finalize()
         return [passes]
