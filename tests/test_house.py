@@ -29,6 +29,7 @@ FLOORS = {
     "requests": 1,
     "untrusted": 1,
     "kernel_cache": 0,
+    "kernel_call_types": 0,
     "kernel_flags": 0,
     "kernel_extending": 0,
     "kernel_intrinsics": 1,
@@ -88,6 +89,7 @@ CLIENT_FLOORS = {
     "upsampler": 7,
     "interpolate": 7,
     "train": 7,
+    "cost": 8,
     "reconstruct": 8,
     "commands": 9,
 }

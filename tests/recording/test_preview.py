@@ -11,6 +11,7 @@ import av
 import numpy as np
 import pytest
 
+from vid2ev.errors import UsageError
 from vid2ev.recording.panels import COLOURS, GRAYS, NEUTRAL
 from vid2ev.recording.preview import RATE, Preview, rate_for
 from vid2ev.stream.events import Events
@@ -42,7 +43,7 @@ def film(path: Path, steps: list[tuple[Frame, Events]], size: tuple[int, int] = 
             preview.begin(frame)
     preview.finish(Events.empty())
     preview.close()
-    preview.join(path)
+    preview.join(path, (steps[-1][0].t_ns - steps[0][0].t_ns) // 1000)
     return path
 
 
@@ -176,13 +177,40 @@ def test_the_pieces_do_not_show(tmp_path: Path) -> None:
         assert np.abs(one[number] - other[number]).mean() < 1
 
 
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("by", [-(10**15), 10**10, 1 << 60])
+def test_a_state_of_another_time_is_refused(which: int, by: int, tmp_path: Path) -> None:
+    """One long ago would have a film of all the time since then; one far off has frames that no film can hold."""
+    preview = Preview(SIZE, tmp_path)
+    preview.begin(frame_at(0))
+    preview.add(frame_at(10**9), events_at([5]))
+    preview.close()
+    state = preview.state()
+    state["clock"][which] += by
+    with pytest.raises(UsageError, match="state of a preview"):
+        preview.restore(state)
+        preview.begin(frame_at(10**9))
+
+
+def test_a_state_of_more_frames_than_there_was_time_for_is_refused(tmp_path: Path) -> None:
+    preview = Preview(SIZE, tmp_path)
+    preview.begin(frame_at(0))
+    preview.add(frame_at(10**9), events_at([5]))
+    preview.close()
+    state = preview.state()
+    state["clock"][1] += 100
+    preview.restore(state)
+    with pytest.raises(UsageError, match="130 frames for 1 s"):
+        preview.join(tmp_path / "preview.mp4", 10**6)
+
+
 def test_an_unwanted_preview_makes_no_file(tmp_path: Path) -> None:
     preview = Preview(SIZE, tmp_path, wanted=False)
     preview.begin(frame_at(0))
     preview.add(frame_at(10**9), events_at([5]))
     preview.finish(events_at([6]))
     preview.close()
-    preview.join(tmp_path / "preview.mp4")
+    preview.join(tmp_path / "preview.mp4", 10**6)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -53,6 +53,12 @@ def test_every_pixel_finds_its_ray_again(name: str) -> None:
     np.testing.assert_allclose(opencv_pixels(rays.reshape(-1, 3), camera), grid.reshape(-1, 2), atol=1e-4)
 
 
+def test_what_is_along_the_plane_of_the_picture_is_infinitely_far_out() -> None:
+    camera = Intrinsics(size=(150, 70), focal_px=(89.4, 89.4), centre_px=(74.5, 34.5))
+    with np.errstate(all="raise"):
+        assert pixels_of(np.array([0.0, 0.5, np.finfo(np.float64).tiny]), camera).tolist() == [74.5, np.inf]
+
+
 def test_what_no_lens_sees_has_no_pixel() -> None:
     for name in LENSES:
         behind = pixels_of(np.array([[0, 0, -1.0], [1, 1, 0], [0.1, 0, -1e-12], [np.nan, 0, 1]]), lens(name))

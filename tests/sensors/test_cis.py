@@ -285,3 +285,18 @@ def test_thousands_of_exposures_between_two_frames_come_one_at_a_time():
     assert next(made).index == 0 and len(cis._spare) + len(cis._open) <= 1
     assert sum(1 for _ in made) == 35_999
     assert math.isclose(cis.counts["frames"], 36_000)
+
+
+@pytest.mark.parametrize("which", range(3))
+@pytest.mark.parametrize("by", [-(10**15), -(10**9), 10**9, 10**15])
+def test_a_state_of_times_that_do_not_belong_together_is_refused(which: int, by: int):
+    """A first exposure long ago would have all since then made at once."""
+    cis = Cis(EVERYTHING, SIZE)
+    for frame in clip()[:30]:
+        cis.see(frame)
+    state = cis.state()
+    changed = {name: array.copy() for name, array in state.items()}
+    changed["clock"][which] += by
+    with pytest.raises(UsageError, match="state of a frame camera"):
+        cis.restore(changed)
+    cis.restore(state)

@@ -63,8 +63,11 @@ class Preview:
         self._container: Any = None
 
     def begin(self, frame: Frame) -> None:
-        """The first frame of the recording; after `restore`, the last source frame before it."""
+        """The first frame of the recording; after `restore`, the last source frame before it.  Raises UsageError for
+        one that is not where the state is."""
         self._newest = frame
+        if self.wanted and self._t0_ns is not None and not self._instant_ns(-1) < frame.t_ns <= self._instant_ns():
+            raise UsageError(f"state of a preview before its frame {self._next}, at {frame.t_ns} ns")
         self._t0_ns = frame.t_ns if self._t0_ns is None else self._t0_ns
 
     def add(self, frame: Frame, events: Events) -> None:
@@ -110,17 +113,21 @@ class Preview:
         if missing := next((k for k in range(len(self._starts)) if not self._piece(k).is_file()), None):
             raise UsageError(f"state of a preview without its piece {missing}")
 
-    def join(self, path: Path) -> None:
-        """Put the pieces one after the other into one file, without encoding them again."""
+    def join(self, path: Path, duration_us: int) -> None:
+        """Put the pieces one after the other into one file, without encoding them again.  Raises UsageError for a state
+        of more frames than a recording of that length has."""
+        if self._next > self.rate * duration_us // 10**6 + 3:
+            raise UsageError(f"state of a preview of {self._next} frames for {duration_us / 1e6:.6g} s")
         if self._starts:
             join_films(path, ((self._piece(number), first) for number, first in enumerate(self._starts)), self.rate)
 
     def _piece(self, number: int) -> Path:
         return self.pieces / f"preview-{number:05d}.mp4"
 
-    def _instant_ns(self) -> int:
+    def _instant_ns(self, later: int = 0) -> int:
+        """The instant of the next frame, or of another `later` than that."""
         assert self._t0_ns is not None
-        return self._t0_ns + (4 * self._next + 1) * 10**9 // (4 * self.rate)
+        return self._t0_ns + (4 * (self._next + later) + 1) * 10**9 // (4 * self.rate)
 
     def _count(self, events: Events) -> None:
         if len(events):

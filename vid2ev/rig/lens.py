@@ -61,7 +61,8 @@ def pixel_grid(size: tuple[int, int]) -> np.ndarray:
 def bent(plane: np.ndarray, camera: Intrinsics) -> np.ndarray:
     """Pixels [..., 2] of places [..., 2] on the plane z = 1, in the same precision; NaN beyond the lens's field."""
     if camera.model == "none":
-        return (plane * camera.focal_px + camera.centre_px).astype(plane.dtype)
+        with np.errstate(over="ignore"):  # (what is seen along the picture's plane is infinitely far out)
+            return (plane * camera.focal_px + camera.centre_px).astype(plane.dtype)
     import torch
 
     return bent_tensor(torch.from_numpy(plane), camera).numpy()

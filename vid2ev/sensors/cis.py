@@ -127,7 +127,8 @@ class Cis:
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave.  Raises UsageError, KeyError
+        for another."""
         self._open.clear()
         if not state:
             self._t_ns, self._first_ns, self._next = None, 0, 0
@@ -138,7 +139,11 @@ class Cis:
         begun = entry(state, "open", np.int64, (None, 2))
         totals = entry(state, "totals", np.float64, (len(begun), *shape)) if len(begun) else begun
         pending = entry(state, "pending", np.float64, (len(begun), shape[0])) if len(begun) else begun
-        self._t_ns, self._first_ns, self._next = clock(state, "clock", 3)
+        t_ns, first_ns, following = clock(state, "clock", 3)
+        open_ns = [first_ns + opening_ns(k, self.spec.frame_rate_hz) for k in (following - 1, following)]
+        if following < 1 or not open_ns[0] <= t_ns < open_ns[1]:
+            raise UsageError(f"state of a frame camera at {t_ns} ns before exposure {following} since {first_ns} ns")
+        self._t_ns, self._first_ns, self._next = t_ns, first_ns, following
         self._made, self._unfinished, self._rows.mended = clock(state, "counts", 3)
         self._rows.before = self._rows.put(light)
         self._open += [

@@ -64,7 +64,8 @@ class DvsTrack:
 
     def begin(self, frame: Frame) -> None:
         """The first frame; after `restore`, the last source frame before the checkpoint."""
-        self._film.begin(frame)
+        with self.folder.taking_up():
+            self._film.begin(frame)
         if not self.folder.size(f"{self._within}{FRAME_US}"):
             self.dvs.see(frame)
             self._note(frame)
@@ -107,7 +108,8 @@ class DvsTrack:
     def write(self, whole: Path, start_us: int, duration_us: int) -> None:
         """The files of the recording."""
         self.outputs.write(whole, self._recording(start_us, duration_us))
-        self._film.join(whole / "preview.mp4")
+        with self.folder.taking_up():
+            self._film.join(whole / "preview.mp4", duration_us)
         if self._probe:
             shutil.copyfile(self.folder.written(f"{self._within}{PROBE}"), whole / PROBE)
         elif self._probed and self.outputs.probe:
