@@ -127,8 +127,8 @@ class Cis:
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that a sensor of the same parameters, size, seed and camera gave.  Raises UsageError, KeyError
-        for another."""
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave.  Raises UsageError and
+        KeyError for another."""
         self._open.clear()
         if not state:
             self._t_ns, self._first_ns, self._next = None, 0, 0
