@@ -72,6 +72,12 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 @click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
     help="Where; auto: on a GPU, if there is one.",
 )  # fmt: skip
+@click.option(
+    "--precision", type=click.Choice(["float32", "bfloat16", "float16"]), default="float32", show_default=True,
+    help="Of a network's convolutions: fewer bits are faster where hardware has them; `vid2ev cost SOURCE --rebuild 8`"
+    " says what that does here.",
+)  # fmt: skip
+@click.option("--compile", "compiled", is_flag=True, help="Have torch compile a network first, for long footage.")
 @worker_options("Sources")
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
@@ -87,6 +93,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     """
     from interp.commands.many import places, sources_in
     from interp.interpolate.take import Options
+    from interp.methods.running import Running
     from vid2ev.commands import batch
     from vid2ev.commands.worker_options import workers_of
 
@@ -94,6 +101,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     workers = workers_of(options)
     asked, given = options.pop("hdr"), options.pop("hdr_network")
     options["hdr"] = given or (pretrained.first(pretrained.HDR) if asked else None)
+    options["running"] = Running(options.pop("precision"), options.pop("compiled"))
     taken = Options(
         start_s=options.pop("start"),
         stop_s=options.pop("stop"),

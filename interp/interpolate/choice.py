@@ -11,6 +11,7 @@ import torch
 from interp import pretrained
 from interp.methods import Method, open_method
 from interp.methods.one_frame import WAYS, OneFrame
+from interp.methods.running import PLAIN, Running
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import sha256
 
@@ -34,11 +35,13 @@ def choice(
     where: str,
     device: torch.device | str,
     coarse: bool = False,
+    running: Running = PLAIN,
 ) -> Choice:
     """The method of a name or a file of weights, or without either the default.
 
     events   whether there are events; `where` is what has them or not, for people
     coarse   whether a pixel of the event camera looks at several of the frames
+    running  how a network is run
     Raises UsageError for both at once, and for a method that needs events where there are none.
     """
     if name and network:
@@ -52,20 +55,22 @@ def choice(
         seen = f"there are {'coarse ' * coarse}events" if events else "there are no events"
         best = "the network that comes with vid2ev" if network else "the best that needs no training"
         why = f"{best}, since {seen}"
-    method = open_method(str(network or name), device)
+    method = open_method(str(network or name), device, running)
     if method.needs_events and not events:
         raise UsageError(f"method '{method.name}' needs events, and {where} has none; choose flow, or leave it out")
     about: dict[str, Any] = {"method": method.name}
     if network:
-        about |= {"weights": str(network), "sha256": sha256(network)}
+        about |= {"weights": str(network), "sha256": sha256(network), **running.describe()}
     return Choice(method, why, about)
 
 
-def choice_of_one(name: str | None, network: str | Path | None, where: str) -> Choice:
-    """The method for a single frame.  Raises UsageError for one that takes two."""
+def choice_of_one(name: str | None, network: str | Path | None, where: str, running: Running = PLAIN) -> Choice:
+    """The method for a single frame.  Raises UsageError for one that takes two, and for a way to run networks."""
     asked = name or network
     if asked is not None and name not in WAYS:
         raise UsageError(f"method '{asked}' takes two frames, and {where} is a single one; choose {' or '.join(WAYS)}")
+    if running != PLAIN:
+        raise UsageError(f"{where} is a single frame, which no network takes: leave out --precision and --compile")
     method = OneFrame(name or WAYS[0])  # type: ignore[arg-type]
     return Choice(method, "as asked" if asked else "what a single frame and its events allow", {"method": method.name})
 

@@ -24,6 +24,7 @@ from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.interpolate.tiling import parse_tiling
 from interp.methods import open_method
+from interp.methods.running import PLAIN, Running
 from interp.representation.carried import footprint_of
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, versions
@@ -47,6 +48,7 @@ def interpolate(
     tile: str = "auto",
     cuts: str = "hold",
     device: str = "cpu",
+    running: Running = PLAIN,
     options: Options = AS_IT_IS,
     overwrite: bool = False,
     resume: bool = False,
@@ -67,6 +69,7 @@ def interpolate(
     tile       none, WIDTHxHEIGHT, or auto: large frames in tiles
     cuts       hold: nothing is interpolated across a cut; keep: cuts are not looked for
     device     cpu, cuda or auto
+    running    with how many bits a network is run, and whether torch compiles it
     resume     go on where an interrupted run was, to the same bytes; what is finished is left as it is
     report     told how many frames are done, of how many
     told       told in one sentence which method was chosen, and why
@@ -75,7 +78,7 @@ def interpolate(
     """
     output, where = Path(output), device_of(device)
     kind = kind_of(output, format)
-    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options)
+    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options, running)
     take, grid, fill = ready.take, ready.grid, ready.fill
     if told:
         told(f"{fill.method.name}: {ready.why}")
@@ -116,11 +119,13 @@ def frames(
     tile: str = "auto",
     cuts: str = "hold",
     device: str = "cpu",
+    running: Running = PLAIN,
     options: Options = AS_IT_IS,
 ) -> Iterator[Filled]:
     """The frames that `interpolate` writes, one by one, in memory that does not grow; what is wrong is refused at
     once, as there."""
-    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, device_of(device), options)
+    where = device_of(device)
+    ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options, running)
     return (frame for stretch in ready.stretches() for frame in ready.work(stretch)[1])
 
 
@@ -156,6 +161,7 @@ def prepared(
     cuts: str,
     device: torch.device,
     options: Options,
+    running: Running,
 ) -> Ready:
     """Open the source, its method and its tiles.  Raises as `interpolate` does."""
     if cuts not in ("hold", "keep"):
@@ -163,10 +169,10 @@ def prepared(
     take = open_take(source, options)
     has_events = take.event_size is not None
     if isinstance(take, OfStill):
-        chosen = choice_of_one(method, network, str(source))
+        chosen = choice_of_one(method, network, str(source), running)
     else:
         coarse = take.event_size is not None and footprint_of(take.size, take.event_size) > 1
-        chosen = choice(method, network, has_events, str(source), device, coarse)
+        chosen = choice(method, network, has_events, str(source), device, coarse, running)
     after = After(pretrained.path_of(hdr), has_events, device) if hdr else None
     tiling = parse_tiling(tile, take.size, multiple_of(chosen))
     needed = after is not None and after.needs_events

@@ -30,6 +30,7 @@ from interp.methods.closed_forms import ClosedForm, guided_by_ramps, linear, nea
 from interp.methods.flow import flow
 from interp.methods.gap import Gap, Method
 from interp.methods.of_networks import of_weights
+from interp.methods.running import PLAIN, Running
 from vid2ev.errors import UsageError
 from vid2ev.errors import nearest as near
 
@@ -47,14 +48,17 @@ METHODS: dict[str, Callable[[], Method]] = {
 }
 
 
-def open_method(name: str, device: torch.device | str = "cpu") -> Method:
-    """The method of a name, or of a file of weights.
+def open_method(name: str, device: torch.device | str = "cpu", running: Running = PLAIN) -> Method:
+    """The method of a name, or of a file of weights, which is run as `running` says.
 
-    Raises UsageError for a name that is none, DataError for a file that holds no network which rebuilds frames.
+    Raises UsageError for a name that is none, and for a way to run what is no network; DataError for a file that holds
+    no network which rebuilds frames.
     """
     if name in METHODS:
+        if running != PLAIN:
+            raise UsageError(f"method '{name}' is no network: leave out --precision and --compile, which are of these")
         return METHODS[name]()
     if Path(name).suffix == ".safetensors" or Path(name).exists():
-        return of_weights(Path(name), device)
+        return of_weights(Path(name), device, running=running)
     known = ", ".join(METHODS)
     raise UsageError(f"method '{name}'{near(name, METHODS)}: expected one of {known}, or a file of weights")

@@ -10,6 +10,7 @@ import torch
 from torch.nn import functional as F
 
 from interp.methods.gap import Gap
+from interp.methods.running import PLAIN, Running
 from interp.networks.event_fed import EventFed, States
 from interp.networks.frame_fed import FrameFed
 from interp.weights import load
@@ -25,6 +26,7 @@ class OfFrames:
     name: str
     network: FrameFed
     needs_events: bool
+    running: Running = PLAIN
     sequential: bool = False
 
     def begin(self) -> Self:
@@ -36,9 +38,11 @@ class OfFrames:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
         events = gap.events if self.needs_events else None
-        pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], events)
         some = max(1, AT_ONCE_PX // gap.frame_0[0].numel())
-        return _finite(self, torch.cat([self.network.at(pair, part).images[0] for part in times.split(some)]))
+        with self.running.on(gap.frame_0.device):
+            pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], events)
+            images = [self.network.at(pair, part).images[0] for part in times.split(some)]
+        return _finite(self, torch.cat(images).float())
 
 
 @dataclass(slots=True)
@@ -47,6 +51,7 @@ class OfEvents:
 
     name: str
     network: EventFed
+    running: Running = PLAIN
     needs_events: bool = True
     sequential: bool = True
     states: States = field(default=(), repr=False)
@@ -63,19 +68,22 @@ class OfEvents:
         edges = torch.cat([times.new_zeros(1), times, times.new_ones(1)])[None]
         bins: int = self.network.spec.bins  # type: ignore[assignment, union-attr]
         voxels = gap.events.voxels(edges[:, :-1], edges[:, 1:], bins)
-        images, self.states = self.network.sequence(voxels, self.states)
-        laid = F.interpolate(images[0, :-1], gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
+        with self.running.on(voxels.device):
+            images, self.states = self.network.sequence(voxels, self.states)
+        laid = F.interpolate(images[0, :-1].float(), gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
         return _finite(self, laid.expand(-1, len(gap.frame_0), -1, -1))
 
 
-def of_weights(path: Path, device: torch.device | str = "cpu", name: str | None = None) -> OfFrames | OfEvents:
+def of_weights(
+    path: Path, device: torch.device | str = "cpu", name: str | None = None, running: Running = PLAIN
+) -> OfFrames | OfEvents:
     """The network of a file as a method; it is called like the file unless told otherwise."""
-    network: Any = load(path).to(device)
+    network: Any = running.ready(load(path).to(device))
     name = name or path.stem
     if isinstance(network, FrameFed):
-        return OfFrames(name, network, network.spec.takes_events)
+        return OfFrames(name, network, network.spec.takes_events, running)
     if isinstance(network, EventFed):
-        return OfEvents(name, network)
+        return OfEvents(name, network, running)
     raise DataError(f"{path} holds a network that rebuilds no frames in between; give one of frames or of events")
 
 

@@ -14,8 +14,9 @@ machine's noise makes of them, the most accurate; where time is the only limit, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from vid2ev.cost.errors import Errors
 from vid2ev.cost.rung import Rung
@@ -23,6 +24,7 @@ from vid2ev.errors import UsageError, nearest
 
 DEFAULT, DEFAULT_OF_FRAMES = "vR=0.05", "lsb=1"
 AS_FAST = 1.05
+T = TypeVar("T")
 LIMITS = ("vR", "count", "us", "lsb", "time")
 
 
@@ -104,9 +106,15 @@ def refusal(rows: Sequence[Row], budget: Budget) -> str:
 
 def front(rows: Sequence[Row]) -> list[Row]:
     """The settings than which none is as fast and more accurate, nor as accurate and faster; from the fastest on."""
-    kept: list[Row] = []
-    for row in sorted(filter(_is_seen, rows), key=lambda row: (row.time, _error(row))):
-        if not kept or _error(row) < _error(kept[-1]):
+    return ahead([*filter(_is_seen, rows)], lambda row: row.time, _error)
+
+
+def ahead(rows: Iterable[T], time: Callable[[T], float], error: Callable[[T], float]) -> list[T]:
+    """Of anything that takes time and is off by something, what nothing else is ahead of in both; from the fastest
+    on."""
+    kept: list[T] = []
+    for row in sorted(rows, key=lambda row: (time(row), error(row))):
+        if not kept or error(row) < error(kept[-1]):
             kept.append(row)
     return kept
 

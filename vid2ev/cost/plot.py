@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def plot(cost: Cost, picture: Path) -> None:
         axes.scatter(*places, color=COLOURS[group], s=36, zorder=3, label=MEANINGS.get(group))
     _draw_recommended(axes, cost)
     figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize=8)
-    _label(axes, rows)
+    label(axes, [(row.time, _error(row), row.rung.name, COLOURS[row.rung.group]) for row in rows])
     save(figure, picture)
 
 
@@ -100,19 +101,19 @@ def _draw_recommended(axes: Any, cost: Cost) -> None:
         )  # fmt: skip
 
 
-def _label(axes: Any, rows: list[Row]) -> None:
-    """Names beside the points, moved up where they would cover one another."""
+def label(axes: Any, points: Iterable[tuple[float, float, str, str]]) -> None:
+    """Names beside points (x, y, name, colour), moved up where they would cover one another."""
     axes.figure.draw_without_rendering()
     taken: list[tuple[float, float, float]] = []
-    for row in sorted(rows, key=_error):
-        x, y = axes.transData.transform((row.time, _error(row)))
-        width, up = 6.0 * len(row.rung.name), 0.0
+    for x_of, y_of, name, colour in sorted(points, key=lambda point: point[1]):
+        x, y = axes.transData.transform((x_of, y_of))
+        width, up = 6.0 * len(name), 0.0
         while any(abs(y + up - other) < CLOSE_PX and x < right and x + width > left for left, right, other in taken):
             up += CLOSE_PX
         taken.append((x, x + width, y + up))
         axes.annotate(
-            row.rung.name, (row.time, _error(row)), xytext=(8, up * 0.72 - 3), textcoords="offset points", fontsize=8,
-            color=COLOURS[row.rung.group], bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5},
+            name, (x_of, y_of), xytext=(8, up * 0.72 - 3), textcoords="offset points", fontsize=8, color=colour,
+            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5},
         )  # fmt: skip
 
 

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from vid2ev.cost.measure import Cost
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import whole_file, writing
 
 
-def check(name: str | None, source: str, overwrite: bool) -> tuple[Path, Path]:
+@dataclass(frozen=True)
+class Findings:
+    """What was measured: ready for JSON, as text for people, and what draws it into a PNG file."""
+
+    described: Mapping[str, Any]
+    text: str
+    draw: Callable[[Path], None]
+
+
+def check(name: str | None, source: str, overwrite: bool, kind: str = "cost") -> tuple[Path, Path]:
     """The places of the JSON and the PNG file; raises UsageError where one is taken."""
-    stem = name or f"{_short(source)}_cost"
+    stem = name or f"{_short(source)}_{kind}"
     places = Path(f"{stem}.json"), Path(f"{stem}.png")
     for place in places:
         if place.exists() and not overwrite:
@@ -20,12 +31,12 @@ def check(name: str | None, source: str, overwrite: bool) -> tuple[Path, Path]:
     return places
 
 
-def store(cost: Cost, place: Path) -> None:
+def store(described: Mapping[str, Any], place: Path) -> None:
     """Write the JSON file, which is there as a whole or not at all; raises DataError."""
     with writing(place):
         place.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(place) as file:
-            file.write(f"{json.dumps(cost.describe(), indent=2, allow_nan=False)}\n".encode())
+            file.write(f"{json.dumps(described, indent=2, allow_nan=False)}\n".encode())
 
 
 def _short(source: str) -> str:

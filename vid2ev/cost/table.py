@@ -49,11 +49,18 @@ def _headed(cost: Cost) -> list[str]:
     width, height = cost.size
     begin, end = cost.stretch_s
     part = "all of it" if begin is None or end is None else f"{begin:g} ... {end:g} s"
-    lines = cells(cost)
-    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]) - 1)]
-    rows = ["  ".join(_set(line, widths)).rstrip() for line in lines]
     threads = f"{cost.threads} thread{'s' * (cost.threads > 1)}"
-    return [f"{cost.clip}, {part}, {width}x{height}, {threads}; errors against the reference", "", *rows]
+    return [
+        f"{cost.clip}, {part}, {width}x{height}, {threads}; errors against the reference",
+        "",
+        *columns(cells(cost)),
+    ]
+
+
+def columns(lines: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of cells below each other."""
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]) - 1)]
+    return ["  ".join(_set(line, widths)).rstrip() for line in lines]
 
 
 def _set(line: Sequence[str], widths: Sequence[int]) -> list[str]:

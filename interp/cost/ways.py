@@ -1,0 +1,125 @@
+"""The ways to rebuild frames that are compared.
+
+closed forms    all of `interp.methods`
+networks        the best that come with vid2ev, of each kind, and those that are asked for
+of the first of these, or of what is asked for:
+precision       fewer bits                  compiled   by torch
+tiles           of 256x256 px               motion     what is found once per gap, found anew for each frame
+larger          the same with more channels, untrained: its time alone
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Self
+
+import torch
+
+from interp import pretrained
+from interp.interpolate.tiling import between, parse_tiling
+from interp.methods import METHODS, Gap, Method, open_method
+from interp.methods.of_networks import OfFrames, of_weights
+from interp.methods.running import PLAIN, PRECISIONS, Running
+from interp.networks.spec import BASES
+
+KINDS = (pretrained.WITH_EVENTS, pretrained.OF_FRAMES, pretrained.OF_EVENTS)
+TILE = "256x256"
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to rebuild frames.
+
+    name     what it is called in tables
+    group    what it is (above)
+    open     opens its method
+    asked    what asks `interpolate` for it; empty if nothing does
+    scored   whether its frames are worth a look
+    """
+
+    name: str
+    group: str
+    open: Callable[[], Method] = field(repr=False)
+    asked: str = ""
+    scored: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Tiled:
+    """A method that makes frames in tiles."""
+
+    method: Method
+    tile: str
+    multiple: int
+
+    name, needs_events, sequential = "tiled", True, False
+
+    def begin(self) -> Self:
+        """See `interp.methods.gap.Method`."""
+        return replace(self, method=self.method.begin())
+
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`."""
+        height, width = gap.frame_0.shape[-2:]
+        return between(self.method, gap, times, parse_tiling(self.tile, (width, height), self.multiple))
+
+
+@dataclass(frozen=True, slots=True)
+class Anew:
+    """A method that is asked for one frame at a time, and does all of its work for each."""
+
+    method: Method
+
+    name, needs_events, sequential = "anew", True, False
+
+    def begin(self) -> Self:
+        """See `interp.methods.gap.Method`."""
+        return replace(self, method=self.method.begin())
+
+    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+        """See `interp.methods.gap.Method`."""
+        return torch.cat([self.method.between(gap, time) for time in times.split(1)])
+
+
+def ways(networks: Sequence[str | Path], device: str) -> list[Way]:
+    """All ways; of networks those that are asked for, or else those that come with vid2ev.
+
+    Raises UsageError, DataError for weights that cannot be used.
+    """
+    paths = [pretrained.path_of(network) for network in networks]
+    if not paths:
+        paths = [path for names in KINDS if (path := pretrained.first(names)) is not None]
+    found = [Way(name, "closed forms", partial(open_method, name), f"--method {name}") for name in METHODS]
+    for path in paths:
+        found.append(Way(path.stem, "networks", partial(of_weights, path, device), f"--network {path.stem}"))
+    if paths:
+        found += _varied(paths[0], device)
+    return found
+
+
+def _varied(path: Path, device: str) -> Iterator[Way]:
+    """The same network, run otherwise."""
+    name, asked, plain = path.stem, f"--network {path.stem}", of_weights(path, device)
+    for precision in PRECISIONS:
+        running = Running(precision)
+        # (16-bit floats of another kind are slow on CPUs, and no more exact than is of use)
+        if running != PLAIN and not (precision == "float16" and device == "cpu"):
+            opened = partial(of_weights, path, device, running=running)
+            yield Way(f"{name}, {precision}", "precision", opened, f"{asked} --precision {precision}")
+    opened = partial(of_weights, path, device, running=Running(compiled=True))
+    yield Way(f"{name}, compiled", "compiled", opened, f"{asked} --compile")
+    if not isinstance(plain, OfFrames):
+        return
+    network = plain.network
+    yield Way(f"{name}, tiles", "tiles", lambda: Tiled(plain, TILE, network.multiple), f"{asked} --tile {TILE}")
+    yield Way(f"{name}, motion anew", "motion", lambda: Anew(plain))
+    for size in list(BASES)[list(BASES).index(network.spec.size) + 1 :]:
+        yield Way(f"{name}, of size {size}", "larger", partial(_untrained, plain, size), scored=False)
+
+
+def _untrained(method: OfFrames, size: str) -> Method:
+    network = type(method.network)(method.network.spec.model_copy(update={"size": size}))  # type: ignore[call-arg]
+    return replace(method, network=network.to(next(method.network.parameters()).device).eval())

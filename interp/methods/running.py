@@ -1,0 +1,65 @@
+"""How networks are run: with how many bits, and as torch does it by itself or compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import nn
+
+from vid2ev.errors import UsageError
+
+PRECISIONS = {"float32": None, "bfloat16": torch.bfloat16, "float16": torch.float16}
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """How a network is run.
+
+    precision   bits of what convolutions take and give: float32; bfloat16 and float16, which are fast where hardware
+                has them.  Warps, blends and what is remembered stay in float32 (`interp.precision`)
+    compiled    by torch, once for each size of frames, which takes half a minute or more; on a CPU that needs a
+                C++ compiler
+    Raises UsageError for a precision that is none.
+    """
+
+    precision: str = "float32"
+    compiled: bool = False
+
+    def __post_init__(self) -> None:
+        if self.precision not in PRECISIONS:
+            raise UsageError(f"precision '{self.precision}': expected one of {', '.join(PRECISIONS)}")
+
+    def ready(self, network: Any) -> Any:
+        """A network to be run like this; its parts are compiled when they are first used."""
+        for part in network.children() if self.compiled else ():
+            assert isinstance(part, nn.Module)
+            part.compile()
+        return network
+
+    @contextmanager
+    def on(self, device: torch.device) -> Iterator[None]:
+        """Within it networks are run like this.  Raises UsageError where there is no compiler."""
+        kind = PRECISIONS[self.precision]
+        with torch.autocast(device.type, kind, enabled=kind is not None):
+            if not self.compiled:
+                yield
+                return
+            from torch._dynamo.exc import BackendCompilerFailed
+            from torch._inductor.exc import InductorError
+
+            try:
+                yield
+            except (BackendCompilerFailed, InductorError) as error:
+                said = str(error).strip().splitlines()[0]
+                raise UsageError(f"torch cannot compile networks here ({said}); leave out --compile") from error
+
+    def describe(self) -> dict[str, Any]:
+        """It as JSON."""
+        return {"precision": self.precision, "compiled": self.compiled}
+
+
+PLAIN = Running()
