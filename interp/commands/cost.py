@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
 
-from vid2ev.cost.measure import Report
 from vid2ev.cost.store import Findings
+from vid2ev.cost.turns import Report
 from vid2ev.errors import UsageError
 from vid2ev.sources import OPTIONS
 

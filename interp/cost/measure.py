@@ -8,6 +8,7 @@ round that does not count.  What takes long is timed once.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,18 +24,19 @@ from torch.nn import functional as F
 from interp.cost.ways import Way, ways
 from interp.data.tensors import as_tensor
 from interp.evaluate.group import Group
-from interp.evaluate.protocol import Protocol
+from interp.evaluate.protocol import Protocol, range_of
 from interp.evaluate.rebuilders import OfMethod
 from interp.evaluate.scoring import scores_of
 from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
+from interp.evaluate.tables import mean_of
 from interp.methods import Gap
 from vid2ev.cost.front import ahead
-from vid2ev.errors import UsageError
+from vid2ev.cost.turns import Report, Turns
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine
 
 Size = tuple[int, int]
-Report = Callable[[int, int, str], object]  # how many passes are done, of how many, and what comes next
 GAPS = 4
 SIZES: tuple[Size, ...] = ((640, 480), (1280, 720))
 LONG_S = 10.0
@@ -45,7 +47,8 @@ AS_GOOD_DB = 0.2
 class Row:
     """A way as measured.
 
-    psnr, ssim   means over its frames, against the range of the true frame; None where it is not worth a look
+    psnr, ssim   means over its frames, against the range of the true frame; None where it is not worth a look, and
+                 SSIM of frames that are smaller than its window
     ms           for each size, how long each pass took per frame that it made [ms]
     """
 
@@ -147,10 +150,12 @@ def rebuilding(
     groups = list(footage.groups())
     if not groups:
         raise UsageError(f"{source}: no two key frames with {multiple - 1} frames between them; give a longer one")
+    if not any(range_of(true) for group in groups for true in group.truth):
+        raise DataError(f"{source}: each frame to be rebuilt is of one value all over; give one of things")
     tried = ways(networks, device)
     own = groups[0].keys.shape[2], groups[0].keys.shape[1]
     every = tuple(dict.fromkeys([own, *sizes]))
-    turns = _Turns(report, len(tried) * (1 + (1 + repeats) * len(every)))
+    turns = Turns(report, len(tried) * (1 + (1 + repeats) * len(every)))
     with _threads(threads) as used:
         methods = [OfMethod(way.name, {}, way.open(), protocol, device) for way in tried]
         rows = []
@@ -164,18 +169,6 @@ def rebuilding(
     return Rebuilding(source, len(groups), multiple, every, device, used, tuple(rows))
 
 
-class _Turns:
-    """Counts the passes for a report."""
-
-    def __init__(self, report: Report | None, total: int):
-        self._report, self._total, self._done = report, total, 0
-
-    def next(self, name: str) -> None:
-        if self._report is not None:
-            self._report(self._done, self._total, name)
-        self._done += 1
-
-
 @contextmanager
 def _threads(wanted: int | None) -> Iterator[int]:
     """How many torch has within."""
@@ -187,15 +180,16 @@ def _threads(wanted: int | None) -> Iterator[int]:
         torch.set_num_threads(before)
 
 
-def _scores(method: OfMethod, groups: Sequence[Group]) -> tuple[float, float]:
-    """PSNR and SSIM, means over all frames."""
+def _scores(method: OfMethod, groups: Sequence[Group]) -> tuple[float, float | None]:
+    """PSNR and SSIM, means over all frames; no SSIM of frames smaller than its window."""
     scores = [
         scores_of(made, true, group.keys)
         for group in groups
         for made, true in zip(method.frames(group), group.truth, strict=True)
         if made is not None
     ]
-    return float(np.nanmean([each["psnr"] for each in scores])), float(np.nanmean([each["ssim"] for each in scores]))
+    psnr, ssim = (mean_of(each[name] for each in scores).mean for name in ("psnr", "ssim"))
+    return psnr, None if math.isnan(ssim) else ssim
 
 
 def _brought_to(group: Group, size: Size, protocol: Protocol, device: str) -> tuple[Gap, torch.Tensor]:
@@ -210,7 +204,7 @@ def _brought_to(group: Group, size: Size, protocol: Protocol, device: str) -> tu
 
 
 def _timed(
-    methods: Sequence[OfMethod], gap: Gap, times: torch.Tensor, repeats: int, turns: _Turns, clock: Callable[[], float]
+    methods: Sequence[OfMethod], gap: Gap, times: torch.Tensor, repeats: int, turns: Turns, clock: Callable[[], float]
 ) -> list[list[float]]:
     """How long each method takes per frame [ms], in turn; the first round, in which things are compiled and memory is
     found, does not count."""

@@ -21,7 +21,7 @@ import torch
 from interp import pretrained
 from interp.interpolate.tiling import between, parse_tiling
 from interp.methods import METHODS, Gap, Method, open_method
-from interp.methods.of_networks import OfFrames, of_weights
+from interp.methods.of_networks import OfEvents, OfFrames, of_weights
 from interp.methods.running import PLAIN, PRECISIONS, Running
 from interp.networks.spec import BASES
 
@@ -89,28 +89,25 @@ def ways(networks: Sequence[str | Path], device: str) -> list[Way]:
 
     Raises UsageError, DataError for weights that cannot be used.
     """
-    paths = [pretrained.path_of(network) for network in networks]
-    if not paths:
-        paths = [path for names in KINDS if (path := pretrained.first(names)) is not None]
+    asked = networks or [path.stem for names in KINDS if (path := pretrained.first(names)) is not None]
     found = [Way(name, "closed forms", partial(open_method, name), f"--method {name}") for name in METHODS]
-    for path in paths:
-        found.append(Way(path.stem, "networks", partial(of_weights, path, device), f"--network {path.stem}"))
-    if paths:
-        found += _varied(paths[0], device)
+    opened = {f"--network {name}": of_weights(pretrained.path_of(name), device) for name in asked}
+    found += [Way(plain.name, "networks", partial(_itself, plain), of) for of, plain in opened.items()]
+    for of, plain in [*opened.items()][:1]:
+        found += _otherwise(plain, of, device)
+        found.append(_compiled(pretrained.path_of(asked[0]), of, device))
     return found
 
 
-def _varied(path: Path, device: str) -> Iterator[Way]:
+def _otherwise(plain: OfFrames | OfEvents, asked: str, device: str) -> Iterator[Way]:
     """The same network, run otherwise."""
-    name, asked, plain = path.stem, f"--network {path.stem}", of_weights(path, device)
+    name = plain.name
     for precision in PRECISIONS:
         running = Running(precision)
         # (16-bit floats of another kind are slow on CPUs, and no more exact than is of use)
         if running != PLAIN and not (precision == "float16" and device == "cpu"):
-            opened = partial(of_weights, path, device, running=running)
-            yield Way(f"{name}, {precision}", "precision", opened, f"{asked} --precision {precision}")
-    opened = partial(of_weights, path, device, running=Running(compiled=True))
-    yield Way(f"{name}, compiled", "compiled", opened, f"{asked} --compile")
+            coarse = partial(replace, plain, running=running)
+            yield Way(f"{name}, {precision}", "precision", coarse, f"{asked} --precision {precision}")
     if not isinstance(plain, OfFrames):
         return
     network = plain.network
@@ -118,6 +115,16 @@ def _varied(path: Path, device: str) -> Iterator[Way]:
     yield Way(f"{name}, motion anew", "motion", lambda: Anew(plain))
     for size in list(BASES)[list(BASES).index(network.spec.size) + 1 :]:
         yield Way(f"{name}, of size {size}", "larger", partial(_untrained, plain, size), scored=False)
+
+
+def _compiled(path: Path, asked: str, device: str) -> Way:
+    """The same network compiled: loaded once more, as it is compiled in place."""
+    opened = partial(of_weights, path, device, running=Running(compiled=True))
+    return Way(f"{path.stem}, compiled", "compiled", opened, f"{asked} --compile")
+
+
+def _itself(method: Method) -> Method:
+    return method
 
 
 def _untrained(method: OfFrames, size: str) -> Method:

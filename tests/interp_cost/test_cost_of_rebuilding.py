@@ -14,14 +14,16 @@ from matplotlib.image import imread
 
 from interp.cost import measure
 from interp.cost.measure import rebuilding
+from interp.cost.shown import table
 from interp.cost.ways import Anew, Tiled, ways
 from interp.evaluate.run import evaluate
+from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS, Gap, open_method
 from interp.methods.running import Running
 from interp.pretrained import HERE
 from interp.representation.event_counts import EventCounts
 from vid2ev.commands import main
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 
 SCENE = "scene:room,size=64x48,scene.duration_s=0.1"
 WEIGHTS = HERE / "rrin_events_guided-tiny.safetensors"
@@ -93,6 +95,25 @@ def test_the_command_makes_table_file_and_picture(quick: None, tmp_path: Path, m
     assert set(told["ways"][0]["ms_per_frame"]) == {"64x48", "96x64"}
     assert all(name in done.output for name in QUICK) and told["recommended"] in done.output.splitlines()[-3]
     assert imread("room_rebuild_cost.png").shape[:2] == (600, 950)
+
+
+def film(path: Path, pictures: np.ndarray) -> str:
+    np.save(path, pictures)
+    return str(path)
+
+
+def test_a_film_in_which_nothing_is_seen_is_refused(tmp_path: Path) -> None:
+    grey = film(tmp_path / "grey.npy", np.full((9, 32, 32), 99, np.uint8))
+    with pytest.raises(DataError, match="of one value all over"):
+        rebuilding(grey, simulated=Simulated.of("clean", fps=240, transfer="srgb"))
+
+
+def test_frames_smaller_than_the_window_of_ssim_have_none(quick: None, tmp_path: Path) -> None:
+    ramp = np.arange(9 * 8 * 8, dtype=np.uint8).reshape(9, 8, 8)
+    small = film(tmp_path / "small.npy", ramp)
+    found = rebuilding(small, simulated=Simulated.of("clean", fps=240, transfer="srgb"), sizes=[], repeats=1)
+    assert {row.ssim for row in found.rows} == {None} and "-" in table(found)
+    json.dumps(found.describe(), allow_nan=False)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from vid2ev.conversion import Progress
-    from vid2ev.cost.measure import Report
+    from vid2ev.cost.turns import Report
     from vid2ev.formats.event_file import Recording
     from vid2ev.recipe import Recipe
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.cost.front import Budget, refusal
-from vid2ev.cost.measure import Report, measured
+from vid2ev.cost.measure import measured
 from vid2ev.cost.rung import Rung
 from vid2ev.cost.table import recommendation
+from vid2ev.cost.turns import Report
 from vid2ev.errors import UsageError
 
 FRAMES, REPEATS = 15, 2  # of 640x480 pixels: a short stretch

@@ -19,6 +19,7 @@ from vid2ev.cost.passes import run
 from vid2ev.cost.quality import Quality, interpolated, triples_of
 from vid2ev.cost.rung import Rung
 from vid2ev.cost.stretch import FRAMES, Stretch, stretch_of
+from vid2ev.cost.turns import Report, Turns
 from vid2ev.errors import UsageError
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.recipe import Recipe
@@ -26,8 +27,6 @@ from vid2ev.recording.manifest import machine
 from vid2ev.sensors.tiles import usable_cores
 
 REPEATS = 3
-
-Report = Callable[[int, int, str], object]  # how many passes are done, of how many, and what comes next
 
 
 @dataclass(frozen=True)
@@ -126,8 +125,8 @@ def measured(
     if not recipe.source.dense:
         steps = steps_of(recipe)
     ladder = ladder_of(recipe, explicit, steps)
-    turns = _Turns(ladder, repeats, report)
-    rows, span_ns = _rows(options, ladder, threads, turns, clock)
+    turns = Turns(report, (1 + repeats) * len(ladder.all))
+    rows, span_ns = _rows(options, ladder, threads, turns, repeats, clock)
     return Cost(
         str(video),
         stretch,
@@ -142,21 +141,13 @@ def measured(
     )
 
 
-class _Turns:
-    """Counts the passes for a report."""
-
-    def __init__(self, ladder: Ladder, repeats: int, report: Report | None):
-        self.repeats, self._report = repeats, report
-        self._all, self._done = (1 + repeats) * len(ladder.all), 0
-
-    def next(self, name: str) -> None:
-        if self._report is not None:
-            self._report(self._done, self._all, name)
-        self._done += 1
-
-
 def _rows(
-    options: Mapping[str, Any], ladder: Ladder, threads: int, turns: _Turns, clock: Callable[[], float]
+    options: Mapping[str, Any],
+    ladder: Ladder,
+    threads: int,
+    turns: Turns,
+    repeats: int,
+    clock: Callable[[], float],
 ) -> tuple[list[Row], tuple[int, int]]:
     """A row for each setting, the reference first; and the span of the clip [ns]."""
     views = any(rung.group == "views" for rung in ladder.rungs)
@@ -170,7 +161,7 @@ def _rows(
         turns.next(rung.name)
         found.append(_tried(options, rung, threads, reference))
     lasting_s = (first.span_ns[1] - first.span_ns[0]) / 1e9
-    times = _timed(options, ladder, threads, turns, clock, lasting_s)
+    times = _timed(options, ladder, threads, turns, repeats, clock, lasting_s)
     rows = [
         Row(rung, errors, events, tuple(times[rung.name]))
         for rung, (errors, events) in zip(ladder.all, found, strict=True)
@@ -189,12 +180,13 @@ def _timed(
     options: Mapping[str, Any],
     ladder: Ladder,
     threads: int,
-    turns: _Turns,
+    turns: Turns,
+    repeats: int,
     clock: Callable[[], float],
     lasting_s: float,
 ) -> dict[str, list[float]]:
     times: dict[str, list[float]] = {rung.name: [] for rung in ladder.all}
-    for again in range(turns.repeats):
+    for again in range(repeats):
         for rung in ladder.all[:: -1 if again % 2 else 1]:
             turns.next(rung.name)
             began = clock()
