@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, read_events
-from vid2ev.instants import Instant
+from vid2ev.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
 from vid2ev.stream.ahead import ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
@@ -198,3 +198,9 @@ def test_real_video_makes_the_same_bytes_in_pieces(tmp_path: Path) -> None:
         with av.open(str(tmp_path / directory / "preview.mp4")) as film:
             films.append([packet.pts for packet in film.demux(video=0)])
     assert films[0] == films[1]
+
+
+@pytest.mark.parametrize("size", [(1, 1), (346, 260), (1280, 720), (3840, 2160), (8192, 8192)])
+def test_frames_made_in_advance_are_a_few_and_bounded_in_size(size: tuple[int, int]) -> None:
+    depth, pixels = frames_ahead(size), size[0] * size[1]
+    assert LEAST_AHEAD <= depth <= MOST_AHEAD and (depth == LEAST_AHEAD or depth * pixels <= AHEAD_PX)

@@ -32,8 +32,9 @@ from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
 from vid2ev.upsample.none import NoUpsampling
 
-FRAMES_AHEAD = 4  # made in advance, while the sensors work
-INTERVALS_AHEAD = 2  # whose motion is known in advance
+LEAST_AHEAD, MOST_AHEAD = 4, 16  # frames made in advance, while the sensors work: between them as many as
+AHEAD_PX = 1 << 23  # have so many pixels together
+INTERVALS_AHEAD = 3  # whose motion is known in advance
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,12 @@ def instants(recipe: Recipe, start: int = 0, device: Device = CPU) -> Generator[
     Light is made on the `device` from the source's frames on, and is in tensors of torch there.
     """
     upload = None if device.light is None else Upload(device.light)
-    return ahead(_instants(recipe, start, upload), FRAMES_AHEAD)
+    return ahead(_instants(recipe, start, upload), frames_ahead(recipe.source.size))
+
+
+def frames_ahead(size: tuple[int, int]) -> int:
+    """How many frames of a size are made in advance: the more, the less threads that take turns at being slow wait."""
+    return min(max(AHEAD_PX // (size[0] * size[1]), LEAST_AHEAD), MOST_AHEAD)
 
 
 def events_of(
@@ -107,7 +113,7 @@ def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[In
         return (yield from _rendered(recipe, start, upload))
     wanted, before_ns = recipe.truth, None
     made = _light(recipe, start, upload)
-    with closing(made if sight.free else ahead(made, FRAMES_AHEAD)) as light:
+    with closing(made if sight.free else ahead(made, LEAST_AHEAD)) as light:
         for frame, limited, shift_px in light:
             views, truth = sight.views(frame), tuple[Truth, ...]()
             if wanted and frame.original:
