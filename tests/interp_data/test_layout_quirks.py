@@ -181,7 +181,7 @@ def test_lines_that_are_no_times_are_counted(tmp_path: Path) -> None:
     written(tmp_path / "seq", "bsergb", times=lines)
     sequence = open_sequence(tmp_path / "seq")
     np.testing.assert_array_equal(sequence.times_us, STEP_US * np.arange(1, 7))
-    assert sequence.remarks == ["3 lines of timestamp.txt are no times"]
+    assert sequence.remarks == ["3 of the 9 lines of timestamp.txt say no time"]
 
 
 def test_a_picture_whose_line_is_no_time_is_left_out_and_others_keep_theirs(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_picture_whose_line_is_no_time_is_left_out_and_others_keep_theirs(tmp_
     torn = open_sequence(tmp_path / "torn")
     assert torn.times_us.tolist() == [t for t in whole.times_us.tolist() if t != 3 * STEP_US]
     np.testing.assert_array_equal(torn.frame(2), whole.frame(3))
-    assert torn.remarks == ["1 lines of timestamp.txt are no times"]
+    assert torn.remarks == ["1 of the 6 lines of timestamp.txt say no time"]
 
 
 def test_windows_in_which_something_is_missing_are_counted(tmp_path: Path) -> None:

@@ -111,7 +111,7 @@ class Ergb:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
         times = [_time_us(line) for line in lines if line.strip()]
         if strange := times.count(None):
-            self.remarks.append(f"{strange} lines of {path.name} are no times")
+            self.remarks.append(f"{strange} of the {len(times)} lines of {path.name} say no time")
         return times
 
 
