@@ -342,9 +342,16 @@ def go_to(page: Any, source: str) -> None:
     wait_for(lambda: page.locator(".v-source").inner_text() == source)
 
 
+def replace_what_is_there(page: Any) -> None:
+    """What other tests have recorded may be replaced."""
+    page.locator(".v-right .q-tab", has_text="Record").click()
+    page.locator(".q-toggle", has_text="replace").click()
+
+
 def test_each_scene_becomes_a_recording_by_two_clicks(browser: Any, address: Any) -> None:
     page, wrong = opened(browser, address)
     said = page.locator('[data-key="said"]')
+    replace_what_is_there(page)
     for name in scene_names():
         page.locator(".v-side .q-tab", has_text="Source").click()
         page.locator(f'[data-scene="{name}"]').click()
@@ -362,11 +369,11 @@ def test_work_is_cancelled_and_ends_with_its_page(browser: Any, address: Any) ->
     page, _ = opened(browser, address)
     go_to(page, "scene:parallax,size=640x480")
     said = page.locator('[data-key="said"]')
+    replace_what_is_there(page)
     page.locator("[data-key=convert]").click()
     wait_for(lambda: " frames" in said.inner_text(), 120)
     page.locator("button:visible", has_text="Cancel").click()
     wait_for(lambda: said.inner_text() == "cancelled", 30)
-    page.locator(".q-toggle", has_text="replace").click()
     page.locator("[data-key=convert]").click()
     wait_for(lambda: " frames" in said.inner_text(), 120)
     page.context.close()
