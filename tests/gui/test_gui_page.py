@@ -293,9 +293,10 @@ def drag(page: Any, name: str, way_px: tuple[float, float]) -> None:
 def test_things_lamps_and_cameras_are_moved_in_the_3d_view(browser: Any, address: Any) -> None:
     page, wrong = opened(browser, address)
     go_to(page, "scene:room,size=48x36,duration_s=0.1")
-    before = place_of_things(page)
     scene = read_scene("room", ["camera.size=[48, 36]", "duration_s=0.1"]).resolved(0)
     lamp = next(f"lights.{each.name}" for each in scene.lights if each.kind == "point")
+    wait_for(lambda: lamp in place_of_things(page))
+    before = place_of_things(page)
     for name in (lamp, "cameras.dvs"):
         drag(page, name, (30.0, -20.0))
         wait_for(lambda name=name: place_of_things(page)[name]["own"] != before[name]["own"])
@@ -324,6 +325,7 @@ def test_files_are_loaded_and_the_command_is_copied(browser: Any, address: Any, 
         page.locator("button", has_text="Load").click()
         page.locator(".q-uploader input[type=file]").set_input_files(tmp_path / name)
         page.wait_for_selector(f'.q-notification:has-text("{said}")')
+        page.wait_for_selector(".q-uploader", state="detached")  # (while the menu closes it takes no other file)
     shown = page.locator('[data-key="dvs.threshold_on"] .v-value input')
     wait_for(lambda: shown.input_value() == "0.33")
     expected = command(page)
