@@ -86,7 +86,7 @@ def assert_same(one: Path, other: Path) -> None:
 def kill_and_resume(whole: Path, out: Path, killed_at: int) -> None:
     """Kill at a step, look at what is left, go on, compare."""
     killed = run(out, killed_at)
-    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert killed.returncode == -signal.SIGKILL, (killed_at, killed.stdout, killed.stderr)
     assert not out.exists() or {path.name for path in out.iterdir()} == FILES | {"manifest.json"}
     done = run(out, resume=True)
     assert done.returncode == 0, done.stderr

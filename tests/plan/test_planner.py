@@ -148,6 +148,19 @@ def test_what_is_kept_for_what_is_to_come_says_so(clip: Path, tmp_path: Path, he
     assert planning.SPARED in whys["photoreceptor"] and planning.SPARED not in whys["follower"]
 
 
+def test_light_that_trembles_more_and_more_makes_it_begin_again_once(
+    clip: Path, tmp_path: Path, held: Callable[[int], None]
+) -> None:
+    """What is left out the second time is within a smaller share of the tolerance."""
+    draws, growing = np.random.default_rng(5), np.maximum(0, np.linspace(-0.01, 0.1, 160))[:, None, None]
+    ramp = 0.2 + 0.01 * np.arange(160)[:, None, None]
+    np.save(clip, (ramp * np.exp(draws.normal(0, 1, (160, *SIZE[::-1])) * growing)).astype(np.float32))
+    held(SOME)
+    reports: list[int] = []
+    manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda _, done: reports.append(done.frames))
+    assert reports.count(10) == 2 and manifest["plan"][""]["distance"] <= 0.02
+
+
 def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
     clip: Path, tmp_path: Path, held: Callable[[int], None]
 ) -> None:

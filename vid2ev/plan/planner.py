@@ -3,15 +3,15 @@
 Light is made once, for both the look at it and the sensors.  What the cameras see at first is held until it is some
 `HELD`; its plans, within a share of the tolerance, are what the recording begins with.  Each later instant is measured
 as it goes by, and the same plans are asked for again, of all that was seen so far: now and then, and at the end.  If
-what is left out is no longer within the tolerance, the plans leave out less, the recording begins again, and light is
-not measured twice.
+what is left out is no longer within the tolerance, the plans leave out less, within a smaller share of it as long as
+there may be more to come, the recording begins again, and light is not measured twice.
 
 What is kept once is kept, and a camera of which all is kept is not looked at any more.  What is kept although it would
 be within the tolerance, for the sake of what is still to come, says so in the plan.
 
 **Cost**: the plan is what was asked for, whether it pays or not, and mostly it does not.  To look takes 2 to 4 ns per
 pixel and frame, what can be left out 1 to 2, and to begin again what was recorded so far: CPU time of a conversion was
-1.0 to 1.1 times that of all effects, and 2.1 times where motion picked up and it began again twice (README).  Where the
+1.0 to 1.1 times that of all effects, and 1.2 times where motion picked up and it began again (README).  Where the
 first plans keep all, no more than what is held is looked at.
 
 **It is sound**: a recording is made by one plan from its beginning to its end, and in the end that plan's bounds hold
@@ -45,8 +45,8 @@ from vid2ev.recipe import Recipe
 from vid2ev.sensors.devices import CPU, Device
 
 HELD = 1 << 26  # bytes of light, at least an instant
-SPARE = 0.5  # share of the tolerance for the first plans: what comes may be worse, and to begin again is dear
-SPARED = "kept, as the first plan spares half of the tolerance for what was still to come"
+SPARE = 0.5  # share of the tolerance for the first plans, and again each time: what comes may be worse yet
+SPARED = "kept, as some of the tolerance was spared for what was still to come"
 REVISIONS = 2  # after so many all is kept: each costs the recording so far
 
 
@@ -83,7 +83,7 @@ class Planner:
         if not self.looked or (more and not self.recipe.source.rewindable):
             self.plans = plans_unseen(self.recipe, PASSES, "auto", self.tolerance)
         else:
-            self._decide(more)
+            self._take(self._decided(more))
         if not more or not self.recipe.source.rewindable:
             self._looking.clear()
         if self._looking and looked > self.looked:
@@ -111,12 +111,12 @@ class Planner:
         if self._bytes < self._due:
             return False
         self._due *= 2
-        return self._revise()
+        return self._revise(more=True)
 
     def finish(self) -> bool:
         """After the last instant: the plans of all that was seen; returns whether they are new."""
         self.ended = True
-        return bool(self._looking) and self._revise()
+        return bool(self._looking) and self._revise(more=False)
 
     def _hold(self, coming: Generator[Instant]) -> bool:
         """Look at the first instants and keep them; returns whether there may be more."""
@@ -146,15 +146,17 @@ class Planner:
         self._bytes += sum(frame.light.nbytes for frame in instant.frames)
         self.looked += 1
 
-    def _decide(self, more: bool) -> None:
-        """The first plans; there may be `more` to see."""
-        found = self._look.plans("auto", self.tolerance)
-        if more:
-            whole, found = found, self._look.plans("auto", self.tolerance * SPARE)
-            self._spared = {name: frozenset(whole[name].gone) - {*plan.gone} for name, plan in found.items()}
-        self._take({name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()})
+    def _decided(self, more: bool, among: dict[str, Sequence[str]] | None = None) -> dict[str, Plan]:
+        """Plans of all that was seen; some of the tolerance is spared if there may be `more` to see."""
+        found = self._look.plans("auto", self.tolerance, among)
+        if not more:
+            return found
+        whole, found = found, self._look.plans("auto", self.tolerance * SPARE ** (1 + self._revisions), among)
+        for name, plan in found.items():
+            self._spared[name] = self._spared.get(name, frozenset()) | {*whole[name].gone} - {*plan.gone}
+        return {name: replace(plan, tolerance=self.tolerance) for name, plan in found.items()}
 
-    def _revise(self) -> bool:
+    def _revise(self, more: bool) -> bool:
         """Make the plans again, of no more than they leave out; returns whether any of them is another."""
         among: dict[str, Sequence[str]] = {name: self.plans[name].gone for name in self._looking}
         found = self._look.plans("auto", self.tolerance, among)
@@ -163,7 +165,8 @@ class Planner:
             self._revisions += 1
             for name in new:
                 among[name] = _steady(self.plans[name], found[name]) if self._revisions < REVISIONS else ()
-            found = self._look.plans("auto", self.tolerance, among)
+            decided = self._decided(more, among)
+            found |= {name: decided[name] for name in new}
         self._take(found)
         return bool(new)
 

@@ -56,7 +56,8 @@ class Subframes:
             return Row("subframes", "kept", Omission(None, "no bound yet", made, why), 0.0, 0.0)
         figure = f"{self.worst_us:.3g} us, {made}"
         limited = f", {self.limited} at the limit of sub-frames" if self.limited else ""
-        why = f"{intervals}; with those made crossings are up to {self.left_us:.3g} us off{limited}"
+        with_those = " with those made" if self.made else ""
+        why = f"{intervals}; crossings are up to {self.left_us:.3g} us off{with_those}{limited}"
         return Row(
             "subframes", "kept", Omission(None, "estimate", figure, why), NS_PER_PIXEL if self.made else 0.0, 0.0
         )
