@@ -164,6 +164,7 @@ def test_fewer_bits_are_off_by_little_and_not_by_nothing() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:torch")  # (of its own parts, as its compiler is imported)
 def test_compiled_it_makes_the_same() -> None:
     from torch._dynamo.utils import counters
 
