@@ -110,6 +110,7 @@ def _card(
     recipe, clips = job["recipe"], job["clips"]
     steps = read_curve(run / "validation.csv")[-1]["step"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
+    begun = ", ".join(f"{part or 'all'} of sha256 {digest}" for part, digest in job.get("starts", {}).items())
     total = clips["scenes"] + clips["photographs"] + clips["videos"] + clips["recordings"]
     trained_on = [Path(name).name for name in clips["video_files"]]
     lines = [
@@ -119,6 +120,7 @@ def _card(
         f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
         f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; the weights are"
         f" those of step {best}, whose validation was best,{_said_of(share)} stored in 16 bits."
+        f"{f' They began with weights: {begun}.' * bool(begun)}"
         f" Versions: torch {versions['torch']}, lightning {versions['lightning']}.{' ' * bool(note)}{note}",
         "",
         "- **Data**: events simulated while training, of "

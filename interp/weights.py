@@ -58,6 +58,17 @@ def load(path: Path) -> nn.Module:
     return network.eval()
 
 
+def about(path: Path) -> tuple[str, dict[str, Any]]:
+    """The name of a file's network, and its options.  Raises DataError for a file that does not say them."""
+    name, spec, _ = _read(path)
+    return name, spec
+
+
+def fill(network: nn.Module, path: Path) -> None:
+    """Give a network the weights of a file.  Raises DataError where they are not of it."""
+    _fill(network, _read(path)[2], path)
+
+
 def load_part(network: nn.Module, part: str, path: Path) -> None:
     """Give a part of a network, such as `flow` or `reconstruct`, the weights of a network trained for itself."""
     module = getattr(network, part, None)
@@ -110,11 +121,10 @@ def _shape(tensor: torch.Tensor | None) -> torch.Size | None:
 
 
 def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
-    try:
-        module.load_state_dict(tensors)
-    except RuntimeError as error:
-        first = str(error).splitlines()[-1].strip()[:200]
-        raise DataError(f"{path} holds the weights of another network ({first}); give those of this one") from error
+    shapes = {key: tensor.shape for key, tensor in module.state_dict().items()}
+    if shapes != {key: tensor.shape for key, tensor in tensors.items()}:
+        raise _another(path, shapes, tensors)
+    module.load_state_dict(tensors)
 
 
 def _bare(key: str) -> str:

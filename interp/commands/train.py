@@ -23,12 +23,18 @@ WORD = "auto"
 
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
 @click.option(
-    "--network", default="rrin-events-guided", show_default=True, metavar="NAME",
+    "--network", metavar="NAME", show_default="rrin-events-guided, or that of --start",
     help="superslomo, slomo-events, rrin, rrin-light, rrin-events, rrin-events-light, rrin-events-guided,"
-    " rrin-slomo-events, timelens, e2vid, firenet,"
-    " hdr.",
+    " rrin-slomo-events, timelens, flow, e2vid, firenet, hdr.",
 )  # fmt: skip
-@click.option("--size", type=click.Choice(["tiny", "small", "paper"]), default="tiny", show_default=True, help="Width.")
+@click.option(
+    "--size", type=click.Choice(["tiny", "small", "paper"]), show_default="tiny, or that of --start", help="Width.",
+)  # fmt: skip
+@click.option(
+    "--start", "starts", multiple=True, metavar="[PART=]WEIGHTS",
+    help="Begin with these weights: of a file, a run, or the name of some that come with vid2ev; for a part such as"
+    " flow, those of a network trained for itself.",
+)  # fmt: skip
 @click.option(
     "--data", multiple=True, metavar="PATH", type=click.Path(exists=True),
     help="A video, or a folder of recordings; may be repeated.  [default: scenes, made on the fly]",
@@ -78,8 +84,11 @@ def train(
     from interp.train.machines import Machines, check_installed
 
     session_s = _seconds(session, "--session") if session else None
-    path = Path(output or f"{options['network']}_{options['size']}".replace("-", "_"))
-    job = _taken_up(path, options) if resume else _job(options)
+    from interp.train.starts import parsed
+
+    starts = parsed(options["starts"])
+    path = Path(output or _usual_name(options, starts))
+    job = _taken_up(path, options, starts) if resume else _job(options, starts)
     if dry_run:
         from interp.train.told import described
 
@@ -87,7 +96,7 @@ def train(
         return
     check_installed()
     machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
-    outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json)
+    outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts)
     if machines.first:
         _tell(outcome, path, as_json, quiet)
 
@@ -100,13 +109,14 @@ def _run(
     session_s: float | None,
     workers: int | None,
     quiet: bool,
+    starts: Mapping[str, Path],
 ) -> Outcome:
     """A session; the first Ctrl-C ends it after the step, with a checkpoint."""
     from interp.train.runs import run
     from vid2ev.commands.progress import heard
 
     with heard(gently=True) as check:
-        return run(job, path, resume, machines, session_s, workers, quiet, check)
+        return run(job, path, resume, machines, session_s, workers, quiet, check, starts)
 
 
 def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
@@ -124,7 +134,14 @@ def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
             click.echo(f"\n{told.table(outcome)}")
 
 
-def _job(options: Mapping[str, Any]) -> Job:
+def _usual_name(options: Mapping[str, Any], starts: Mapping[str, Path]) -> str:
+    """NETWORK_SIZE, of a run's folder."""
+    from interp.train.job import network_and_size
+
+    return "_".join(network_and_size(options["network"], options["size"], starts))
+
+
+def _job(options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
     """The job of options of the command line."""
     from interp.train.job import Job
 
@@ -136,16 +153,16 @@ def _job(options: Mapping[str, Any]) -> Job:
     if options["steps"]:
         settings.append(f"steps={options['steps']}")
     recordings = [path for path in paths if path not in videos]
-    return Job.of(options["network"], options["size"], settings, videos, recordings, options["validate"])
+    return Job.of(options["network"], options["size"], settings, videos, recordings, options["validate"], starts)
 
 
-def _taken_up(path: Path, options: Mapping[str, Any]) -> Job:
+def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
     """The job of a run that was begun, unless the command line says what it should be."""
     from interp.train.job import Job
     from interp.train.run_folder import begun_job
     from vid2ev.commands.progress import given
 
-    return _job(options) if given() & options.keys() else Job(**begun_job(path))
+    return _job(options, starts) if given() & options.keys() else Job(**begun_job(path))
 
 
 def _seconds(text: str, option: str) -> float:

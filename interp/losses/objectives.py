@@ -1,6 +1,7 @@
 """What each network is trained on: terms with their weights, for codes from 0 to 1.
 
     Super SloMo, SloMoEvents   204 L1 + 102 warps + 0.005 features + smoothness of flows
+    flow                       102 warps + smoothness of flows, as of Super SloMo
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
     Time Lens                  L1 + 0.1 features
     rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
@@ -36,12 +37,18 @@ def super_slomo(
     made: Interpolated, frame_0: torch.Tensor, frame_1: torch.Tensor, truth: torch.Tensor, features: Features
 ) -> Terms:
     """Terms for images of two frames [B, C, H, W]; truth [B, N, C, H, W], features squared (`Perceptual`)."""
+    return {
+        "image": 204 * absolute(made.images, truth),
+        "features": 0.005 * features(made.images, truth),
+    } | carried(made, frame_0, frame_1, truth)
+
+
+def carried(made: Interpolated, frame_0: torch.Tensor, frame_1: torch.Tensor, truth: torch.Tensor) -> Terms:
+    """Terms for the flows of two frames [B, C, H, W], by what they carry where; truth [B, N, C, H, W]."""
     assert made.flows is not None
     warps = 2 * absolute(made.warps, truth[:, :, None]) + between_frames(made.flows, frame_0, frame_1)
     return {
-        "image": 204 * absolute(made.images, truth),
         "warps": 102 * warps,
-        "features": 0.005 * features(made.images, truth),
         "smoothness": smoothness(made.flows[:, :2]) + smoothness(made.flows[:, 2:]),
     }
 

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -14,13 +16,15 @@ from interp.data.samples import SampleSettings
 from interp.data.settings import PRESETS, ClipSettings
 from interp.networks import spec_of
 from interp.train.recipe import RECURRENT, Recipe
+from interp.train.starts import WHOLE, check_frozen, digests, network_of
 from vid2ev.errors import UsageError, clause, nearest
 from vid2ev.requests import setting
 
 EVENT_FED = ("e2vid", "firenet")
 SEQUENTIAL = (*EVENT_FED, "hdr")
-UNTRAINABLE = {"flow": "it learns from the true flow of scenes, which samples do not have"}
+NOTHING: Mapping[str, Path] = MappingProxyType({})
 PARTS = ("recipe", "network", "clips", "samples", "window", "validation")
+NETWORK, SIZE = "rrin_events_guided", "tiny"  # unless said otherwise
 EXAMPLE = "rate=0.001, network.bins=5, clips.multiples=[16] or samples.size=128"
 
 
@@ -44,7 +48,11 @@ class Validation(BaseModel):
 
 
 class Job(BaseModel):
-    """All that decides a run.  `options` are those of the network that are not its defaults."""
+    """All that decides a run.
+
+    options   those of the network that are not its defaults
+    starts    digests of the weights that it begins with, by part (`starts.py`)
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -56,6 +64,7 @@ class Job(BaseModel):
     samples: SampleSettings
     window: Window
     validation: Validation
+    starts: dict[str, str] = {}
 
     @property
     def sequences(self) -> bool:
@@ -65,24 +74,27 @@ class Job(BaseModel):
     @classmethod
     def of(
         cls,
-        network: str,
-        size: str = "tiny",
+        network: str | None = None,
+        size: str | None = None,
         settings: Sequence[str] = (),
         videos: Sequence[str] = (),
         recordings: Sequence[str] = (),
         validation_videos: Sequence[str] = (),
+        starts: Mapping[str, Path] = NOTHING,
     ) -> Self:
         """The job for a network, with `key=value` settings.
 
+        network, size   those of the weights that it starts with; else rrin-events-guided, tiny
         settings   of the recipe, or of `network.`, `clips.`, `samples.`, `window.`, `validation.`
         videos, recordings   to train with, instead of what is made on the fly
+        starts     files of weights to begin with, by part (`starts.parsed`)
         Raises UsageError for what cannot be meant.
         """
-        network = network.replace("-", "_")
-        if network in UNTRAINABLE:
-            raise UsageError(f"network '{network}' cannot be trained: {UNTRAINABLE[network]}; choose another")
         asked = _by_part(settings)
-        spec_of(network, size, **asked["network"])
+        network, size = network_and_size(network, size, starts)
+        options = (network_of(starts[WHOLE])[2] if WHOLE in starts else {}) | asked["network"]
+        spec_of(network, size, **options)
+        check_frozen(network, size, options, starts)
         clips = _clip_defaults(network, videos, recordings) | asked["clips"]
         recipe = (RECURRENT if network in SEQUENTIAL else {}) | asked["recipe"]
         parts = {
@@ -92,8 +104,26 @@ class Job(BaseModel):
             "window": _valid(Window, asked["window"], "window."),
             "validation": _valid(Validation, {"videos": tuple(validation_videos)} | asked["validation"], "validation."),
         }
-        named = {"network": network, "size": size, "options": asked["network"]}
+        named = {"network": network, "size": size, "options": options, "starts": digests(starts)}
         return _valid(cls, named | parts, "")
+
+    def kept(self) -> dict[str, Any]:
+        """It as JSON, as a run's folder keeps it."""
+        return self.model_dump(mode="json", exclude=None if self.starts else {"starts"})
+
+
+def network_and_size(network: str | None, size: str | None, starts: Mapping[str, Path]) -> tuple[str, str]:
+    """Those asked for, or of the weights that training starts with.  Raises UsageError where they contradict."""
+    name = network.replace("-", "_") if network else None
+    if WHOLE in starts:
+        found = network_of(starts[WHOLE])[:2]
+        if (name or found[0], size or found[1]) != found:
+            asked = ", ".join(filter(None, [name, size]))
+            raise UsageError(
+                f"{starts[WHOLE]} holds weights of {', '.join(found)}, not of {asked}; leave --network and --size out"
+            )
+        return found
+    return name or NETWORK, size or SIZE
 
 
 def _clip_defaults(network: str, videos: Sequence[str], recordings: Sequence[str]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from interp.data.validation import validation_clips
 from interp.networks import make
 from interp.train.batches import Batch, Feed
 from interp.train.event_fed import EventFedLearner
+from interp.train.flow import FlowLearner
 from interp.train.frame_fed import FrameFedLearner
 from interp.train.hdr import HdrLearner
 from interp.train.job import EVENT_FED, Job
@@ -36,10 +37,8 @@ def learner_of(job: Job) -> Learner:
     torch.manual_seed(job.recipe.seed)
     network: Any = make(job.network, job.size, **job.options)
     schedule = Schedule(job.recipe.warm_up, job.recipe.rate_end, job.recipe.steps)
-    if job.network == "hdr":
-        return HdrLearner(job.network, network, job.recipe, schedule)
-    kind = EventFedLearner if job.network in EVENT_FED else FrameFedLearner
-    return kind(job.network, network, job.recipe, schedule)  # type: ignore[type-var]
+    kinds: dict[str, Any] = dict.fromkeys(EVENT_FED, EventFedLearner) | {"hdr": HdrLearner, "flow": FlowLearner}
+    return kinds.get(job.network, FrameFedLearner)(job.network, network, job.recipe, schedule)
 
 
 def feed_of(job: Job, cache: Path, step: int, workers: int, jobs: int, report: Report | None = None) -> Feed:

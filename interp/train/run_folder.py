@@ -1,6 +1,7 @@
 """The folder of a training run: all that it needs to go on, and all that it has to show.
 
     run.json              what is trained, with what, how; versions, machine
+    start*.safetensors    weights that it began with, if it did
     steps.json            how many steps, once that is known
     checkpoint.ckpt       where training goes on
     weights.safetensors   the running mean of the network at its best validation, for use (`interp.networks`)
@@ -19,9 +20,11 @@ from __future__ import annotations
 import json
 import operator
 import os
+import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from interp.pretrained import OF_RUN
@@ -37,11 +40,19 @@ MOST_STEPS = 1 << 40
 class RunFolder:
     """A run's folder, open for one process until it is closed.
 
-    job   what decides the result, for JSON
+    job      what decides the result, for JSON
+    starts   files of weights that it begins with, by part
     Raises UsageError where the folder is taken, or was begun with another job.
     """
 
-    def __init__(self, path: Path, job: Mapping[str, Any], resume: bool, first: bool = True):
+    def __init__(
+        self,
+        path: Path,
+        job: Mapping[str, Any],
+        resume: bool,
+        first: bool = True,
+        starts: Mapping[str, Path] = MappingProxyType({}),
+    ):
         self.path, self.first = path, first
         job = json.loads(json.dumps(job))
         if not first:  # (the process that leads has looked, and holds the folder)
@@ -53,6 +64,9 @@ class RunFolder:
             for left in path.rglob("*.new"):  # (of files that were being written when a session was killed)
                 left.unlink()
             if not resume:
+                for part, copy in self.starts(starts).items():
+                    with whole_file(copy) as file:
+                        file.write(starts[part].read_bytes())
                 self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
 
     def forget_clips(self) -> None:
@@ -75,6 +89,10 @@ class RunFolder:
     def weights(self) -> Path:
         """The network, for use."""
         return self.path / OF_RUN
+
+    def starts(self, parts: Iterable[str]) -> dict[str, Path]:
+        """The files of weights that it begins with, by part."""
+        return {part: self.path / f"{f'start.{part}'.rstrip('.')}.safetensors" for part in parts}
 
     @property
     def clips(self) -> Path:
@@ -127,8 +145,8 @@ class RunFolder:
             if begun:
                 raise UsageError(f"{self.path} holds a run; --resume goes on with it, -o chooses another folder")
             # (what a run leaves that is killed before it has begun is no reason not to begin)
-            ours = ("lock", "run.json.new")
-            if self.path.is_dir() and any(child.name not in ours for child in self.path.iterdir()):
+            ours = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
+            if self.path.is_dir() and not all(ours.fullmatch(child.name) for child in self.path.iterdir()):
                 raise UsageError(f"{self.path} holds files that are no run; choose another folder with -o")
             return
         changed = difference(begun_job(self.path), job)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from interp.train.checkpoints import read_checkpoint
 from interp.train.fit import Fit, Outcome, Stop
-from interp.train.job import Job
+from interp.train.job import NOTHING, Job
 from interp.train.machines import ALL, Machines, cores
 from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import RunFolder
+from interp.train.starts import begin
 from vid2ev.commands.progress import counting
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
@@ -25,18 +27,24 @@ def run(
     workers: int | None = None,
     quiet: bool = False,
     stop: Stop = lambda: False,
+    starts: Mapping[str, Path] = NOTHING,
 ) -> Outcome:
     """Train in the folder `path`, or go on there.
 
     session_s   seconds after which to stop, to go on another time
     workers     processes that make samples, for each that trains; None for those cores that training leaves, at least 1
     stop        asked after each step
+    starts      files of weights to begin with, by part, as the job says; to go on the run has its own
     Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on.
     """
     begun_s = time.monotonic()
-    folder = RunFolder(path, job.model_dump(mode="json"), resume, machines.first)
+    learner = learner_of(job)
+    if not resume:
+        begin(learner.network, starts)
+    folder = RunFolder(path, job.kept(), resume, machines.first, starts)
     try:
-        learner = learner_of(job)
+        if resume and not folder.checkpoint.exists():
+            begin(learner.network, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = max(1, cores() - job.recipe.threads) if workers is None else workers
         with counting(quiet, CLIPS) as report:

@@ -23,11 +23,16 @@ def described(job: Job, path: Path) -> str:
     return lines(
         [
             ("network", f"{job.network}, {job.size}"),
+            *([("begins with", _starts(job))] if job.starts else []),
             ("training", f"{length} of {recipe.batch} samples of {job.samples.size}x{job.samples.size}"),
             ("data", f"{data}; x{', x'.join(map(str, job.clips.multiples))}"),
             ("run", str(path)),
         ]
     )
+
+
+def _starts(job: Job) -> str:
+    return ", ".join(f"{part or 'all'} of sha256 {digest[:12]}" for part, digest in sorted(job.starts.items()))
 
 
 def table(outcome: Outcome) -> str:

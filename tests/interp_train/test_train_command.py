@@ -15,7 +15,6 @@ from interp.commands.train import train
 from interp.networks import names
 from interp.train import runs
 from interp.train.batches import Feed
-from interp.train.job import UNTRAINABLE
 from vid2ev.commands import Commands
 
 FEW = ["--steps", "3", "--set", "batch=2", "--set", "processes=1", "--set", "validations=1", "--workers", "0", "--cpu"]
@@ -60,7 +59,7 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> N
 
 def test_the_help_names_every_network_that_can_be_trained() -> None:
     shown = next(option.help for option in train.params if option.name == "network")
-    assert {name.replace("_", "-") for name in names() if name not in UNTRAINABLE} == set(re.findall(r"[\w-]+", shown))
+    assert {name.replace("_", "-") for name in names()} == set(re.findall(r"[\w-]+", shown))
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from small_run import SIDE, sample
 
 from interp.networks import make
 from interp.train.event_fed import EventFedLearner, aligned, grey, windows
+from interp.train.flow import FlowLearner
 from interp.train.frame_fed import FrameFedLearner
 from interp.train.hdr import HdrLearner, seen
 from interp.train.learner import Learner
@@ -23,6 +24,7 @@ KINDS = {
     "superslomo": FrameFedLearner,
     "rrin_events": FrameFedLearner,
     "timelens": FrameFedLearner,
+    "flow": FlowLearner,
     "e2vid": EventFedLearner,
     "firenet": EventFedLearner,
     "hdr": HdrLearner,
@@ -43,7 +45,7 @@ def learner(name: str) -> Learner:
 def batch(name: str, side: int = 2 * SIDE) -> dict[str, torch.Tensor]:
     """Four frames one after the other, and what is between the first and the last."""
     found = sample(0)
-    if KINDS[name] is FrameFedLearner:
+    if issubclass(KINDS[name], FrameFedLearner):
         return {key: part[None] for key, part in found.items()}
     light = (
         torch.rand(3, 8, 8, generator=torch.Generator().manual_seed(1)).repeat_interleave(5, 1).repeat_interleave(5, 2)

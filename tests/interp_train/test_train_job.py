@@ -8,12 +8,12 @@ import pytest
 from pydantic import ValidationError
 
 from interp.networks import names
-from interp.train.job import UNTRAINABLE, Job
+from interp.train.job import Job
 from interp.train.recipe import Recipe
 from vid2ev.errors import UsageError
 
 
-@pytest.mark.parametrize("network", [name for name in names() if name not in UNTRAINABLE])
+@pytest.mark.parametrize("network", names())
 def test_a_job_comes_back_from_its_json(network: str) -> None:
     job = Job.of(
         network, "small", ["rate=.002", "clips.scenes=1", "samples.size=64", "window.begin=8", "validation.clips=2"]
@@ -37,7 +37,6 @@ def test_settings_reach_what_they_are_of() -> None:
     ("network", "settings", "sentence"),
     [
         ("rrin_event", [], r"network 'rrin_event' \(did you mean rrin_events\?\): expected one of superslomo"),
-        ("flow", [], "network 'flow' cannot be trained"),
         ("rrin", ["rate"], "Setting 'rate' is not of the form key=value; write for example rate=0.001"),
         ("rrin", ["rat=1"], r"setting 'rat' is unknown \(did you mean rate\?\); expected one of seed"),
         ("rrin", ["rate=-1"], r"setting rate = -1 is impossible: it must be greater than 0"),

@@ -1,0 +1,138 @@
+"""Training that begins with weights: they are what it begins with, frozen parts stay, and a run carries its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from safetensors.torch import load_file
+from small_run import Made, clips
+
+from interp import pretrained, weights
+from interp.networks import make
+from interp.train import runs
+from interp.train.batches import Feed
+from interp.train.fit import Fit
+from interp.train.job import Job
+from interp.train.machines import Machines
+from interp.train.run_folder import RunFolder
+from interp.train.runs import run
+from interp.train.starts import WHOLE, parsed
+from vid2ev.errors import DataError, UsageError
+
+SHIPPED = "rrin_events_guided-tiny"
+FEW = ["steps=2", "batch=2", "processes=1", "validations=1", "warm_up=0"]
+ALONE = Machines.of("auto", 1, True, 1)
+COMBINED = ["network.flow=pretrained", *FEW]
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "feed_of", lambda job, *_: Feed(Made(), clips(1), job.recipe.batch, 0))
+
+
+@pytest.fixture
+def flow(tmp_path: Path) -> Path:
+    """Weights of a network for flow."""
+    torch.manual_seed(7)
+    network = make("flow", "tiny")
+    torch.nn.init.normal_(network.unet.head.weight, std=0.01)  # type: ignore[arg-type, union-attr]
+    weights.save(tmp_path / "flow.safetensors", "flow", network)
+    return tmp_path / "flow.safetensors"
+
+
+def trained(path: Path, settings: list[str], starts: dict[str, Path], **rest: Any) -> Any:
+    return run(Job.of(settings=settings, starts=starts, **rest), path, machines=ALONE, quiet=True, starts=starts)
+
+
+def test_it_begins_with_the_weights_of_a_file(tmp_path: Path) -> None:
+    """The network and its options are those of the file; where nothing is learnt its weights stay."""
+    starts = parsed([SHIPPED])
+    job = Job.of(settings=FEW, starts=starts)
+    assert (job.network, job.size, job.options) == ("rrin_events_guided", "tiny", {"flow_scale": 3.0})
+    done = run(job, tmp_path / "run", machines=ALONE, quiet=True, starts=starts)
+    assert done.finished
+    trained(tmp_path / "still", [*FEW, "rate=1e-30", "weight_decay=0"], starts)
+    kept, shipped = (load_file(path) for path in (tmp_path / "still" / "weights.safetensors", starts[WHOLE]))
+    assert all(torch.equal(kept[name], shipped[name].float()) for name in shipped)
+
+
+def test_a_pretrained_part_stays_and_what_is_around_it_learns(tmp_path: Path, flow: Path) -> None:
+    starts = {"flow": flow}
+    assert trained(tmp_path / "run", [*COMBINED, "rate=0.1"], starts, network="rrin-slomo-events").finished
+    given, learnt = load_file(flow), load_file(tmp_path / "run" / "weights.safetensors")
+    assert all(torch.equal(learnt[f"flow.module.{name}"], given[name]) for name in given)
+    network = weights.load(tmp_path / "run" / "weights.safetensors")
+    torch.testing.assert_close(network.flow.module.state_dict(), given, rtol=0, atol=0)  # type: ignore[union-attr]
+    own = ["network.flow=own", *FEW, "rate=0.01"]
+    trained(tmp_path / "own", own, starts, network="rrin-slomo-events")
+    state = torch.load(tmp_path / "own" / "checkpoint.ckpt", weights_only=False)["state_dict"]
+    assert any(not torch.equal(state[f"network.flow.{name}"], given[name]) for name in given)
+
+
+def test_a_run_carries_what_it_began_with(tmp_path: Path, flow: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped before its first checkpoint and carried to where the file is not, it goes on to the same weights."""
+    starts = {"flow": flow}
+    trained(tmp_path / "whole", COMBINED, starts, network="rrin-slomo-events")
+
+    def stopped(_: Fit) -> Any:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(Fit, "run", stopped)
+        trained(tmp_path / "stopped", COMBINED, starts, network="rrin-slomo-events")
+    (tmp_path / "stopped").rename(tmp_path / "carried")
+    flow.unlink()
+    job = Job(**json.loads((tmp_path / "carried" / "run.json").read_text())["job"])
+    assert run(job, tmp_path / "carried", resume=True, machines=ALONE, quiet=True).finished
+    ends = [load_file(tmp_path / name / "weights.safetensors") for name in ("whole", "carried")]
+    assert ends[0].keys() == ends[1].keys() and all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+def test_a_run_goes_on_only_with_the_weights_it_began_with(tmp_path: Path, flow: Path) -> None:
+    job = Job.of("rrin-slomo-events", settings=COMBINED, starts={"flow": flow})
+    RunFolder(tmp_path / "run", job.kept(), False, starts={"flow": flow}).close()
+    weights.save(flow, "flow", make("flow", "tiny"))
+    other = Job.of("rrin-slomo-events", settings=COMBINED, starts={"flow": flow})
+    with pytest.raises(UsageError, match=r"was begun with starts.flow = "):
+        run(other, tmp_path / "run", resume=True, machines=ALONE, quiet=True)
+
+
+def test_a_job_without_weights_is_kept_as_it_was_before_there_were_any() -> None:
+    assert "starts" not in Job.of().kept() and Job(**Job.of().kept()) == Job.of()
+
+
+@pytest.mark.parametrize(
+    ("network", "settings", "starts", "sentence"),
+    [
+        ("rrin-slomo-events", ["network.flow=pretrained"], [], "its flow is to be pretrained; .* of a FlowNetwork"),
+        ("rrin-slomo-events", ["network.reconstruct=firenet", "network.reconstruct_weights=pretrained"], [],
+         "its reconstruct is to be pretrained; give the weights of a FireNet"),
+        ("rrin", [], [SHIPPED], "holds weights of rrin_events_guided, tiny, not of rrin; leave --network"),
+        (None, [], ["rrin_event-tiny"], r"no such file, and none of those that come with vid2ev"),
+        (None, [], [SHIPPED, SHIPPED], "the network has weights already; give one"),
+        ("rrin", [], [f"flow={SHIPPED}", f"flow={SHIPPED}"], "part flow has weights already"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_meant_is_refused(
+    network: str | None, settings: list[str], starts: list[str], sentence: str
+) -> None:
+    with pytest.raises(UsageError, match=sentence) as error:
+        Job.of(network, settings=settings, starts=parsed(starts))
+    assert "\n" not in str(error.value)
+
+
+def test_weights_that_do_not_fit_are_refused_before_anything_is_there(tmp_path: Path, flow: Path) -> None:
+    shipped = pretrained.path_of(SHIPPED)
+    for part, path, sentence in (
+        ("flow", shipped, "holds the weights of another network"),
+        ("flows", flow, "has no part 'flows'; it has flow"),
+    ):
+        with pytest.raises((UsageError, DataError), match=sentence):
+            trained(tmp_path / "run", FEW, {part: path}, network="rrin-slomo-events")
+    with pytest.raises(DataError, match="holds the weights of another network"):
+        trained(tmp_path / "run", ["network.bins=3", *FEW], {WHOLE: shipped})
+    assert not (tmp_path / "run").exists()
