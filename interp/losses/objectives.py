@@ -1,7 +1,7 @@
 """What each network is trained on: terms with their weights, for codes from 0 to 1.
 
     Super SloMo, SloMoEvents   204 L1 + 102 warps + 0.005 features + smoothness of flows
-    flow                       102 warps + smoothness of flows, as of Super SloMo
+    flow                       10 L1 of flows [px] + 102 warps + smoothness of flows, as of Super SloMo
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
     Time Lens                  L1 + 0.1 features
     rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
@@ -41,6 +41,15 @@ def super_slomo(
         "image": 204 * absolute(made.images, truth),
         "features": 0.005 * features(made.images, truth),
     } | carried(made, frame_0, frame_1, truth)
+
+
+def flows(
+    made: Interpolated, frame_0: torch.Tensor, frame_1: torch.Tensor, truth: torch.Tensor, flow: torch.Tensor
+) -> Terms:
+    """Terms for flows alone; `flow` [B, 4, H, W] px is nearly right, and says where to look: what pictures say of large
+    motion has no slope that leads there."""
+    assert made.flows is not None
+    return {"flows": 10 * absolute(made.flows, flow)} | carried(made, frame_0, frame_1, truth)
 
 
 def carried(made: Interpolated, frame_0: torch.Tensor, frame_1: torch.Tensor, truth: torch.Tensor) -> Terms:

@@ -1,4 +1,4 @@
-"""A network for optical flow alone: trained by what its flows carry where, it serves others, frozen.
+"""A network for optical flow alone: trained by DIS and by what its flows carry where, it serves others, frozen.
 
     F_01, F_10 = UNet(I0, I1, events)
 

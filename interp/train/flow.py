@@ -1,5 +1,5 @@
-"""The network for optical flow learns by what its flows carry where: one frame to the other, and both to what was
-between them, if motion is straight and even (Jiang et al. (2018), "Super SloMo", CVPR)."""
+"""The network for optical flow learns from DIS, and by what its flows carry where: one frame to the other, and both to
+what was between them, if motion is straight and even (Jiang et al. (2018), "Super SloMo", CVPR)."""
 
 from __future__ import annotations
 
@@ -37,4 +37,4 @@ class FlowLearner(FrameFedLearner):
     def parts(self, batch: Batch) -> objectives.Terms:
         """Terms of the loss."""
         first, last = batch["frames"].unbind(1)
-        return objectives.carried(self.made(batch), first, last, batch["truth"])
+        return objectives.flows(self.made(batch), first, last, batch["truth"], batch["flow"])

@@ -26,7 +26,7 @@ from interp.train.hdr import HdrLearner
 from interp.train.job import EVENT_FED, Job
 from interp.train.learner import Learner
 from interp.train.schedule import Schedule
-from interp.train.true_flows import WithFlows, with_flows
+from interp.train.true_flows import WithFlowBetween, WithFlows, with_flows
 
 WITHOUT_END = 1 << 40  # samples
 MEASURED_WITH = ("clean", "noisy")  # event sensors
@@ -54,7 +54,8 @@ def feed_of(job: Job, cache: Path, step: int, workers: int, jobs: int, report: R
 
 def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
     if not job.sequences:
-        return Samples(pool, job.samples, WITHOUT_END)
+        samples = Samples(pool, job.samples, WITHOUT_END)
+        return WithFlowBetween(samples) if job.network == "flow" else samples
     return WithFlows(Sequences(pool, job.samples, WITHOUT_END))
 
 

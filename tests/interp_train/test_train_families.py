@@ -18,7 +18,7 @@ from interp.train.hdr import HdrLearner, seen
 from interp.train.learner import Learner
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
-from interp.train.true_flows import with_flows
+from interp.train.true_flows import with_flow_between, with_flows
 
 KINDS = {
     "superslomo": FrameFedLearner,
@@ -46,7 +46,7 @@ def batch(name: str, side: int = 2 * SIDE) -> dict[str, torch.Tensor]:
     """Four frames one after the other, and what is between the first and the last."""
     found = sample(0)
     if issubclass(KINDS[name], FrameFedLearner):
-        return {key: part[None] for key, part in found.items()}
+        return {key: part[None] for key, part in with_flow_between(found).items()}
     light = (
         torch.rand(3, 8, 8, generator=torch.Generator().manual_seed(1)).repeat_interleave(5, 1).repeat_interleave(5, 2)
     )

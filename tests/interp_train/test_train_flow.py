@@ -15,6 +15,7 @@ from interp.train.flow import FlowLearner
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.starts import begin
+from interp.train.true_flows import with_flow_between
 
 WAY = (4, 2)  # px to the right and down, from frame to frame
 
@@ -23,13 +24,14 @@ def moving() -> dict[str, torch.Tensor]:
     """A texture that moves, with what there is halfway."""
     texture = F.interpolate(torch.rand(1, 3, 24, 24), size=(96, 96), mode="bicubic")[0].clamp(0, 1)
     pictures = [texture[:, 16 - down : 80 - down, 16 - right : 80 - right] for right, down in ((0, 0), (2, 1), WAY)]
-    return {
-        "frames": torch.stack([pictures[0], pictures[2]])[None],
-        "off_on": torch.zeros(1, 2, 8, 64, 64, dtype=torch.uint8),
-        "contrast": torch.full((1, 2), 0.15),
-        "times": torch.tensor([[0.5]]),
-        "truth": pictures[1][None, None],
+    sample = {
+        "frames": torch.stack([pictures[0], pictures[2]]),
+        "off_on": torch.zeros(2, 8, 64, 64, dtype=torch.uint8),
+        "contrast": torch.full((2,), 0.15),
+        "times": torch.tensor([0.5]),
+        "truth": pictures[1][None],
     }
+    return {name: part[None] for name, part in with_flow_between(sample).items()}
 
 
 def test_it_finds_the_motion_of_a_texture_and_serves_others_frozen(tmp_path: Path) -> None:
