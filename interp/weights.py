@@ -41,26 +41,15 @@ def save(path: Path, name: str, network: nn.Module, about: Mapping[str, str] | N
 
 def load(path: Path) -> nn.Module:
     """The network of a file, as in use.  Raises DataError for a file that does not hold one."""
-    name, spec, tensors = _read(path)
-    try:
-        with torch.device("meta"):  # (without memory: options in a file may ask for any amount of it)
-            shapes = {key: tensor.shape for key, tensor in make(name, **spec).state_dict().items()}
-        if shapes == {key: tensor.shape for key, tensor in tensors.items()}:
-            network = make(name, **spec)
-        else:
-            raise _another(path, shapes, tensors)
-    except DataError:
-        raise
-    except Exception as error:  # (of options; of torch, for sizes that cannot be)
-        said = first_line(error)
-        raise DataError(f"{path} is of another version of its network ({said}); train it again") from error
+    name, spec, tensors = _of_network(path)
+    network = make(name, **spec)
     _fill(network, tensors, path)
     return network.eval()
 
 
 def about(path: Path) -> tuple[str, dict[str, Any]]:
-    """The name of a file's network, and its options.  Raises DataError for a file that does not say them."""
-    name, spec, _ = _read(path)
+    """The name of a file's network, and its options.  Raises DataError for a file that does not hold one."""
+    name, spec, _ = _of_network(path)
     return name, spec
 
 
@@ -77,6 +66,19 @@ def load_part(network: nn.Module, part: str, path: Path) -> None:
             f"{type(network).__name__} has no part '{part}'; it has {', '.join(dict(network.named_children()))}"
         )
     _fill(module.module if isinstance(module, Frozen) else module, _read(path)[2], path)
+
+
+def _of_network(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
+    """Name, options and tensors of a file, which fit."""
+    name, spec, tensors = _read(path)
+    try:
+        with torch.device("meta"):  # (without memory: options in a file may ask for any amount of it)
+            network = make(name, **spec)
+    except Exception as error:  # (of options; of torch, for sizes that cannot be)
+        said = first_line(error)
+        raise DataError(f"{path} is of another version of its network ({said}); train it again") from error
+    _check_fits(network, tensors, path)
+    return name, spec, tensors
 
 
 def _read(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
@@ -106,14 +108,17 @@ def _in_order(file: bytes) -> bytes:
     return len(padded).to_bytes(8, "little") + padded + file[8 + length :]
 
 
-def _another(path: Path, shapes: Mapping[str, torch.Size], tensors: Mapping[str, torch.Tensor]) -> DataError:
-    """What is to be said of weights that are not those of the network that the file names."""
-    key = next(key for key in [*shapes, *tensors] if key not in tensors or tensors[key].shape != shapes.get(key))
-    wanted, found = (list(of) if of is not None else "nothing" for of in (shapes.get(key), _shape(tensors.get(key))))
-    return DataError(
-        f"{path} holds the weights of another network ({key[:80]} is {found}, expected {wanted}); give those"
-        " of this one"
-    )
+def _check_fits(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
+    shapes = {key: tensor.shape for key, tensor in module.state_dict().items()}
+    keys = (key for key in [*shapes, *tensors] if key not in tensors or tensors[key].shape != shapes.get(key))
+    if (key := next(keys, None)) is not None:
+        wanted, found = (
+            list(of) if of is not None else "nothing" for of in (shapes.get(key), _shape(tensors.get(key)))
+        )
+        raise DataError(
+            f"{path} holds the weights of another network ({key[:80]} is {found}, expected {wanted}); give those"
+            " of this one"
+        )
 
 
 def _shape(tensor: torch.Tensor | None) -> torch.Size | None:
@@ -121,9 +126,7 @@ def _shape(tensor: torch.Tensor | None) -> torch.Size | None:
 
 
 def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
-    shapes = {key: tensor.shape for key, tensor in module.state_dict().items()}
-    if shapes != {key: tensor.shape for key, tensor in tensors.items()}:
-        raise _another(path, shapes, tensors)
+    _check_fits(module, tensors, path)
     module.load_state_dict(tensors)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import torch
-from safetensors.torch import load_file
+from safetensors.torch import load_file, save_file
 from small_run import Made, clips
 
 from interp import pretrained, weights
@@ -123,6 +123,13 @@ def test_what_cannot_be_meant_is_refused(
     with pytest.raises(UsageError, match=sentence) as error:
         Job.of(network, settings=settings, starts=parsed(starts))
     assert "\n" not in str(error.value)
+
+
+def test_a_file_that_says_more_than_it_holds_is_refused(tmp_path: Path, flow: Path) -> None:
+    """Before anything of that size is made."""
+    save_file(load_file(flow), tmp_path / "lies", {"network": "flow", "spec": '{"size": "paper"}'})
+    with pytest.raises(DataError, match="lies holds the weights of another network"):
+        Job.of(starts={WHOLE: tmp_path / "lies"})
 
 
 def test_weights_that_do_not_fit_are_refused_before_anything_is_there(tmp_path: Path, flow: Path) -> None:
