@@ -1,5 +1,8 @@
 """A sensor on a GPU is the sensor on a CPU: the same events, counts and state, to the bit.
 
+But for the nanosecond in which a state has the last event: times are rounded to it, and a root that is found by code
+compiled apart may be rounded the other way (seen once: of 633 events in the tail of a flash, the last one 1 ns later).
+
 The GPU is numba's simulator: kernels are run thread by thread, and what they call is compiled for the CPU from the same
 text, for one pixel per thread.  Compiling that takes 35 s of a CPU and more for a combination of effects, so all but
 one are slow: `python -m pytest tests/battery/test_on_card.py -m slow`.
@@ -60,7 +63,10 @@ def assert_same_state(one: Dvs, other: Dvs) -> None:
     ours, theirs = one.state(), other.state()
     assert ours.keys() == theirs.keys()
     for name, plane in ours.items():
-        np.testing.assert_array_equal(plane, theirs[name], name)
+        if name in ("t_last", "t_reset"):
+            assert np.abs(plane - theirs[name]).max(initial=0) <= 1, name  # [ns]
+        else:
+            np.testing.assert_array_equal(plane, theirs[name], name)
 
 
 def both(name: str, clip: Clip, memory: Any = None) -> tuple[Dvs, DvsOnCard]:
@@ -79,6 +85,16 @@ def seen(dvs: Dvs, clip: Clip, first: int = 0) -> list[Events]:
 def test_events_counts_and_state_are_those_of_the_walk_on_a_cpu(name, data):
     clip = data.draw(clips(np.dtype(data.draw(st.sampled_from(["float32", "float64", "uint8"])))))
     cpu, card = both(name, clip)
+    assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
+    assert cpu.counts == card.counts
+    assert_same_state(cpu, card)
+
+
+def test_the_tail_of_a_flash_is_the_same() -> None:
+    frames = np.zeros((4, *SIZE[::-1]), np.float32)
+    frames[1, 3, 3] = frames[2, 3, 1] = np.inf
+    clip = Clip(np.array([0, 1, 8, 7_498_950]), frames, 1, 0)
+    cpu, card = both("paper", clip)
     assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
     assert cpu.counts == card.counts
     assert_same_state(cpu, card)
