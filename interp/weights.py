@@ -43,7 +43,7 @@ def load(path: Path) -> nn.Module:
     """The network of a file, as in use.  Raises DataError for a file that does not hold one."""
     name, spec, tensors = _of_network(path)
     network = make(name, **spec)
-    _fill(network, tensors, path)
+    network.load_state_dict(tensors)
     return network.eval()
 
 
@@ -55,7 +55,9 @@ def about(path: Path) -> tuple[str, dict[str, Any]]:
 
 def fill(network: nn.Module, path: Path) -> None:
     """Give a network the weights of a file.  Raises DataError where they are not of it."""
-    _fill(network, _read(path)[2], path)
+    tensors = _read(path)[2]
+    _check_fits(network, tensors, path)
+    network.load_state_dict(tensors)
 
 
 def load_part(network: nn.Module, part: str, path: Path) -> None:
@@ -65,7 +67,7 @@ def load_part(network: nn.Module, part: str, path: Path) -> None:
         raise UsageError(
             f"{type(network).__name__} has no part '{part}'; it has {', '.join(dict(network.named_children()))}"
         )
-    _fill(module.module if isinstance(module, Frozen) else module, _read(path)[2], path)
+    fill(module.module if isinstance(module, Frozen) else module, path)
 
 
 def _of_network(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:
@@ -123,11 +125,6 @@ def _check_fits(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Pa
 
 def _shape(tensor: torch.Tensor | None) -> torch.Size | None:
     return None if tensor is None else tensor.shape
-
-
-def _fill(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
-    _check_fits(module, tensors, path)
-    module.load_state_dict(tensors)
 
 
 def _bare(key: str) -> str:

@@ -82,10 +82,9 @@ def train(
     at any moment, or carried to another machine, it continues with --resume, on a CPU to the very same weights.
     """
     from interp.train.machines import Machines, check_installed
-
-    session_s = _seconds(session, "--session") if session else None
     from interp.train.starts import parsed
 
+    session_s = _seconds(session, "--session") if session else None
     starts = parsed(options["starts"])
     path = Path(output or _usual_name(options, starts))
     job = _taken_up(path, options, starts) if resume else _job(options, starts)
