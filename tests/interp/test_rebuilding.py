@@ -19,9 +19,8 @@ from interp.representation.event_counts import EventCounts
 from interp.weights import save
 from vid2ev import Frame
 from vid2ev.errors import DataError, UsageError
-from vid2ev.upsample import flow as upsampled
 from vid2ev.upsample import make_upsampler
-from vid2ev.upsample.flow import motion_at
+from vid2ev.upsample.flow import Moving
 
 TIMES = torch.tensor([0.25, 0.5, 0.875])
 NOTHING = EventCounts.none(1, (48, 48), steps=8)
@@ -73,7 +72,8 @@ def test_flow_makes_the_instants_asked_for_and_no_others(monkeypatch: pytest.Mon
     times = torch.tensor([0.0, 0.12501, 0.2493, 0.2493, 0.9, 1.0])  # as stamps of a real camera are
     alone = torch.cat([flow(gap, time[None]) for time in times])
     made: list[float] = []
-    monkeypatch.setattr(upsampled, "motion_at", lambda *asked: made.append(float(asked[1])) or motion_at(*asked))
+    at = Moving.at
+    monkeypatch.setattr(Moving, "at", lambda moving, time: made.append(float(time)) or at(moving, time))
     assert torch.equal(flow(gap, times), alone)
     assert made == pytest.approx([0.12501, 0.2493, 0.9])
     torch.testing.assert_close(alone[[0, -1]], torch.stack([gap.frame_0, gap.frame_1]), atol=1e-5, rtol=0)

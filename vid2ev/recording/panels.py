@@ -16,8 +16,18 @@ def reduced(light: np.ndarray, across: int, down: int) -> np.ndarray:
     """Codes Y [uint8, down x across] of linear light, which is averaged where pixels share one."""
     if light.shape != (down, across):
         light = cv2.resize(light, (across, down), interpolation=cv2.INTER_AREA)
-    light = np.nan_to_num(light, nan=0.0)
-    return GRAYS[(np.clip(light, 0, 1) * 65535).astype(np.uint16)]
+    gray = np.empty(light.shape, np.uint8)
+    _gray(light, GRAYS, gray)
+    return gray
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gray(light, grays, gray):  # type: ignore[no-untyped-def]
+    zero, one, most = np.float32(0), np.float32(1), np.float32(65535)
+    for i in range(light.shape[0]):
+        for j in range(light.shape[1]):
+            shown = light[i, j] if light[i, j] > zero else zero  # (NaN is black)
+            gray[i, j] = grays[np.uint16((shown if shown < one else one) * most)]
 
 
 @njit(cache=True, nogil=True)
@@ -37,12 +47,13 @@ def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-unt
     """
     down, across = gray.shape
     height, width = luma.shape[0], luma.shape[1] // 2
+    columns = np.minimum(np.arange(width) // enlarged, across - 1)
     for block_i in range(height // 2):
         for block_j in range(width // 2):
             u = v = n = 0
             for k in range(4):
                 i, j = 2 * block_i + k // 2, 2 * block_j + k % 2
-                row, column = min(i // enlarged, down - 1), min(j // enlarged, across - 1)
+                row, column = min(i // enlarged, down - 1), columns[j]
                 off, on = counts[0, row, column], counts[1, row, column]
                 luma[i, j] = gray[row, column]
                 luma[i, width + j] = colours[off, on, 0]

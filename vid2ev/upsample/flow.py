@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import cv2
@@ -105,27 +106,53 @@ class FlowUpsampling:
         forward = convincing(forward, proxy_before, proxy_after, least_codes)
         backward = convincing(backward, proxy_after, proxy_before, least_codes)
         sure_before, sure_after = agreement(forward, backward), agreement(backward, forward)
-        speeds = np.hypot(forward[..., 0], forward[..., 1])
-        speeds = speeds[changed & (sure_before > 0.5) & (speeds > 0)]
+        seen = forward[changed & (sure_before > 0.5)]
+        speeds = np.hypot(seen[:, 0], seen[:, 1])
+        speeds = speeds[speeds > 0]
         changing = np.count_nonzero(changed)
         explained = speeds.size / changing if changing >= FEWEST else 1.0
         shift_px = SHRINK * float(np.percentile(speeds, FAST_PERCENTILE)) if speeds.size >= FEWEST else 0.0
         return Motion(forward, backward, sure_before, sure_after, shift_px, explained)
 
 
+class Moving:
+    """Velocity and weights for every pixel of frames [H, W] at instants between them; arrays serve for all instants."""
+
+    def __init__(self, motion: Motion, shape: tuple[int, int]):
+        (height, width), (self._rows, self._columns) = motion.sure_before.shape, shape
+        self._motion = motion
+        self._sums, self._blurred = np.empty((2, height + 2, width + 2, 4), np.float32)
+        self._settled = np.empty((3, height, width), np.float32)
+        self._enlarged = np.empty((3, *shape), np.float32)
+
+    def at(self, time: np.float32) -> np.ndarray:
+        """[3, H, W] of `warp.settle`, px of the frames; until the next call."""
+        motion, field, settled = self._motion, self._sums, self._settled
+        field[...] = 0
+        splat(motion.forward, motion.sure_before, UNSURE, time, F(1), F(1) - time, 2, field)
+        splat(motion.backward, motion.sure_after, UNSURE, F(1) - time, F(-1), time, 3, field)
+        cv2.GaussianBlur(field, (BLUR_TAPS, BLUR_TAPS), BLUR_PX, dst=self._blurred)
+        settle(self._blurred, time, ENOUGH, settled)
+        settled[0] *= F(self._columns / settled.shape[2])
+        settled[1] *= F(self._rows / settled.shape[1])
+        for small, large in zip(settled, self._enlarged, strict=True):
+            cv2.resize(small, (self._columns, self._rows), dst=large, interpolation=cv2.INTER_LINEAR)
+        return self._enlarged
+
+
 def carried(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int]) -> Iterator[Frame]:
     """The frames at instants between a and b, in order, and b."""
     before, after = (list(map(with_margin, channels_of(frame.light))) for frame in (a, b))
     height, width = a.light.shape[:2]
-    moving, last = np.empty((3, height, width), np.float32), a.light
+    moving, last = Moving(motion, (height, width)), a.light
     was_still = np.ones(strip_count(width, height), np.bool_)
     for t_ns in times_ns:
         time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
-        motion_at(motion, time, moving)
+        motion_there = moving.at(time)
         channels = np.empty((len(before), height, width), np.float32)
         still = np.empty((len(before), strip_count(width, height)), np.bool_)
         for k, pair in enumerate(zip(before, after, strict=True)):
-            carry(*pair, moving, time, channels[k], still[k])
+            carry(*pair, motion_there, time, channels[k], still[k])
         light = channels[0] if a.light.ndim == 2 else np.moveaxis(channels, 0, -1).copy()
         is_still = np.logical_and.reduce(still)
         yield Frame(light, t_ns, original=False, still=Still(last, is_still & was_still))
@@ -170,24 +197,21 @@ def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes
 
 def carried_along(picture: np.ndarray, flow: np.ndarray) -> np.ndarray:
     """A picture [H, W] of 8 bits at where a flow [H, W, 2] px leads."""
-    rows, columns = np.indices(picture.shape, np.float32)
-    return cv2.remap(
-        picture, columns + flow[..., 0], rows + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    there = _places(*picture.shape) + flow
+    return cv2.remap(  # (None: columns and rows are in one array)
+        picture,
+        there,
+        None,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,  # type: ignore[call-overload]
     )
 
 
-def motion_at(motion: Motion, time: np.float32, out: np.ndarray) -> None:
-    """Velocity [px of the frames] and weights for every pixel of an instant into out [3, H, W] (`warp.settle`)."""
-    height, width = motion.sure_before.shape
-    field = np.zeros((height + 2, width + 2, 4), np.float32)
-    splat(motion.forward, motion.sure_before, UNSURE, time, F(1), F(1) - time, 2, field)
-    splat(motion.backward, motion.sure_after, UNSURE, F(1) - time, F(-1), time, 3, field)
-    settled = np.empty((3, height, width), np.float32)
-    settle(cv2.GaussianBlur(field, (BLUR_TAPS, BLUR_TAPS), BLUR_PX), time, ENOUGH, settled)
-    settled[0] *= F(out.shape[2] / width)
-    settled[1] *= F(out.shape[1] / height)
-    for small, large in zip(settled, out, strict=True):
-        cv2.resize(small, (out.shape[2], out.shape[1]), dst=large, interpolation=cv2.INTER_LINEAR)
+@lru_cache(maxsize=2)
+def _places(height: int, width: int) -> np.ndarray:
+    """Column and row of every pixel, [height, width, 2]."""
+    rows, columns = np.indices((height, width), np.float32)
+    return np.stack([columns, rows], -1)
 
 
 def no_motion(shape: tuple[int, ...]) -> Motion:

@@ -68,16 +68,15 @@ def splat(flow, sure, unsure, time, direction, share, slot, field):
     height, width = sure.shape
     for y in range(height):
         for x in range(width):
-            across, down = flow[y, x, 0], flow[y, x, 1]
+            across, down, weight = flow[y, x, 0], flow[y, x, 1], sure[y, x] + unsure
+            if across == F(0) and down == F(0):
+                field[y + 1, x + 1, slot] += weight
+                continue
             to_x, to_y = F(x + 1) + time * across, F(y + 1) + time * down
             if not (F(0) <= to_x < F(width + 1) and F(0) <= to_y < F(height + 1)):
                 continue
             column, row = int(to_x), int(to_y)
             right, lower = to_x - F(column), to_y - F(row)
-            weight = sure[y, x] + unsure
-            if across == F(0) and down == F(0):
-                field[y + 1, x + 1, slot] += weight
-                continue
             x_sum, y_sum = direction * share * across, direction * share * down
             for part, place in (
                 ((_ONE - right) * (_ONE - lower) * weight, field[row, column]),
