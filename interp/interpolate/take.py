@@ -5,7 +5,7 @@ A new kind is a class that satisfies `Take`, and a line in `open_take`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -95,7 +95,7 @@ class Options:
     start_s: float | None = None
     stop_s: float | None = None
     crop: str | None = None
-    size: str | None = None
+    size: str | Sequence[int] | None = None
     transfer: str = "auto"
     source_hz: Fraction | None = None
     contrast: tuple[float, float] | None = None

@@ -291,6 +291,14 @@ def test_colour_is_framed_like_luminance(tmp_path: Path) -> None:
         np.testing.assert_allclose(colour @ np.array(BT709_WEIGHTS, np.float32), grey, rtol=1e-5)
 
 
+def test_a_size_may_be_two_numbers(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).uniform(0, 3, (20, 30)).astype(np.float32)
+    np.testing.assert_array_equal(framed(tmp_path, picture, size=(7, 9)), framed(tmp_path, picture, size="7x9"))
+    for wrong, said in (((7, -9), "7x-9"), ((0, 9), "0x9"), ((7, 9, 3), "7x9x3"), ((7.5, 9), "7.5x9"), ((), "")):
+        with pytest.raises(UsageError, match=f"size '{said}"):
+            framed(tmp_path, picture, size=wrong)
+
+
 def test_boxes() -> None:
     assert crop_box("4x6", (10, 10)) == (3, 2, 4, 6)
     assert of_shape(crop_box("100x50+10+20", (200, 100)), (1, 1)) == (35, 20, 50, 50)

@@ -8,7 +8,7 @@ A new kind of source is a class that satisfies `Source` (`source.py`) and a line
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ def open_source(
     start: float | Fraction | None = None,
     stop: float | Fraction | None = None,
     crop: str | None = None,
-    size: str | None = None,
+    size: str | Sequence[int] | None = None,
     motion: str | None = None,
     seen_through: Callable[[Source], Source] | None = None,
 ) -> Source:
@@ -47,7 +47,7 @@ def open_source(
     colour       "luminance" gives frames [H, W], "rgb" [H, W, 3] (see `Frame`)
     start, stop  the part to read [s on the source's own clock], both ends included
     slowdown     the footage plays so many times slower than the world went: its times are divided by it
-    crop, size   as in `framing.py`, such as "640x480+0+60" and "346x260"
+    crop, size   as in `framing.py`, such as "640x480+0+60" and "346x260" or (346, 260)
     seen_through what else is done to the source before it is cut and framed, such as giving it depth
     motion       makes a clip of a photograph: "pan", "saccade", "zoom" or a .csv file, as in `motion.py`
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -54,8 +54,9 @@ def crop_box(text: str, size: tuple[int, int]) -> Box:
     return Box(Fraction(x), Fraction(y), Fraction(width), Fraction(height))
 
 
-def parse_size(text: str, shape: tuple[int, int]) -> tuple[int, int, bool]:
+def parse_size(size: str | Sequence[int], shape: tuple[int, int]) -> tuple[int, int, bool]:
     """Width, height and whether to stretch, of a size for pictures of the shape (width, height).  Raises UsageError."""
+    text = size if isinstance(size, str) else "x".join(map(str, size))
     found = re.fullmatch(r"(\d{1,9})(?:x(\d{1,9})(!)?)?", text)
     if not found:
         raise UsageError(f"size '{text}': expected WIDTH, WIDTHxHEIGHT or WIDTHxHEIGHT!, such as 346x260")
@@ -76,7 +77,7 @@ def of_shape(box: Box, shape: tuple[int, int]) -> Box:
 class Framed(Edit):
     """A source whose pictures are cropped, then brought to a size.  Raises UsageError."""
 
-    def __init__(self, source: Source, crop: str | None, size: str | None):
+    def __init__(self, source: Source, crop: str | None, size: str | Sequence[int] | None):
         super().__init__(source)
         whole = (source.size[0], source.size[1])
         self._box = crop_box(crop, whole) if crop else Box(Fraction(0), Fraction(0), *map(Fraction, whole))

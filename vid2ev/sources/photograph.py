@@ -11,7 +11,7 @@ The frame rate is such that nothing moves more than half a pixel from frame to f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ class Photograph:
 
     motion   as for `parse_motion`
     crop     the part of the photograph to use
-    size     of the pictures, WIDTH or WIDTHxHEIGHT
+    size     of the pictures, as in `framing.py`
 
     Raises UsageError for a motion that leaves the photograph and for options that cannot be meant, DataError for a
     photograph that cannot be read.
@@ -58,7 +58,7 @@ class Photograph:
         fps: float | Fraction | None = None,
         colour: Colour = "luminance",
         crop: str | None = None,
-        size: str | None = None,
+        size: str | Sequence[int] | None = None,
     ):
         self.path, self.warnings = Path(path), list[str]()
         self._motion = parse_motion(motion)
@@ -143,12 +143,12 @@ class Photograph:
                 taps_of(self._whole[0], Fraction(self._corner[0]), Fraction(columns * self._factor), columns),
             )
 
-    def _fitted(self, text: str | None) -> tuple[tuple[int, int], float]:
+    def _fitted(self, size: str | Sequence[int] | None) -> tuple[tuple[int, int], float]:
         """The size of the pictures, and output pixels per pixel of the photograph."""
-        if text is not None:
-            width, height, stretched = parse_size(text, self._whole)
+        if size is not None:
+            width, height, stretched = parse_size(size, self._whole)
             if stretched:
-                raise UsageError(f"size '{text}': a photograph in motion is not stretched; leave the '!' out")
+                raise UsageError(f"size '{size}': a photograph in motion is not stretched; leave the '!' out")
             least = self._least_scale((width, height))
             if self._motion.scale and self._motion.scale < least:
                 raise UsageError(
