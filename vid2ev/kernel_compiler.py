@@ -24,6 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import Linkage
 from numba import _dynfunc, njit  # type: ignore[attr-defined]
 from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
@@ -122,6 +123,20 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
 
+class KernelLibrary(JITCodeLibrary):
+    """The code of a kernel: its parts are its own, and what has one caller is put into it.
+
+    A record goes to a part as its numbers, some hundred of them: a call that stays takes longer than to look at a strip
+    of pixels.  Of what belongs to nobody else LLVM also drops the arguments that are not used.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class CallableByKernels(LoweringPass):
     """What numba does with lowered code in the end, but without an address: for inner functions."""
@@ -170,6 +185,9 @@ class KernelCompiler(CompilerBase):
         if flags.no_cpython_wrapper:
             flags.no_compile = True
             self.state.library = InnerLibrary(targetctx.codegen(), "inner")
+        else:
+            self.state.library = KernelLibrary(targetctx.codegen(), "kernel")
+            self.state.library.enable_object_caching()
 
     def compile_extra(self, function: Callable) -> Any:
         # (what a compilation makes is kept: looking for garbage in it takes a tenth of the time)
