@@ -130,35 +130,50 @@ def sleep_of(block, scratch, pixel, n, theta, flags, num, iv):
     poles = len(flags.poles)
     if poles + len(flags.leak) + len(flags.track) == 0:
         return SLEEPS, np.inf, 0
-    restless, moving, wide = np.int32(0), np.int32(0), np.int32(0)
+    restless, moving = np.int32(0), np.int32(0)
     gain, floor = F(exp64(iv.leak0)), F(num.curve.floor)
     for i in range(n):
-        u = block[INPUT * PITCH + i]
-        lag, top, bottom = F(0.0), u, u
-        if poles > 0:
-            e1 = block[LAG1 * PITCH + i]
-            e2 = block[LAG2 * PITCH + i] if poles > 1 else e1
-            lag = max(abs(e1), abs(e2))
-            top, bottom = max(u, max(u - e1, u - e2)), min(u, min(u - e1, u - e2))
-        slack = SLACK * lag + ROUNDING * abs(u)
-        top, bottom = top + slack, bottom - slack
+        lag, top, bottom = hull_of(block, i, flags)
         quiet = is_quiet(block, scratch, i, lag, top, bottom, gain, flags, num, iv)
         if (poles > 0) & (len(flags.log_input) == 0):  # nor will it ever have to be refined
             quiet = quiet & (lag + SLACK * lag <= F(STEEP) * (bottom + floor))
         restless = np.int32(restless + np.int32(quiet == False))  # noqa: E712 (vectorises, `not` does not)
         moving = np.int32(moving + np.int32(lag != F(0.0)))
-        if len(flags.forced):
-            scale = F(1.0) if len(flags.log_input) else bottom + floor
-            near = F(0.125 * least_threshold(pixel + i, theta, flags, num))  # (no curve is steeper than 4 / scale)
-            wide = np.int32(wide + np.int32((top - bottom <= near * scale) == False))  # noqa: E712
     if restless > 0:
-        return AWAKE, -np.inf, wide
+        return AWAKE, -np.inf, 0
     until = np.inf
     if len(flags.leak):
         until = least_room(scratch, n, flags)
     if until <= iv.leak1:
-        return AWAKE, until, wide
+        return AWAKE, until, 0
+    wide = pixels_not_calm(block, pixel, n, theta, flags, num) if len(flags.forced) else 0
     return (NAPS if moving > 0 else SLEEPS), until, wide
+
+
+@inner
+def hull_of(block, i, flags):
+    """(larger lag, top, bottom) of what the signal of pixel i may be in steady light."""
+    u = block[INPUT * PITCH + i]
+    lag, top, bottom = F(0.0), u, u
+    if len(flags.poles) > 0:
+        e1 = block[LAG1 * PITCH + i]
+        e2 = block[LAG2 * PITCH + i] if len(flags.poles) > 1 else e1
+        lag = max(abs(e1), abs(e2))
+        top, bottom = max(u, max(u - e1, u - e2)), min(u, min(u - e1, u - e2))
+    slack = SLACK * lag + ROUNDING * abs(u)
+    return lag, top + slack, bottom - slack
+
+
+@inner
+def pixels_not_calm(block, pixel, n, theta, flags, num):
+    """How many signals of a strip have further to go than a share of their least threshold."""
+    wide, floor = np.int32(0), F(num.curve.floor)
+    for i in range(n):
+        _, top, bottom = hull_of(block, i, flags)
+        scale = F(1.0) if len(flags.log_input) else bottom + floor
+        near = F(0.125 * least_threshold(pixel + i, theta, flags, num))  # (no curve is steeper than 4 / scale)
+        wide = np.int32(wide + np.int32((top - bottom <= near * scale) == False))  # noqa: E712
+    return wide
 
 
 @inner
