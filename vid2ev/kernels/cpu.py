@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.kernel_intrinsics import prefetch, put_eight
 from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
@@ -17,32 +18,31 @@ from vid2ev.kernels.shots import aim
 from vid2ev.kernels.sleep import doze, next_run, stir
 from vid2ev.kernels.slow import climb, load
 
-_ADD_BYTES = np.uint64(0x0101010101010101)
+AHEAD = 64  # entries of float32 in four lines of a cache
+
+_BYTES = np.uint64(0x0101010101010101)  # times this, the top byte is the sum of all; times the next, they are its bits
+_BITS = np.uint64(0x0102040810204080)
+_SET = np.zeros(256, np.uint64)  # the numbers of the bits that are set, ascending, a byte each, and zeros
+for _bits in range(256):
+    _SET[_bits] = sum(bit << 8 * k for k, bit in enumerate(bit for bit in range(8) if _bits >> bit & 1))
 
 
 @inner
 def hits_of(flagged, hits):
-    """Indices of the flagged pixels of a block into `hits` (BLOCK + 1 long); returns their number.
+    """Indices of the flagged pixels of a block into `hits` (BLOCK + 8 long); returns their number.
 
-    Where many are flagged no branch depends on a single pixel, where few are, words of eight without any are skipped.
+    No branch depends on a pixel: of each eight as many entries are written, and those without a flag are overwritten.
     """
     words = flagged.view(np.uint64)
     total = np.uint64(0)
     for k in range(words.size):
-        total += (words[k] * _ADD_BYTES) >> np.uint64(56)  # (flags are 0 or 1: their sum is in the top byte)
-    count = 0
+        total |= words[k]
+    count = np.int64(0)
     if total == 0:
         return count
-    if total > BLOCK // 16:
-        for i in range(flagged.size):
-            hits[count] = i
-            count += np.int64(flagged[i])
-        return count
     for k in range(words.size):
-        if words[k] != 0:
-            for i in range(8 * k, 8 * k + 8):
-                hits[count] = i
-                count += np.int64(flagged[i])
+        put_eight(hits, count, np.int32(8 * k), _SET[(words[k] * _BITS) >> np.uint64(56)])
+        count += np.int64((words[k] * _BYTES) >> np.uint64(56))  # (flags are 0 or 1)
     return count
 
 
@@ -82,6 +82,8 @@ def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags
     for index in range(first_block, last_block):
         p0 = index * BLOCK
         size = min(BLOCK, pixels - p0)
+        if index + 1 < last_block:
+            announce(planes.fast, (index + 1) * stride, stride)
         block = planes.fast[index * stride : (index + 1) * stride]
         rest = planes.rest[2 * PITCH * index : 2 * PITCH * (index + 1)]
         if len(flags.forced):
@@ -101,7 +103,7 @@ def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags
                 shots = np.int64(0)
             forced, shots = take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv)
         count = hits_of(flagged, hits)
-        if len(flags.forced) + len(flags.noise) + len(flags.no_closed_form):
+        if all_general(flags, iv) or (len(flags.forced) > 0 and forced > 0):
             count, out, n = take_general(
                 block, work, count, p0, keys, chance, forced, planes, flags, num, iv, out, n, tally
             )
@@ -111,6 +113,8 @@ def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags
                 out, n = climb(work, used, planes, flags, num, iv, out, n, tally)
                 used = np.int64(0)
             some = min(count - first, LANE_COUNT - used)
+            for k in range(first, first + some):  # (what `climb` asks for is then there)
+                prefetch(planes.memory, p0 + np.int64(hits[k]))
             load(block, scratch, work.lanes[used:], work.pixels[used:], hits[first:], some, p0, flags)
             first, used = first + some, used + some
         keep(block, scratch, p0, size, naps, flags)
@@ -119,6 +123,14 @@ def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags
     if len(flags.forced):
         out, n = fire(work, shots, planes, flags, num, iv, out, n, tally)
     return out, n
+
+
+@inner
+def announce(plane, first, count):
+    """Begin to bring float32 entries to the cache, every fourth line: then the machine goes on by itself, which it does
+    not where a page ends."""
+    for at in range(first, first + count, AHEAD):
+        prefetch(plane, np.int64(at))
 
 
 @inner
@@ -165,6 +177,8 @@ def keep(block, scratch, p0, size, naps, flags):
 def take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv):
     """Load the shots of a block, flag the pixels of other forced events: (candidates left, shots)."""
     forced = keep_likely(block, work.scratch, keys, chance, forced, flags, num, iv)
+    for j in range(forced):
+        prefetch(planes.memory, p0 + place_of_candidate(keys[j], iv)[0])
     if all_general(flags, iv):
         for j in range(forced):
             work.flagged[place_of_candidate(keys[j], iv)[0]] = 1

@@ -51,7 +51,7 @@ def new_work() -> Work:
     return Work(
         scratch=aligned(SCRATCH, f32),
         flagged=aligned(BLOCK, np.uint8),
-        hits=aligned(BLOCK + 1, np.int32),
+        hits=aligned(BLOCK + 8, np.int32),
         lent=aligned(BLOCK, np.int32),
         lanes=aligned(LANES, f64),
         pixels=aligned(LANE_COUNT, i64),

@@ -151,7 +151,7 @@ def _scratch() -> tuple[np.ndarray, ...]:
     return (
         aligned(SCRATCH, np.float32),
         aligned(BLOCK, np.uint8),
-        aligned(BLOCK + 1, np.int32),
+        aligned(BLOCK + 8, np.int32),
         aligned(LANES, np.float32),
     )
 
