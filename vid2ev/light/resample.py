@@ -63,18 +63,30 @@ def _line(centre: Fraction, length: int) -> tuple[int, list[float]]:
 def _resample(light, rows, columns, out):
     first_row, row_count, row_weights = rows
     first_column, column_count, column_weights = columns
-    _, width, channels = light.shape
-    row = np.empty((width, channels), np.float32)
+    height, width, channels = light.shape
+    lines, row = light.reshape(height, width * channels), np.empty(width * channels, np.float32)
     for j in range(out.shape[0]):
-        row[:] = 0
-        for k in range(row_count[j]):
-            weight, above = row_weights[j, k], light[first_row[j] + k]
-            for x in range(width):
-                for c in range(channels):
-                    row[x, c] += weight * above[x, c]
-        for i in range(out.shape[1]):
-            for c in range(channels):
-                total = np.float32(0)
-                for k in range(column_count[i]):
-                    total += column_weights[i, k] * row[first_column[i] + k, c]
-                out[j, i, c] = total
+        _add_lines(lines, first_row[j], row_weights[j, : row_count[j]], row)
+        for c in range(channels):
+            _add_columns(row, c, channels, first_column, column_count, column_weights, out[j, :, c])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_lines(lines, first, weights, row):
+    """The weighted sum of lines from the first one on."""
+    row[:] = 0
+    for k in range(weights.size):
+        weight, line = weights[k], lines[first + k]
+        for x in range(row.size):
+            row[x] += weight * line[x]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_columns(row, channel, channels, first, counts, weights, out):
+    """The weighted sums of the pixels of a row, in one of its channels."""
+    flat, most, next_pixel = weights.reshape(-1), np.uintp(weights.shape[1]), np.uintp(channels)
+    for i in range(np.uintp(out.size)):
+        total, place = np.float32(0), np.uintp(first[i]) * next_pixel + np.uintp(channel)
+        for k in range(np.uintp(counts[i])):
+            total += flat[i * most + k] * row[place + k * next_pixel]
+        out[i] = total
