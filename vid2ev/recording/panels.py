@@ -11,6 +11,9 @@ from numba import njit
 
 from vid2ev.pictures.colours import MOST, NEUTRAL, codes, event_colours
 
+EACH = MOST + 1  # counts of a polarity that are told apart
+CODES = EACH * EACH
+
 
 def reduced(light: np.ndarray, across: int, down: int) -> np.ndarray:
     """Codes Y [uint8, down x across] of linear light, which is averaged where pixels share one."""
@@ -47,22 +50,45 @@ def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-unt
     """
     down, across = gray.shape
     height, width = luma.shape[0], luma.shape[1] // 2
-    columns = np.minimum(np.arange(width) // enlarged, across - 1)
-    for block_i in range(height // 2):
-        for block_j in range(width // 2):
-            u = v = n = 0
-            for k in range(4):
-                i, j = 2 * block_i + k // 2, 2 * block_j + k % 2
-                row, column = min(i // enlarged, down - 1), columns[j]
-                off, on = counts[0, row, column], counts[1, row, column]
-                luma[i, j] = gray[row, column]
-                luma[i, width + j] = colours[off, on, 0]
-                if off + on > 0:
-                    u, v, n = u + colours[off, on, 1], v + colours[off, on, 2], n + 1
-            chroma[0, block_i, block_j] = chroma[1, block_i, block_j] = NEUTRAL
-            right = width // 2 + block_j
-            chroma[0, block_i, right] = u // n if n else colours[0, 0, 1]
-            chroma[1, block_i, right] = v // n if n else colours[0, 0, 2]
+    columns = np.minimum(np.arange(width) // enlarged, across - 1).astype(np.uint32)
+    shown, tints = np.empty(CODES, np.uint8), np.zeros((3, CODES), np.int32)
+    for code in range(CODES):
+        colour = colours[code // EACH, code % EACH]
+        shown[code] = colour[0]
+        if code > 0:  # (a pixel without events counts nothing, so that nothing asks whether it has some)
+            tints[0, code], tints[1, code], tints[2, code] = colour[1], colour[2], 1
+    chroma[:, :, : width // 2] = NEUTRAL
+    seen = np.empty((2, width), np.uint8)
+    for i in range(height):
+        row, here = min(i // enlarged, down - 1), seen[i % 2]
+        _look(gray[row], counts[0, row], counts[1, row], columns, here, shown, luma[i, :width], luma[i, width:])
+        if i % 2:
+            u_row, v_row = chroma[0, i // 2, width // 2 :], chroma[1, i // 2, width // 2 :]
+            _tint(seen[0], seen[1], tints, colours[0, 0], u_row, v_row)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _look(gray, off, on, columns, codes, shown, left, right):  # type: ignore[no-untyped-def]
+    """Luma of a row of both panels, and the codes of its counts."""
+    for j in range(columns.size):
+        column = columns[j]
+        code = np.uint8(off[column] * np.uint8(EACH) + on[column])
+        codes[j], left[j], right[j] = code, gray[column], shown[code]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _tint(upper, lower, tints, ground, u_row, v_row):  # type: ignore[no-untyped-def]
+    """Chroma of two rows of codes."""
+    two, one = np.uintp(2), np.uintp(1)
+    u_of, v_of, n_of = tints[0], tints[1], tints[2]
+    for j in range(np.uintp(u_row.size)):
+        a, b, c, d = upper[two * j], upper[two * j + one], lower[two * j], lower[two * j + one]
+        n = n_of[a] + n_of[b] + n_of[c] + n_of[d]
+        if n == 0:
+            u_row[j], v_row[j] = ground[1], ground[2]
+        else:
+            u_row[j] = np.uint8(np.float32(u_of[a] + u_of[b] + u_of[c] + u_of[d]) / np.float32(n))
+            v_row[j] = np.uint8(np.float32(v_of[a] + v_of[b] + v_of[c] + v_of[d]) / np.float32(n))
 
 
 def _gray_table() -> np.ndarray:
