@@ -29,7 +29,7 @@ from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval, warp_tensors
 from vid2ev.upsample.proxies import agreement, finite, proxies
 from vid2ev.upsample.subframes import instants, steps_for
-from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
+from vid2ev.upsample.warp import AFTER, BEFORE, carry, doubt, settle, splat
 
 F = np.float32
 SHRINK = 2
@@ -186,13 +186,15 @@ def channels_of(light: np.ndarray) -> list[np.ndarray]:
 
 
 def convincing(flow: np.ndarray, start: np.ndarray, end: np.ndarray, least_codes: float) -> np.ndarray:
-    """The flow where it explains the change from start to end better than standing still does, elsewhere 0.
+    """The flow where it explains the change from start to end better than standing still does, elsewhere 0: the very
+    array.
 
     Better by at least least_codes, on average around a pixel: in smooth places any flow explains the noise as well as
     any other, and what DIS returns there wanders by many pixels.
     """
     gain = cv2.subtract(cv2.absdiff(start, end), cv2.absdiff(start, carried_along(end, flow)), dtype=cv2.CV_32F)
-    return flow * (cv2.blur(gain, (AROUND, AROUND)) > least_codes)[..., None]
+    doubt(flow, cv2.blur(gain, (AROUND, AROUND)), F(least_codes))
+    return flow
 
 
 def carried_along(picture: np.ndarray, flow: np.ndarray) -> np.ndarray:

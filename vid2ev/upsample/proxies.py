@@ -41,4 +41,5 @@ def agreement(flow: np.ndarray, back: np.ndarray) -> np.ndarray:
 
 def finite(light: np.ndarray) -> np.ndarray:
     """The light with NaN and infinity as 0, so that bad pixels spoil no others; the same array if there are none."""
-    return light if cv2.checkRange(light)[0] else np.where(np.isfinite(light), light, F(0))
+    known = np.isfinite(light)
+    return light if known.all() else np.where(known, light, F(0))

@@ -3,12 +3,6 @@
 `splat` throws the velocities of a frame forward to where its pixels are at that instant; where several land on one
 place, those on which both directions of flow agree outweigh the rest, so that what is in front wins.  `carry` then
 looks, for every pixel of the instant, back along its velocity into the frame before and forward into the frame after.
-
-Light is looked up by cubic convolution (Keys 1981, a = -1/2), the one that is exact for straight and parabolic light:
-a ramp that moves evenly is seen to move evenly, at any fraction of a pixel.  It is held between the four nearest
-values, so that it neither rings nor goes below zero beside a bright edge.
-
-Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE Trans. ASSP 29(6), 1981.
 """
 
 from __future__ import annotations
@@ -17,11 +11,13 @@ import numpy as np
 from numba import njit
 
 from vid2ev.stream.still import STRIP
+from vid2ev.upsample.cubic import look_up, places
 from vid2ev.upsample.stillness import is_kept
 
 F = np.float32
 BEFORE, AFTER = 1, 2  # pixels of margin that `carry` needs around an image
-_HALF, _ONE, _TWO, _THREE, _FOUR = F(0.5), F(1), F(2), F(3), F(4)
+_HALF, _ONE = F(0.5), F(1)
+BLOCK = 16  # pixels of a row that are looked up if one of them moves
 _TINY = F(1e-20)  # in place of a sum of nothing
 
 
@@ -36,6 +32,10 @@ def miss(flow, back, missed):
     for y in range(height):
         for x in range(width):
             across, down = flow[y, x, 0], flow[y, x, 1]
+            if across == F(0) and down == F(0):  # (as below, without looking around: most of many pictures is still)
+                lengths = back[y, x, 0] * back[y, x, 0] + back[y, x, 1] * back[y, x, 1]
+                missed[y, x] = lengths / (F(0.01) * lengths + _HALF)
+                continue
             to_x, to_y = F(x) + across, F(y) + down
             if not (F(0) <= to_x <= F(width - 1) and F(0) <= to_y <= F(height - 1)):
                 missed[y, x] = F(np.inf)
@@ -51,6 +51,17 @@ def miss(flow, back, missed):
                 error += (flow[y, x, axis] + there) ** 2
                 lengths += there * there
             missed[y, x] = error / (F(0.01) * lengths + _HALF)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def doubt(flow, gain, least):
+    """Let nothing move where the gain [h, w] is not more than the least; the flow [h, w, 2] changes."""
+    height, width = gain.shape
+    for y in range(height):
+        for x in range(width):
+            kept = gain[y, x] > least
+            flow[y, x, 0] = flow[y, x, 0] if kept else F(0)
+            flow[y, x, 1] = flow[y, x, 1] if kept else F(0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -123,34 +134,61 @@ def carry(before, after, motion, time, out, still):
     """
     height, width = out.shape
     pitch, x_last, y_last = before.shape[1], F(width - 1), F(height - 1)
-    columns, entry = np.empty(width, np.int32), np.empty(width, np.int32)
-    across, down, weights = np.empty(width, F), np.empty(width, F), np.empty((8, width), F)
+    entry, weights = np.empty(width, np.int32), np.empty((8, width), F)
     seen_before, seen_after = np.empty(width, F), np.empty(width, F)
     flat_before, flat_after, flat_motion, flat_out = (
         before.reshape(-1), after.reshape(-1), motion.reshape(-1), out.reshape(-1)
     )  # fmt: skip
     still[:] = True
     for y in range(height):
-        moving, first = 0, 0
+        row_moves, first = False, 0
         while first < width:
             place = y * width + first
             count = min(STRIP - place % STRIP, width - first)
             margined = (y + BEFORE) * pitch + BEFORE + first
             moves, differs = _fade(flat_before, flat_after, margined, flat_motion, flat_out, place, count)
             still[place // STRIP] &= not (moves or differs)
-            if moves:
-                for x in range(first, first + count):
-                    if motion[0, y, x] != F(0) or motion[1, y, x] != F(0):
-                        columns[moving], across[moving], down[moving] = x, motion[0, y, x], motion[1, y, x]
-                        moving += 1
+            row_moves |= moves
             first += count
-        if moving > 0:
-            _places(columns[:moving], F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
-            _look_up(flat_before, pitch, entry, weights, seen_before[:moving])
-            _places(columns[:moving], F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
-            _look_up(flat_after, pitch, entry, weights, seen_after[:moving])
-            for i in range(moving):
-                out[y, columns[i]] = seen_after[i] + motion[2, y, columns[i]] * (seen_before[i] - seen_after[i])
+        last = 0
+        while row_moves and last < width:
+            first, last = _next_moving(motion[0, y], motion[1, y], last)
+            if first < last:
+                across, down, share = motion[0, y, first:last], motion[1, y, first:last], motion[2, y, first:last]
+                places(first, F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
+                look_up(flat_before, pitch, entry, weights, last - first, seen_before)
+                places(first, F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
+                look_up(flat_after, pitch, entry, weights, last - first, seen_after)
+                _mix(seen_before, seen_after, share, out[y, first:last])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _next_moving(across, down, start):
+    """The next run of blocks of pixels from `start` on, a block's first, in each of which something moves: first and
+    last."""
+    first, count = start, across.size
+    while first < count and not _any_moves(across[first : first + BLOCK], down[first : first + BLOCK]):
+        first += BLOCK
+    last = first
+    while last < count and _any_moves(across[last : last + BLOCK], down[last : last + BLOCK]):
+        last += BLOCK
+    return min(first, count), min(last, count)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _any_moves(across, down):
+    """Whether any of some pixels moves."""
+    moves = np.uint32(0)
+    for i in range(across.size):
+        moves = np.uint32(moves | np.uint32((across[i] != F(0)) | (down[i] != F(0))))
+    return moves != 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mix(before, after, share, out):
+    """What is seen in both frames, of which that before has a share."""
+    for i in range(out.size):
+        out[i] = after[i] + share[i] * (before[i] - after[i])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -166,47 +204,3 @@ def _fade(before, after, margined, motion, out, place, count):
         moves = np.uint32(moves | np.uint32((motion[j + i] != F(0)) | (motion[size + j + i] != F(0))))
         differs = np.uint32(differs | np.uint32(is_kept(p, q) == False))  # noqa: E712 (vectorises, `not` does not)
     return moves != 0, differs != 0
-
-
-# Places first and look-ups after: the first loop runs in vectors, which a loop with a look-up in it cannot.
-@njit(cache=True, nogil=True, error_model="numpy")
-def _places(columns, y, across, down, time, pitch, x_last, y_last, entry, weights):
-    """Where pixels of a row lie after `time` of the interval: the first of 4 x 4 entries of the flat image with
-    margins, and the weights of its columns (0 to 3) and rows (4 to 7).  Places outside are moved to the border."""
-    a0, a1, a2, a3 = weights[0], weights[1], weights[2], weights[3]
-    b0, b1, b2, b3 = weights[4], weights[5], weights[6], weights[7]
-    row_length = np.int32(pitch)
-    for i in range(columns.size):
-        to_x, to_y = F(columns[i]) + time * across[i], y + time * down[i]
-        to_x = to_x if to_x > F(0) else F(0)  # (in this form NaN is a place inside, too)
-        to_x = x_last if to_x > x_last else to_x
-        to_y = to_y if to_y > F(0) else F(0)
-        to_y = y_last if to_y > y_last else to_y
-        column, row = np.int32(to_x), np.int32(to_y)
-        a, b = to_x - F(column), to_y - F(row)
-        entry[i] = row * row_length + column
-        first, third = _HALF * a * ((_TWO - a) * a - _ONE), _HALF * a * ((_FOUR - _THREE * a) * a + _ONE)
-        last = _HALF * a * a * (a - _ONE)
-        a0[i], a1[i], a2[i], a3[i] = first, _ONE - first - third - last, third, last
-        first, third = _HALF * b * ((_TWO - b) * b - _ONE), _HALF * b * ((_FOUR - _THREE * b) * b + _ONE)
-        last = _HALF * b * b * (b - _ONE)
-        b0[i], b1[i], b2[i], b3[i] = first, _ONE - first - third - last, third, last
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _look_up(light, pitch, entry, weights, out):
-    """Light at the places of `_places`, as many as `out` holds."""
-    row_length, one, two, three = np.uintp(pitch), np.uintp(1), np.uintp(2), np.uintp(3)
-    for x in range(out.size):
-        a0, a1, a2, a3 = weights[0, x], weights[1, x], weights[2, x], weights[3, x]
-        k = np.uintp(entry[x])
-        value = weights[4, x] * (light[k] * a0 + light[k + one] * a1 + light[k + two] * a2 + light[k + three] * a3)
-        k += row_length
-        p, q = light[k + one], light[k + two]
-        value += weights[5, x] * (light[k] * a0 + p * a1 + q * a2 + light[k + three] * a3)
-        k += row_length
-        r, s = light[k + one], light[k + two]
-        value += weights[6, x] * (light[k] * a0 + r * a1 + s * a2 + light[k + three] * a3)
-        k += row_length
-        value += weights[7, x] * (light[k] * a0 + light[k + one] * a1 + light[k + two] * a2 + light[k + three] * a3)
-        out[x] = min(max(value, min(min(p, q), min(r, s))), max(max(p, q), max(r, s)))
