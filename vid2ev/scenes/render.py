@@ -31,6 +31,7 @@ from vid2ev.scenes.world_numbers import numbers_of
 
 SAMPLES = 2
 FINE = 6  # the same, of pixels with corners of things and of small things
+FEW = 1 << 13  # pixels that are painted before threads would have started
 Work = Callable[[int, int, Scratch], Any]  # on rows first ... last - 1
 
 
@@ -113,6 +114,7 @@ def paint(
     def smooth(first: int, last: int, scratch: Scratch) -> Any:
         smooth_band(world, rays, first, last, wanted, cells, details, light, depth, keys, scratch)
 
+    threads = 1 if thing.size <= FEW else threads
     works: list[Work] = [trace, smooth] if samples > 1 else [trace]
     for work in works:
         _in_bands(
