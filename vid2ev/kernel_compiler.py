@@ -18,6 +18,7 @@ a kernel is of one version of all files that kernels are made of.
 
 from __future__ import annotations
 
+import dis
 import functools
 import gc
 from collections.abc import Callable
@@ -108,13 +109,17 @@ FlagsAreConstants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types
 
 
 class InnerLibrary(JITCodeLibrary):
-    """The code of an inner function: optimised only as far as loops vectorise, and without machine code."""
+    """The code of an inner function: optimised only as far as its loops vectorise, and without machine code."""
+
+    has_loops = True
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout  # (the rest is done once all is linked)
 
     def _optimize_final_module(self) -> None:
         # (without it, what is inlined into a loop late keeps that loop from being vectorised)
+        if not self.has_loops:
+            return
         passes, builder = self._codegen._module_pass_manager(loop_vectorize=True, slp_vectorize=False, cost="cheap")
         passes.run(self._final_module, builder)
 
@@ -157,6 +162,11 @@ class CallableByKernels(LoweringPass):
         return True
 
 
+def has_loops(function: Callable) -> bool:
+    """Whether a function goes back to do something again."""
+    return any("JUMP_BACKWARD" in step.opname for step in dis.get_instructions(function))
+
+
 PASSES = (
     TranslateByteCode,
     FixupArgs,
@@ -190,6 +200,8 @@ class KernelCompiler(CompilerBase):
             self.state.library.enable_object_caching()
 
     def compile_extra(self, function: Callable) -> Any:
+        if isinstance(self.state.library, InnerLibrary):
+            self.state.library.has_loops = has_loops(function)
         # (what a compilation makes is kept: looking for garbage in it takes a tenth of the time)
         collects = gc.isenabled()
         gc.disable()

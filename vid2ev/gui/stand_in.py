@@ -2,7 +2,7 @@
 
 The pixels of an event camera are compiled for the effects that are on, which takes ten seconds to a minute for each
 combination.  A sensor in which a leak of 1e-9 Hz takes the place of none has the same events (but for one in a million,
-perhaps), and one kernel for many sensors: whether a person sets a leak, a refractory period or hot pixels, it is there.
+perhaps), and one kernel for many sensors: whether a person sets a leak, crossing noise or hot pixels, it is there.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vid2ev.sensors.presets import DVS, load
 from vid2ev.sensors.spec import DvsSpec
 
 SIZE, FRAMES = (16, 16), 3  # of what is seen so that it is compiled
-SLIGHT = {"mismatch": 1e-9, "crossing_noise": 1e-9, "refractory_us": 1e-3, "shot_rate_hz": 1e-12, "shading": (1e-9,)}
+SLIGHT = {"crossing_noise": 1e-9, "refractory_us": 1e-3, "shot_rate_hz": 1e-12}
 LEAK = {"leak_rate_hz": 1e-9}  # (for itself: it has most sensors take a slower way)
 
 

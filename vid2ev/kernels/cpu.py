@@ -103,7 +103,8 @@ def walk_blocks(first_block, last_block, pixels, light, lut, naps, planes, flags
                 shots = np.int64(0)
             forced, shots = take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num, iv)
         count = hits_of(flagged, hits)
-        if all_general(flags, iv) or (len(flags.forced) > 0 and forced > 0):
+        some_general = len(flags.forced) + len(flags.noise) + len(flags.no_closed_form)
+        if some_general and (forced > 0 or all_general(flags, iv)):  # (in this order: without it is not compiled)
             count, out, n = take_general(
                 block, work, count, p0, keys, chance, forced, planes, flags, num, iv, out, n, tally
             )
@@ -138,16 +139,16 @@ def open_eyes(block, scratch, light, lut, planes, p0, size, naps, flags, num, iv
     """Light of what is awake of a block into the scratch; returns how many of its strips sleep."""
     told, asleep = naps.wanted and naps.told.size > 0, 0
     if not told:
-        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+        read_light(scratch, light, lut, planes.shade, p0, size, tally)
     if naps.wanted and len(flags.noise) == 0:
         asleep = doze(block, scratch, p0, size, planes.theta, naps, flags, num, iv)
     if told and asleep == 0:
-        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+        read_light(scratch, light, lut, planes.shade, p0, size, tally)
     elif told:
         first, last = 0, 0
         while last < size:
             first, last = next_run(last, p0, size, True, naps.state)
-            read_light(scratch[first:], light, lut, planes.shade, p0 + first, last - first, flags, tally)
+            read_light(scratch[first:], light, lut, planes.shade, p0 + first, last - first, tally)
     return asleep
 
 
@@ -236,7 +237,7 @@ def settle_tile(first_block, last_block, pixels, light, lut, t_ns, bad, random_p
             block[i] = 0.0
         block[HIGH * PITCH : HIGH * PITCH + BLOCK] = np.inf
         block[LOW * PITCH : LOW * PITCH + BLOCK] = -np.inf
-        read_light(scratch, light, lut, planes.shade, p0, size, flags, tally)
+        read_light(scratch, light, lut, planes.shade, p0, size, tally)
         for first in range(0, size, LANE_COUNT):
             seen = scratch[NEW + first : NEW + min(first + LANE_COUNT, size)]
             settle_lanes(block, seen, first, seen.size, p0, t_ns, bad, random_phase, planes, flags, num, work)

@@ -32,7 +32,7 @@ def load_thresholds(lanes, pixels, count, planes, flags, num):
     memory = planes.memory
     for j in range(count):
         lanes[AT + j] = memory[pixels[j]]
-    if len(flags.crossing_noise) or len(flags.mismatch):
+    if len(flags.crossing_noise) > 0 or num.mismatch > 0.0:
         theta = planes.drawn if len(flags.crossing_noise) else planes.theta
         for j in range(count):
             lanes[LEVEL_ON + j] = theta[pixels[j], 0]
@@ -46,7 +46,7 @@ def load_thresholds(lanes, pixels, count, planes, flags, num):
 def least_threshold(pixel, theta, flags, num):
     """What no threshold of a pixel is below, whatever is drawn [nat]."""
     least = min(num.threshold_on, num.threshold_off)
-    if len(flags.mismatch):
+    if num.mismatch > 0.0:
         least = np.float64(min(theta[pixel, 0], theta[pixel, 1]))
     return FLOOR * least if len(flags.crossing_noise) else least
 
@@ -68,7 +68,7 @@ def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
     for k in range(alive):
         j = live[k]
         lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = num.threshold_on, num.threshold_off
-        if len(flags.mismatch):
+        if num.mismatch > 0.0:
             lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = theta[pixels[j], 0], theta[pixels[j], 1]
     if len(flags.crossing_noise):
         for k in range(alive):
@@ -126,11 +126,11 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
         t_ns = iv.t0_ns + np.int64(when_ns)
         label = np.int64(lanes[LABEL + j]) if len(flags.labels) else np.int64(SIGNAL)
         if len(flags.labels) and len(flags.leak):
-            if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], pixel, planes, flags, num):
+            if label == SIGNAL and polarity == 1 and mostly_leak(t_ns - t_reset[pixel], pixel, planes, num):
                 label = np.int64(LEAK)
             t_reset[pixel] = t_ns
         key = key_of(when_ns, pixel, polarity, label, iv)
-        if len(flags.refractory):
+        if num.refractory_ns > 0:
             blind = t_ns - t_last[pixel] < num.refractory_ns
             t_last[pixel] = t_last[pixel] if blind else t_ns
             tally[SWALLOWED] += np.int64(blind)
@@ -141,9 +141,9 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
 
 
 @inner
-def mostly_leak(since_ns, pixel, planes, flags, num):
+def mostly_leak(since_ns, pixel, planes, num):
     """Whether the leak makes more than half of the way to the pixel's mean ON level in this time."""
-    threshold = np.float64(planes.theta[pixel, 0]) if len(flags.mismatch) else num.threshold_on
+    threshold = np.float64(planes.theta[pixel, 0]) if num.mismatch > 0.0 else num.threshold_on
     return num.leak_nat_per_ns * np.float64(since_ns) > 0.5 * threshold
 
 

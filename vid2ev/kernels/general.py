@@ -280,7 +280,7 @@ def walk_pixel(
 def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
     """A forced candidate at s, where the signal is `end`: (c_on, c_off, out, n)."""
     t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)
-    blind = len(flags.refractory) > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns
+    blind = num.refractory_ns > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns
     if chance == 0.0:  # a hot pixel
         if not blind:
             planes.t_last[pixel % planes.t_last.size] = t_ns

@@ -5,7 +5,9 @@ pixel), so that the compiler sees that planes do not overlap and a block's work 
 the slow path touches is plain planes.  The slow path takes pixels out into **lanes**, planes of its own.
 
 A **flag** is a tuple: empty when the effect is off, of length one when it is on.  Its type differs, so numba compiles a
-walk for each combination in use, and what `if len(flags.effect):` switches off is not even looked at.
+walk for each combination in use, and what `if len(flags.effect):` switches off is not even looked at.  What takes no
+time where it is off, as it is asked once for a block or an event, is no flag but a number: each flag doubles the walks
+that people wait for.
 """
 
 from __future__ import annotations
@@ -42,17 +44,13 @@ class Flags(NamedTuple):
     log_input: tuple  # the filter acts on the log
     log_compare: tuple  # the scan compares nats instead of light
     straight: tuple  # the comparator's input is a straight line in nats within the interval
-    frame_time: tuple  # all events at the end of the interval
     light_bandwidth: tuple
-    shading: tuple
     leak: tuple
-    mismatch: tuple
     crossing_noise: tuple
-    refractory: tuple
     track: tuple  # the refractory period ends by memorising the signal
     noise: tuple  # photoreceptor noise
     forced: tuple  # shot noise or hot pixels
-    labels: tuple
+    labels: tuple  # events have more than one cause, and are to say which
     uncounted: tuple  # crossings have to be looked at one by one, in order of time
     no_closed_form: tuple  # a flagged pixel always takes the general path
 
@@ -65,8 +63,10 @@ class Numbers(NamedTuple):
     curve: Curve
     threshold_on: float
     threshold_off: float
+    mismatch: float  # [nat]
     crossing_noise: float  # [nat]
     refractory_ns: int
+    frame_time: bool  # all events at the end of the interval
     max_crossings: int
     leak_nat_per_ns: float
     noise_rms: float  # [nat]
@@ -113,13 +113,13 @@ class Planes(NamedTuple):
     fast: np.ndarray  # float32, blocks x planes x BLOCK
     rest: np.ndarray  # float32, blocks x 2 x PITCH: what steep lags have beyond float32 (scan.refine)
     memory: np.ndarray  # float64 [n]: the level that each pixel memorised [nat]
-    theta: np.ndarray  # float32 [n, 2]: its ON and OFF threshold [nat]
+    theta: np.ndarray  # float32 [n, 2]: its ON and OFF threshold [nat], if there is mismatch
     drawn: np.ndarray  # float32 [n, 2]: the same with the noise of the crossing to come
     t_last: np.ndarray  # int64 [n]: its last event [ns]
     count: np.ndarray  # uint32 [n]: crossings so far
     t_reset: np.ndarray  # int64 [n]: when its level last moved [ns]
     hot: np.ndarray  # int32: indices of the hot pixels, ascending
-    shade: np.ndarray  # float32 [n]: optical gain
+    shade: np.ndarray  # float32 [n]: optical gain, if there is shading; else [1], 1
 
 
 @compiled

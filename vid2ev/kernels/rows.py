@@ -10,7 +10,7 @@ from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import Interval, Numbers
 from vid2ev.physics.log_curve import Curve
 
-SENSOR_FLOATS, SENSOR_INTS = 17, 4
+SENSOR_FLOATS, SENSOR_INTS = 18, 5
 INTERVAL_FLOATS, INTERVAL_INTS = 19, 6
 RISEN = INTERVAL_FLOATS  # last: what the leak has risen that is taken into the memories before the interval [nat]
 
@@ -18,11 +18,13 @@ RISEN = INTERVAL_FLOATS  # last: what the leak has risen that is taken into the 
 def sensor_row(num: Any) -> tuple[np.ndarray, np.ndarray]:
     """(float64, int64) of a sensor's `Numbers`."""
     floats = [
-        *num.curve, num.threshold_on, num.threshold_off, num.crossing_noise, num.leak_nat_per_ns, num.noise_rms,
-        num.shot_rate_hz, num.shot_light_factor, num.hot_rate_hz, num.bandwidth_dark, num.tau1_ns, num.tau2_ns,
+        *num.curve, num.threshold_on, num.threshold_off, num.mismatch, num.crossing_noise, num.leak_nat_per_ns,
+        num.noise_rms, num.shot_rate_hz, num.shot_light_factor, num.hot_rate_hz, num.bandwidth_dark, num.tau1_ns,
+        num.tau2_ns,
     ]  # fmt: skip
     seed = np.uint64(num.seed).view(np.int64)
-    return np.array(floats, np.float64), np.array([seed, num.camera, num.refractory_ns, num.max_crossings], np.int64)
+    ints = [seed, num.camera, num.refractory_ns, num.frame_time, num.max_crossings]
+    return np.array(floats, np.float64), np.array(ints, np.int64)
 
 
 @inner
@@ -30,8 +32,8 @@ def sensor_of(floats, ints):
     """The `Numbers` of a row."""
     curve = Curve(floats[0], floats[1], floats[2], floats[3], floats[4], floats[5])
     return Numbers(
-        np.uint64(ints[0]), ints[1], curve, floats[6], floats[7], floats[8], ints[2], ints[3], floats[9], floats[10],
-        floats[11], floats[12], floats[13], floats[14], floats[15], floats[16],
+        np.uint64(ints[0]), ints[1], curve, floats[6], floats[7], floats[8], floats[9], ints[2], ints[3] != 0, ints[4],
+        floats[10], floats[11], floats[12], floats[13], floats[14], floats[15], floats[16], floats[17],
     )  # fmt: skip
 
 

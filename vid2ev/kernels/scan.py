@@ -32,11 +32,11 @@ SCRATCH = 12 * PITCH + 1
 
 
 @inner
-def read_light(scratch, light, lut, shade, p0, n, flags, tally):
+def read_light(scratch, light, lut, shade, p0, n, tally):
     """Light of a block into scratch, shading applied."""
     # (slices: an index with an offset may be negative for all the compiler knows, and then it does not vectorise)
     take_light(scratch, light[p0 : p0 + n], lut, tally)
-    if len(flags.shading):
+    if shade.size == light.size:
         gain = shade[p0 : p0 + n]
         for i in range(n):
             scratch[NEW + i] = scratch[NEW + i] * gain[i]

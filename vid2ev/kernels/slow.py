@@ -61,7 +61,7 @@ def take_piece(work, count, planes, flags, num, iv, out, n, tally):
     if len(flags.uncounted):
         return steady_levels(work, count, planes, flags, num, iv, out, n, tally)
     crossings = count_rungs(work.lanes, count, num, tally)
-    return send_lines(work.lanes, work.pixels, work.stamps, count, crossings, flags, num, iv, out, n)
+    return send_lines(work.lanes, work.pixels, work.stamps, count, crossings, num, iv, out, n)
 
 
 @inner
@@ -95,7 +95,7 @@ def send_in_place(work, level, alive, count, planes, flags, num, iv, out, n, tal
 def send_batch(work, count, planes, flags, num, iv, out, n, tally):
     """Send a batch of crossings `who` at `levels`: (out, n)."""
     if len(flags.straight):
-        line_times(work.levels, work.when, work.who, count, work.lanes, flags)
+        line_times(work.levels, work.when, work.who, count, work.lanes, num)
     else:
         b = slower_rate(flags, iv)
         batch_times(

@@ -59,24 +59,24 @@ def to_nats(plane, count, num):
 
 
 @inner
-def line_times(levels, when, who, count, lanes, flags):
+def line_times(levels, when, who, count, lanes, num):
     """Times of a batch of crossings."""
     for k in range(count):
         j = who[k]
         here = (levels[k] - lanes[START + j]) * lanes[PER_NAT + j]
         # (a NaN, from a line without a slope, is its start)
-        when[k] = 1.0 if len(flags.frame_time) else (min(here, 1.0) if here > 0.0 else 0.0)
+        when[k] = 1.0 if num.frame_time else (min(here, 1.0) if here > 0.0 else 0.0)
 
 
 @inner
-def send_lines(lanes, pixels, stamps, count, crossings, flags, num, iv, out, n):
+def send_lines(lanes, pixels, stamps, count, crossings, num, iv, out, n):
     """Keys of all crossings of lanes that have only to be counted, without a batch between: (out, n).
 
     Most lanes have one or two, so two are made for each, in vector code, and counted if there are any.
     """
     out = room(out, n, crossings + 2)
     for j in range(count):
-        first, rung = rung_times(lanes, j, flags, iv)
+        first, rung = rung_times(lanes, j, num, iv)
         polarity = np.int64(lanes[UP + j])
         stamps[j] = key_of(first, pixels[j], polarity, SIGNAL, iv)
         stamps[LANE_PITCH + j] = key_of(first + rung, pixels[j], polarity, SIGNAL, iv)
@@ -85,7 +85,7 @@ def send_lines(lanes, pixels, stamps, count, crossings, flags, num, iv, out, n):
         n = put_two(out, n, stamps[j], stamps[LANE_PITCH + j], rungs)
         if rungs > 2:
             polarity = np.int64(lanes[UP + j])
-            first, rung = rung_times(lanes, j, flags, iv)
+            first, rung = rung_times(lanes, j, num, iv)
             for k in range(2, rungs):
                 n = put(out, n, key_of(first + k * rung, pixels[j], polarity, SIGNAL, iv), True)
         if rungs > num.max_crossings:
@@ -94,9 +94,9 @@ def send_lines(lanes, pixels, stamps, count, crossings, flags, num, iv, out, n):
 
 
 @inner
-def rung_times(lanes, j, flags, iv):
+def rung_times(lanes, j, num, iv):
     """Time of lane j's first rung, and from one to the next [ns since t0]."""
-    if len(flags.frame_time):
+    if num.frame_time:
         return iv.dt_ns, 0.0
     per_nat = lanes[PER_NAT + j] * iv.dt_ns
     return (lanes[FIRST + j] - lanes[START + j]) * per_nat, lanes[STEP + j] * per_nat

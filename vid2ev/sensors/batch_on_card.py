@@ -58,7 +58,7 @@ class DvsBatchOnCard:
         planes = pixel_planes([planes for planes, _ in each], self._flags, size[0] * size[1])
         bad = np.concatenate([bad for _, bad in each])
         phases = [spec.random_phase for spec in specs]
-        self._walk = CardWalk(self._memory, self._flags, self._numbers, size, planes, bad, phases)
+        self._walk = CardWalk(self._memory, self._flags, self._numbers, size, planes, bad, phases, self.labels)
         self._clocks: list[Clock] = []
         self._origins: list[int] = []  # what noise by count is counted from: the first frames [ns]
 

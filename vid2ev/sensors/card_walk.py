@@ -30,8 +30,10 @@ class CardWalk:
         planes: Planes,
         bad: np.ndarray,
         random_phase: Sequence[bool],
+        labels: bool,
     ):
-        self.memory, self._flags, self._numbers, self._size = memory, flags, list(numbers), size
+        self.memory, self._flags, self._labels = memory, flags, labels
+        self._numbers, self._size = list(numbers), size
         self._pixels, self._total = size[0] * size[1], size[0] * size[1] * len(self._numbers)
         self._kernels = memory.kernels(flags)
         self._bad, self._phase = memory.put(bad), memory.put(np.array(random_phase, np.uint8))
@@ -78,7 +80,7 @@ class CardWalk:
     def walk(self, light: Any, steps: list[list[Step]]) -> CardEvents:
         """Advance through frames of light [frames, clips, height, width], by the steps [clips][frames]."""
         keys, moments = self._through(light, steps)
-        return events_of(self.memory, self.memory.ordered(keys), moments, self._size[0], bool(self._flags.labels))
+        return events_of(self.memory, self.memory.ordered(keys), moments, self._size[0], self._labels)
 
     def sent(self, light: Any, steps: list[list[Step]]) -> CardSent:
         """`walk`, but what is sent is not put in order."""

@@ -29,27 +29,29 @@ def flags_of(spec: DvsSpec, labels: bool) -> Flags:
     log_input = spec.filter == "after" and poles > 0
     straight = spec.timing != "response" or (spec.filter == "after" and poles == 0)
     leak, noise, refractory = spec.leak_rate_hz > 0, spec.photoreceptor_noise > 0, spec.refractory_us > 0
+    forced = spec.shot_rate_hz > 0 or (spec.hot_probability > 0 and spec.hot_rate_hz > 0)
     track = refractory and spec.refractory == "track"
     return Flags(
         poles=(0,) * poles,
         log_input=flag(log_input),
         log_compare=flag(log_input or noise or (leak and spec.log_curve != "offset")),
         straight=flag(straight),
-        frame_time=flag(spec.timing == "frame"),
         light_bandwidth=flag(spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0),
-        shading=flag(spec.shading),
         leak=flag(leak),
-        mismatch=flag(spec.mismatch > 0),
         crossing_noise=flag(spec.crossing_noise > 0),
-        refractory=flag(refractory),
         track=flag(track),
         noise=flag(noise),
-        forced=flag(spec.shot_rate_hz > 0 or (spec.hot_probability > 0 and spec.hot_rate_hz > 0)),
-        labels=flag(labels),
+        forced=flag(forced),
+        labels=flag(labels and (leak or forced)),
         uncounted=flag(not straight or refractory or (labels and leak)),
         # A drift after a low-pass that acts on the light has none, nor has a memory that jumps to the signal.
         no_closed_form=flag(track or (not straight and not log_input and (leak or noise))),
     )
+
+
+def flags_at_rest(flags: Flags) -> Flags:
+    """Those that pixels are settled and roused by: without what only their walk goes by."""
+    return flags._replace(straight=OFF, track=OFF, forced=OFF, uncounted=OFF, no_closed_form=OFF)
 
 
 def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
@@ -65,8 +67,10 @@ def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
         curve=curve_of(spec.log_curve, spec.dark_level),
         threshold_on=spec.threshold_on,
         threshold_off=spec.threshold_off,
+        mismatch=spec.mismatch,
         crossing_noise=spec.crossing_noise,
         refractory_ns=spec.refractory_ns(),
+        frame_time=spec.timing == "frame",
         max_crossings=spec.max_crossings,
         leak_nat_per_ns=spec.leak_rate_hz * spec.threshold_on * 1e-9,
         noise_rms=spec.photoreceptor_noise,
@@ -91,44 +95,56 @@ def planes_of(
         bad = bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
     else:
         bad = np.zeros(pixels, np.uint8)
-    remembers_events = bool(flags.refractory) or num.hot_rate_hz > 0
-    if old is None or (len(old.t_last) == pixels) != remembers_events:
-        old = blank_planes(pixels, flags, remembers_events)
+    wanted = kept_of(flags, num)
+    if old is None or any(len(getattr(old, name)) != (pixels if kept else 1) for name, kept in wanted.items()):
+        old = blank_planes(pixels, flags, wanted)
     old.rest[...], old.count[...] = 0, 0
-    if flags.mismatch:
+    if wanted["theta"]:
         fill_thresholds(old.theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
     hot = np.flatnonzero(bad == 1).astype(np.int32)
-    shade = shading_map(spec.shading, width, height).ravel() if flags.shading else old.shade
+    shade = shading_map(spec.shading, width, height).ravel() if spec.shading else np.ones(1, np.float32)
     return old._replace(hot=hot, shade=shade), bad
 
 
-def blank_planes(pixels: int, flags: Flags, remembers_events: bool) -> Planes:
+def kept_of(flags: Flags, num: Numbers) -> dict[str, bool]:
+    """Which planes the slow path has an entry of each pixel in; of the others there is one entry."""
+    return {
+        "memory": True,
+        "theta": num.mismatch > 0,
+        "drawn": bool(flags.crossing_noise),
+        "t_last": num.refractory_ns > 0 or num.hot_rate_hz > 0,
+        "t_reset": bool(flags.labels and flags.leak),
+        "count": bool(flags.crossing_noise),
+    }
+
+
+def blank_planes(pixels: int, flags: Flags, wanted: dict[str, bool]) -> Planes:
     """Planes with room for the state of so many pixels."""
     blocks = -(-pixels // BLOCK)
     return Planes(
         fast=aligned(blocks * stride_of(flags), np.float32),
         rest=np.zeros(2 * PITCH * blocks if flags.poles and not flags.log_input else 0, np.float32),
-        **records_of(pixels, flags, remembers_events),
+        **records_of(pixels, wanted),
         hot=np.empty(0, np.int32),
-        shade=np.empty(0, np.float32),
+        shade=np.ones(1, np.float32),
     )
 
 
-def records_of(pixels: int, flags: Flags, remembers_events: bool) -> dict[str, np.ndarray]:
+def records_of(pixels: int, wanted: dict[str, bool]) -> dict[str, np.ndarray]:
     """What the slow path keeps of each pixel, as views of records: one line of memory for each that it takes."""
-    fields: dict[str, tuple[type, tuple[int, ...], object]] = {
-        "memory": (np.float64, (), True),
-        "theta": (np.float32, (2,), flags.mismatch),
-        "drawn": (np.float32, (2,), flags.crossing_noise),
-        "t_last": (np.int64, (), remembers_events),
-        "t_reset": (np.int64, (), flags.labels and flags.leak),
-        "count": (np.uint32, (), flags.crossing_noise),
+    fields: dict[str, tuple[type, tuple[int, ...]]] = {
+        "memory": (np.float64, ()),
+        "theta": (np.float32, (2,)),
+        "drawn": (np.float32, (2,)),
+        "t_last": (np.int64, ()),
+        "t_reset": (np.int64, ()),
+        "count": (np.uint32, ()),
     }
-    used = [(name, kind, shape) for name, (kind, shape, wanted) in fields.items() if wanted]
+    used = [(name, *field) for name, field in fields.items() if wanted[name]]
     record = np.dtype(used, align=True)
     records = aligned(pixels * record.itemsize, np.uint8).view(record)
     return {
-        name: records[name] if wanted else np.zeros((1, *shape), kind) for name, (kind, shape, wanted) in fields.items()
+        name: records[name] if wanted[name] else np.zeros((1, *shape), kind) for name, (kind, shape) in fields.items()
     }
 
 

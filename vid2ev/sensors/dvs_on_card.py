@@ -57,7 +57,8 @@ class DvsOnCard(Dvs):
         """The sensor onto the device."""
         flags, numbers, bad = self._pixels.flags, self._pixels.numbers, self._pixels.bad
         self._of_fast, planes = int(stride_of(flags)) // PITCH, self._planes_of_pixels()
-        self._card = CardWalk(self._memory, flags, [numbers], self.size, planes, bad, [self.spec.random_phase])
+        phases = [self.spec.random_phase]
+        self._card = CardWalk(self._memory, flags, [numbers], self.size, planes, bad, phases, self.labels)
 
     def renew(self, spec: DvsSpec, seed: int = 0, camera: int = 0) -> None:
         """`Dvs.renew`."""

@@ -60,7 +60,7 @@ def rest_of(
 
 def thresholds_of(pixels: np.ndarray, planes: Planes, flags: Flags, num: Numbers) -> tuple[np.ndarray, np.ndarray]:
     """The ON and OFF thresholds [nat] of the crossing to come."""
-    if flags.crossing_noise or flags.mismatch:
+    if flags.crossing_noise or num.mismatch > 0:
         theta = (planes.drawn if flags.crossing_noise else planes.theta)[pixels].astype(np.float64)
         return theta[:, 0], theta[:, 1]
     return np.full(len(pixels), num.threshold_on), np.full(len(pixels), num.threshold_off)
@@ -71,7 +71,7 @@ def maps_of(planes: Planes, flags: Flags, num: Numbers, bad: np.ndarray, size: t
     shading [optical gain, float32]."""
     width, height = size
     means = np.array([num.threshold_on, num.threshold_off], np.float32)
-    theta = planes.theta if flags.mismatch else np.broadcast_to(means, (width * height, 2))
-    shading = planes.shade if flags.shading else np.ones(width * height, np.float32)
+    theta = planes.theta if num.mismatch > 0 else np.broadcast_to(means, (width * height, 2))
+    shading = np.broadcast_to(planes.shade, width * height)
     found = {"threshold_on": theta[:, 0], "threshold_off": theta[:, 1], "hot": bad == 1, "cold": bad == 2}
     return {name: plane.reshape(height, width).copy() for name, plane in (found | {"shading": shading}).items()}

@@ -12,7 +12,7 @@ from vid2ev.kernels.naps import rouse
 from vid2ev.kernels.rows import interval_rows
 from vid2ev.kernels.work import new_work
 from vid2ev.sensors.clock import Step, as_counted
-from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
+from vid2ev.sensors.compiled import flags_at_rest, flags_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
 from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.sleep import Sleep
@@ -43,6 +43,7 @@ class Pixels:
         """Those of another sensor, without light; in the planes of the old one if it had the same effects."""
         flags = flags_of(spec, self._labels)
         self.flags, self.numbers, self._random_phase = flags, numbers_of(spec, seed, camera), spec.random_phase
+        self._at_rest = flags_at_rest(flags)
         self.planes, self.bad = planes_of(spec, flags, self.numbers, *self.size, self._planes_of.get(flags))
         self._planes_of = {flags: self.planes}
         self.tallies[...] = 0
@@ -54,7 +55,7 @@ class Pixels:
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
                 first, last, self._total, flat[0], table, t_ns, self.bad, self._random_phase, self.planes,
-                self.flags, self.numbers, self._work[k], self.tallies[k],
+                self._at_rest, self.numbers, self._work[k], self.tallies[k],
             )  # fmt: skip
 
         self.sleep.forget()
@@ -116,4 +117,4 @@ class Pixels:
         """Bring these strips up to the last frame, if they have slept."""
         late = self.sleep.late(strips)
         if late.size:
-            rouse(late, self._total, self.planes, self.sleep.naps, self.flags, self.numbers, self._work[0])
+            rouse(late, self._total, self.planes, self.sleep.naps, self._at_rest, self.numbers, self._work[0])

@@ -33,20 +33,18 @@ F = np.float32
 
 
 @inner
-def take_light(scratch, light, gain, flags):
+def take_light(scratch, light, gain):
     """Light of the pixel, mended and shaded, into the scratch; returns 1 if it was no light."""
     good = (light >= F(0.0)) & (light <= BRIGHTEST)
     value = light if light > F(0.0) else F(0.0)
-    scratch[NEW] = value if value < BRIGHTEST else BRIGHTEST
-    if len(flags.shading):
-        scratch[NEW] = scratch[NEW] * gain
+    scratch[NEW] = (value if value < BRIGHTEST else BRIGHTEST) * gain
     return np.int64(0) if good else np.int64(1)
 
 
 @inner
-def gain_of(planes, pixel, flags):
+def gain_of(planes, pixel):
     """The optical gain at a pixel."""
-    return planes.shade[pixel] if len(flags.shading) else F(1.0)
+    return planes.shade[pixel] if pixel < planes.shade.size else F(1.0)  # (without shading there is one entry)
 
 
 @compiled
@@ -57,11 +55,11 @@ def glance(pixel, light, floats, ints, forced, planes, own, scratch, flagged, fl
     """
     if forced:
         return np.int64(0)
-    first, gain = LAG1 + len(flags.poles), gain_of(planes, pixel, flags)
+    first, gain = LAG1 + len(flags.poles), gain_of(planes, pixel)
     n1, n2, mended = F(0.0), F(0.0), np.int64(0)
     for k in range(light.shape[0]):
         iv = interval_of_row(floats[k], ints[k])
-        bad = take_light(scratch, light[k, pixel], gain, flags)
+        bad = take_light(scratch, light[k, pixel], gain)
         if len(flags.noise):
             n1, n2 = own[first], own[first + 1]
             advance_noise(own, scratch, pixel, 1, len(flags.poles), num, iv)
@@ -85,7 +83,7 @@ def walk(pixel, first, light, floats, ints, bases, due, planes, work, sent, flag
 
     `due` has the pixel's forced candidates.
     """
-    stride, n, gain = stride_of(flags), np.int64(0), gain_of(planes, pixel, flags)
+    stride, n, gain = stride_of(flags), np.int64(0), gain_of(planes, pixel)
     block, rest = planes.fast[pixel * stride : (pixel + 1) * stride], planes.rest[2 * pixel : 2 * pixel + 2]
     for i in range(SCRATCH):
         work.scratch[i] = F(0.0)
@@ -95,7 +93,7 @@ def walk(pixel, first, light, floats, ints, bases, due, planes, work, sent, flag
         if floats[k, RISEN] > 0.0:
             shift_pixel(pixel, floats[k, RISEN], planes, flags, num, work)
         forget_rests(work.scratch)
-        tally[NOT_FINITE] += take_light(work.scratch, light[k, pixel], gain, flags)
+        tally[NOT_FINITE] += take_light(work.scratch, light[k, pixel], gain)
         note_rests(work.scratch, scan(block, rest, work.scratch, work.flagged, pixel, 1, flags, num, iv))
         out, n = solve(pixel, block, due, planes, work, flags, num, iv, out, n, tally)
         commit(block, work.scratch, 1, flags)
@@ -143,7 +141,7 @@ def settle(pixel, light, t_ns, bad, random_phase, planes, work, flags, num, tall
     block = planes.fast[pixel * stride : (pixel + 1) * stride]
     for i in range(stride):
         block[i] = F(0.0)
-    tally[NOT_FINITE] += take_light(work.scratch, light[pixel], gain_of(planes, pixel, flags), flags)
+    tally[NOT_FINITE] += take_light(work.scratch, light[pixel], gain_of(planes, pixel))
     seen = work.scratch[NEW : NEW + 1]
     settle_lanes(block, seen, 0, 1, pixel, t_ns, bad, random_phase, planes, flags, num, work)
 
