@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import json
 import subprocess
-import sys
 from pathlib import Path
+
+from forked import Forks
 
 RUN = """
 import json, os, signal, sys
@@ -28,5 +31,11 @@ def converted(
     clip: str | Path, directory: Path, options: dict[str, object], killed_at: int = 0, before: str = ""
 ) -> subprocess.CompletedProcess[str]:
     """Convert with these options of `convert`, after the program `before`; prints how many reports there were."""
-    arguments = [str(killed_at), str(clip), str(directory), json.dumps(options)]
-    return subprocess.run([sys.executable, "-c", before + RUN, *arguments], capture_output=True, text=True)
+    return _forks().run(before + RUN, str(killed_at), str(clip), str(directory), json.dumps(options))
+
+
+@functools.cache
+def _forks() -> Forks:
+    forks = Forks("import vid2ev.conversion")
+    atexit.register(forks.end)
+    return forks

@@ -12,9 +12,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from forked import Forks
 
 from vid2ev.recording.folder import partial_of
 
@@ -54,12 +56,27 @@ OPTIONS = {
     "frames": "npz",
 }
 
+WARM = f"""
+import tempfile
+from vid2ev import convert
+with tempfile.TemporaryDirectory() as folder:
+    convert({CLIP!r}, folder + "/out", **{OPTIONS!r})
+"""
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+forks: list[Forks] = []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def warm() -> Iterator[None]:
+    """A process that has converted the clip once, from which the others are forked."""
+    forks.append(Forks(WARM))
+    yield
+    forks.pop().end()
 
 
 def run(directory: Path, killed_at: int = 0, **changed: object) -> subprocess.CompletedProcess[str]:
-    arguments = [str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed)]
-    return subprocess.run([sys.executable, "-c", RUN, *arguments], capture_output=True, text=True)
+    return forks[0].run(RUN, str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed))
 
 
 @pytest.fixture(scope="module")

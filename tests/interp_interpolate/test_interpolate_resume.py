@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
+from forked import Forks
 from small_takes import images, moving, recording
 
 from interp.interpolate import shelf
@@ -22,10 +23,14 @@ from vid2ev.errors import UsageError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 
-RUN = """
-import os, signal, sys
+WARM = """
 import torch
 torch.set_num_threads(1)
+from interp.interpolate import shelf
+from interp.interpolate.whole import interpolate
+"""
+RUN = """
+import os, signal, sys
 from interp.interpolate import shelf
 from interp.interpolate.whole import interpolate
 
@@ -40,8 +45,18 @@ interpolate(sys.argv[1], sys.argv[2], multiple=3, report=report)
 """
 
 
+forks: list[Forks] = []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def warm() -> Iterator[None]:
+    forks.append(Forks(WARM))
+    yield
+    forks.pop().end()
+
+
 def killed(source: Path, output: Path, at: int) -> None:
-    done = subprocess.run([sys.executable, "-c", RUN, source, output, str(at)], capture_output=True, text=True)
+    done = forks[0].run(RUN, str(source), str(output), str(at))
     assert done.returncode == -signal.SIGKILL, done.stderr
 
 
