@@ -31,7 +31,8 @@ class Intake:
         self.check(light.shape[-2:])
         pixels = self.size[0] * self.size[1]
         if light.dtype.kind == "f":
-            flat = np.ascontiguousarray(light, None if light.dtype in (np.float32, np.float64) else np.float32)
+            with np.errstate(over="ignore"):  # (what is beyond float32 becomes infinite, and is mended)
+                flat = np.ascontiguousarray(light, np.float32)
             return flat.reshape(-1, pixels), np.empty(0, np.float32)
         if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
             raise UsageError(

@@ -25,6 +25,13 @@ STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
 TALLIED = (("swallowed", SWALLOWED), ("capped", CAPPED), ("not_finite", NOT_FINITE))
 
 
+def only_read(light: np.ndarray) -> np.ndarray:
+    """The same light, which cannot be written: one type for kernels, whether others may write it or not."""
+    view = light.view()
+    view.flags.writeable = False
+    return view
+
+
 class Pixels:
     """The pixels of a sensor of `size` (width, height), between one call of the walk and the next.
 
@@ -54,10 +61,11 @@ class Pixels:
 
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
-                first, last, self._total, flat[0], table, t_ns, self.bad, self._random_phase, self.planes,
+                first, last, self._total, flat, table, t_ns, self.bad, self._random_phase, self.planes,
                 self._at_rest, self.numbers, self._work[k], self.tallies[k],
             )  # fmt: skip
 
+        flat = only_read(flat[0])
         self.sleep.forget()
         self.planes.count[...] = as_counted(count)
         self.tiles.each_blocks(settle)
@@ -69,6 +77,7 @@ class Pixels:
         if any(risen > 0.0 for _, risen in steps):
             self.sleep.wake()
         floats, ints = interval_rows(steps)
+        light = only_read(light)
         ends = np.zeros((self.tiles.count, len(steps)), np.int64)
 
         def walk(k: int, first: int, last: int) -> np.ndarray:
