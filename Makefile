@@ -15,8 +15,9 @@ demo: .venv/core
 	$(BIN)/vid2ev convert examples/demo.mp4 -o demo_events --overwrite
 	@echo "Look at it: demo_events/preview.mp4"
 
+# (some hundred processes are started, and all of them import the same)
 test: .venv/dev
-	$(BIN)/python -m pytest $(PYTEST_FLAGS)
+	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest $(PYTEST_FLAGS)
 
 lint: .venv/dev
 	$(BIN)/ruff check --no-cache .
