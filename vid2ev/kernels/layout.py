@@ -108,7 +108,7 @@ class Interval(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """State of the pixels; a plane that nothing uses has one entry."""
+    """State of the pixels; a plane that nothing uses has few entries."""
 
     fast: np.ndarray  # float32, blocks x planes x BLOCK
     rest: np.ndarray  # float32, blocks x 2 x PITCH: what steep lags have beyond float32 (scan.refine)

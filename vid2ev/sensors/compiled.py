@@ -17,6 +17,7 @@ from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 
 F = np.float32
+UNUSED = 2  # (a single entry is never spread out)
 
 
 def flags_of(spec: DvsSpec, labels: bool) -> Flags:
@@ -96,7 +97,7 @@ def planes_of(
     else:
         bad = np.zeros(pixels, np.uint8)
     wanted = kept_of(flags, num)
-    if old is None or any(len(getattr(old, name)) != (pixels if kept else 1) for name, kept in wanted.items()):
+    if old is None or any(len(getattr(old, name)) != (pixels if kept else UNUSED) for name, kept in wanted.items()):
         old = blank_planes(pixels, flags, wanted)
     old.rest[...], old.count[...] = 0, 0
     if wanted["theta"]:
@@ -107,7 +108,7 @@ def planes_of(
 
 
 def kept_of(flags: Flags, num: Numbers) -> dict[str, bool]:
-    """Which planes the slow path has an entry of each pixel in; of the others there is one entry."""
+    """Which planes the slow path has an entry of each pixel in; of the others there are UNUSED entries."""
     return {
         "memory": True,
         "theta": num.mismatch > 0,
@@ -131,7 +132,11 @@ def blank_planes(pixels: int, flags: Flags, wanted: dict[str, bool]) -> Planes:
 
 
 def records_of(pixels: int, wanted: dict[str, bool]) -> dict[str, np.ndarray]:
-    """What the slow path keeps of each pixel, as views of records: one line of memory for each that it takes."""
+    """What the slow path keeps of each pixel, as views of records: one line of memory for each that it takes.
+
+    All planes are spread out in memory, used or not, so that their types are the same; a memory alone is not, which
+    would take twice the room.
+    """
     fields: dict[str, tuple[type, tuple[int, ...]]] = {
         "memory": (np.float64, ()),
         "theta": (np.float32, (2,)),
@@ -144,7 +149,8 @@ def records_of(pixels: int, wanted: dict[str, bool]) -> dict[str, np.ndarray]:
     record = np.dtype(used, align=True)
     records = aligned(pixels * record.itemsize, np.uint8).view(record)
     return {
-        name: records[name] if wanted[name] else np.zeros((1, *shape), kind) for name, (kind, shape) in fields.items()
+        name: records[name] if wanted[name] else np.zeros((2 * UNUSED, *shape), kind)[::2]
+        for name, (kind, shape) in fields.items()
     }
 
 

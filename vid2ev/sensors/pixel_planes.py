@@ -23,10 +23,10 @@ def pixel_planes(each: Sequence[Planes], flags: Flags, pixels: int) -> Planes:
 
 
 def _alike(planes: list[np.ndarray], pixels: int) -> list[np.ndarray]:
-    """One plane of some sensors: with room for each pixel of all, if any of them uses its own, or else one entry."""
+    """One plane of some sensors: with room for each pixel of all, if any of them uses its own, or else for a few."""
     if not any(len(plane) == pixels for plane in planes):
         return planes[:1]
-    return [plane if len(plane) == pixels else np.repeat(plane, pixels, axis=0) for plane in planes]
+    return [plane if len(plane) == pixels else np.repeat(plane[:1], pixels, axis=0) for plane in planes]
 
 
 def by_pixel(plane: np.ndarray, pixels: int, count: int) -> np.ndarray:
