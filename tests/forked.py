@@ -5,6 +5,8 @@ A program that starts from nothing takes seconds to do that, and tests of what i
 
 from __future__ import annotations
 
+import atexit
+import functools
 import json
 import subprocess
 import sys
@@ -33,6 +35,14 @@ for line in sys.stdin:
     child = os.fork() or forked(*asked)
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
+
+
+@functools.cache
+def forks_of(before: str) -> Forks:
+    """One such process for all that have the program `before` in common; it ends with this one."""
+    forks = Forks(before)
+    atexit.register(forks.end)
+    return forks
 
 
 class Forks:

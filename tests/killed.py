@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import atexit
-import functools
 import json
 import subprocess
 from pathlib import Path
 
-from forked import Forks
+from forked import forks_of
 
 RUN = """
 import json, os, signal, sys
@@ -31,11 +29,5 @@ def converted(
     clip: str | Path, directory: Path, options: dict[str, object], killed_at: int = 0, before: str = ""
 ) -> subprocess.CompletedProcess[str]:
     """Convert with these options of `convert`, after the program `before`; prints how many reports there were."""
-    return _forks().run(before + RUN, str(killed_at), str(clip), str(directory), json.dumps(options))
-
-
-@functools.cache
-def _forks() -> Forks:
-    forks = Forks("import vid2ev.conversion")
-    atexit.register(forks.end)
-    return forks
+    arguments = [str(killed_at), str(clip), str(directory), json.dumps(options)]
+    return forks_of("import vid2ev.conversion").run(before + RUN, *arguments)

@@ -12,11 +12,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from forked import Forks
+from forked import forks_of
 
 from vid2ev.recording.folder import partial_of
 
@@ -64,19 +63,10 @@ with tempfile.TemporaryDirectory() as folder:
 """
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-forks: list[Forks] = []
-
-
-@pytest.fixture(scope="module", autouse=True)
-def warm() -> Iterator[None]:
-    """A process that has converted the clip once, from which the others are forked."""
-    forks.append(Forks(WARM))
-    yield
-    forks.pop().end()
 
 
 def run(directory: Path, killed_at: int = 0, **changed: object) -> subprocess.CompletedProcess[str]:
-    return forks[0].run(RUN, str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed))
+    return forks_of(WARM).run(RUN, str(killed_at), CLIP, str(directory), json.dumps(OPTIONS | changed))
 
 
 @pytest.fixture(scope="module")

@@ -92,6 +92,21 @@ def test_dead_time_longer_than_the_clip(kind):
     assert dvs.counts["swallowed"] == (swallowed if kind == "quantised" else 0)
 
 
+@pytest.mark.parametrize("kind", ["quantised", "track"])
+def test_dead_time_of_less_than_a_nanosecond_is_none(kind):
+    rng = np.random.default_rng(2)
+    t_ns, light = np.arange(20) * 3_000_000, 10 ** rng.uniform(-2, 0, (20, 4, 5)).astype(np.float32)
+    keys = {"photoreceptor_tau_us": 300, "follower_tau_us": 100}
+    sent, whole = (
+        feed(start(clean(refractory_us=period_us, refractory=kind, **keys), light), t_ns, light)
+        for period_us in (1e-4, 0.0)
+    )
+    assert len(sent) == len(whole) > 500
+    ours, theirs = (per_pixel(events, (4, 5)) for events in (sent, whole))
+    np.testing.assert_array_equal(ours, theirs)
+    assert np.abs(sent.t - whole.t).max() <= 1
+
+
 def test_dead_time_of_days_outlives_the_state():
     """The end of the dead time is kept through `state` and `restore`."""
     spec = clean(refractory_us=5e6, photoreceptor_tau_us=300, follower_tau_us=100)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 import pytest
-from forked import Forks
+from forked import forks_of
 from small_takes import images, moving, recording
 
 from interp.interpolate import shelf
@@ -45,18 +44,8 @@ interpolate(sys.argv[1], sys.argv[2], multiple=3, report=report)
 """
 
 
-forks: list[Forks] = []
-
-
-@pytest.fixture(scope="module", autouse=True)
-def warm() -> Iterator[None]:
-    forks.append(Forks(WARM))
-    yield
-    forks.pop().end()
-
-
 def killed(source: Path, output: Path, at: int) -> None:
-    done = forks[0].run(RUN, str(source), str(output), str(at))
+    done = forks_of(WARM).run(RUN, str(source), str(output), str(at))
     assert done.returncode == -signal.SIGKILL, done.stderr
 
 

@@ -113,7 +113,7 @@ def kept_of(flags: Flags, num: Numbers) -> dict[str, bool]:
         "memory": True,
         "theta": num.mismatch > 0,
         "drawn": bool(flags.crossing_noise),
-        "t_last": num.refractory_ns > 0 or num.hot_rate_hz > 0,
+        "t_last": num.refractory_ns > 0 or bool(flags.track) or num.hot_rate_hz > 0,
         "t_reset": bool(flags.labels and flags.leak),
         "count": bool(flags.crossing_noise),
     }
