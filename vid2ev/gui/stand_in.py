@@ -7,7 +7,7 @@ perhaps), and one kernel for many sensors: whether a person sets a leak, crossin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from threading import Thread
 from typing import Any
 
@@ -60,7 +60,7 @@ def stand_ins(spec: DvsSpec) -> Iterator[DvsSpec]:
     yield with_slight(spec, SLIGHT | LEAK)
 
 
-def with_slight(spec: DvsSpec, slight: dict[str, object]) -> DvsSpec:
+def with_slight(spec: DvsSpec, slight: Mapping[str, object]) -> DvsSpec:
     """The sensor with the slightest values of what is off."""
     return spec.model_copy(update={key: value for key, value in slight.items() if not getattr(spec, key)})
 
