@@ -15,7 +15,7 @@ demo: .venv/core
 	$(BIN)/vid2ev convert examples/demo.mp4 -o demo_events --overwrite
 	@echo "Look at it: demo_events/preview.mp4"
 
-# (some hundred processes are started, and all of them import the same)
+# (bytecode is kept: some hundred processes are started, and all of them import the same)
 test: .venv/dev
 	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest $(PYTEST_FLAGS)
 

@@ -117,9 +117,9 @@ class InnerLibrary(JITCodeLibrary):
         module.data_layout = self._codegen._data_layout  # (the rest is done once all is linked)
 
     def _optimize_final_module(self) -> None:
-        # (without it, what is inlined into a loop late keeps that loop from being vectorised)
         if not self.has_loops:
             return
+        # (without it, what is inlined into a loop late keeps that loop from being vectorised)
         passes, builder = self._codegen._module_pass_manager(loop_vectorize=True, slp_vectorize=False, cost="cheap")
         passes.run(self._final_module, builder)
 

@@ -58,14 +58,14 @@ class Pixels:
 
     def settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int, count: int) -> None:
         """Settle in a frame of light, from which noise by count goes on at `count`."""
+        light = only_read(flat[0])
 
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
-                first, last, self._total, flat, table, t_ns, self.bad, self._random_phase, self.planes,
+                first, last, self._total, light, table, t_ns, self.bad, self._random_phase, self.planes,
                 self._at_rest, self.numbers, self._work[k], self.tallies[k],
             )  # fmt: skip
 
-        flat = only_read(flat[0])
         self.sleep.forget()
         self.planes.count[...] = as_counted(count)
         self.tiles.each_blocks(settle)
