@@ -6,11 +6,12 @@
     python examples/benchmark.py --frames STACK.npy --preset ideal --threads 2 --json
                                                                       one measurement of uint8 [N, H, W]
 
-Timed is `Dvs.step`: uint8 frames in memory in, arrays of events out, which are counted and dropped. Frames
-are 1 ms apart; the first settles the sensor, the next three warm up. Thresholds are 0.2 nat. Each
-measurement is a process of its own, and they are interleaved (A B C A B C), so that a slow minute of the
-machine hits all alike; the table has the medians. A measurement during which other programs took more than
-0.08 of a core is left out if a quiet one of its kind remains; if none does, the row has a star.
+Timed is `Dvs.steps`: uint8 frames in memory in, eight at a time as `convert` gives them, arrays of events out,
+which are counted and dropped; with `--at-once 1` it is `Dvs.step`. Frames are 1 ms apart; the first settles
+the sensor, and with what goes with it, three at least, warms up. Thresholds are 0.2 nat. Each measurement is
+a process of its own, and they are interleaved (A B C A B C), so that a slow minute of the machine hits all
+alike; the table has the medians. A measurement during which other programs took more than 0.08 of a core is
+left out if a quiet one of its kind remains; if none does, the row has a star.
 
     pan    scikit-image's photographs in a mosaic that moves by (0.5, 0.1) pixels a frame: dense
     video  frames of a clip, with ten linear blends from each to the next: sparse
@@ -39,7 +40,8 @@ import click
 import numpy as np
 
 FRAME_NS = 1_000_000
-WARM_UP_FRAMES = 3
+WARM_UP_FRAMES = 4
+AT_ONCE = 8
 QUIET_CORES = 0.08
 TWO_POLES = ("timing=response", "photoreceptor_tau_us=300", "follower_tau_us=100")
 PRESETS = {  # name -> the sensor and what is changed in it
@@ -122,12 +124,14 @@ def video(count: int, width: int, height: int, clip: Path, blends: int = 10, sta
 # ---- one measurement
 
 
-def measure(stack: Path, preset: str, settings: Iterable[str], threads: int, still: bool, seconds: float) -> Row:
+def measure(
+    stack: Path, preset: str, settings: Iterable[str], threads: int, still: bool, seconds: float, at_once: int = AT_ONCE
+) -> Row:
     """Time a sensor on a stack of frames for `seconds` or, as only whole passes compare, up to three times that."""
     frames = np.load(stack)
-    count, height, width = frames.shape
+    _, height, width = frames.shape
     if still:
-        frames = [frames[0].copy()] * count
+        frames[...] = frames[0].copy()
     began = time.perf_counter()
     from vid2ev.sensors.dvs import Dvs
     from vid2ev.sensors.presets import load_sensor
@@ -139,13 +143,13 @@ def measure(stack: Path, preset: str, settings: Iterable[str], threads: int, sti
         return Dvs(spec, (width, height), threads=threads, transfer="linear")
 
     base_mib = peak_mib()
-    time_pass(sensor(), frames[: WARM_UP_FRAMES + 2], seconds)  # compiles, or loads what was compiled
+    time_pass(sensor(), frames[: WARM_UP_FRAMES + at_once], at_once, seconds)  # compiles, or loads what was compiled
     first_s = time.perf_counter() - began
     times: list[float] = []
     events = 0
     others, began = others_core_seconds(), time.perf_counter()
     while time.perf_counter() - began < seconds or not times:
-        more, found = time_pass(sensor(), frames, 3 * seconds)
+        more, found = time_pass(sensor(), frames, at_once, 3 * seconds)
         times, events = times + more, events + found
     foreign_cores = (others_core_seconds() - others) / (time.perf_counter() - began)
     total, pixels = sum(times), len(times) * width * height
@@ -155,6 +159,7 @@ def measure(stack: Path, preset: str, settings: Iterable[str], threads: int, sti
         "size": f"{width}x{height}",
         "clip": stack.stem.split("_")[0],
         "still": still,
+        "at_once": at_once,
         "frames_timed": len(times),
         "fps": len(times) / total,
         "mpix_s": pixels / total / 1e6,
@@ -170,18 +175,20 @@ def measure(stack: Path, preset: str, settings: Iterable[str], threads: int, sti
     }
 
 
-def time_pass(dvs: Any, frames: Iterable[np.ndarray], seconds: float) -> tuple[list[float], int]:
-    """Seconds of each step after the warm-up, and the events of those steps; cut short after `seconds`."""
+def time_pass(dvs: Any, frames: np.ndarray, at_once: int, seconds: float) -> tuple[list[float], int]:
+    """Seconds of each frame after the warm-up, and the events of those frames; cut short after `seconds`."""
     times, total = [], 0
     began = time.perf_counter()
-    for k, frame in enumerate(frames):
+    for first in range(0, len(frames), at_once):
+        some = frames[first : first + at_once]
+        t_ns = [FRAME_NS * (1 + first + k) for k in range(len(some))]
         before = time.perf_counter()
-        events = dvs.step(frame, (k + 1) * FRAME_NS)
+        sent = dvs.steps(some, t_ns) if at_once > 1 else [dvs.step(some[0], t_ns[0])]
         after = time.perf_counter()
-        if k > WARM_UP_FRAMES:
-            times.append(after - before)
-            total += len(events)
-        del events
+        if first >= WARM_UP_FRAMES:
+            times += [(after - before) / len(some)] * len(some)
+            total += sum(map(len, sent))
+        del sent
         if after - began > seconds and len(times) >= 5:
             break
     return times, total
@@ -224,7 +231,8 @@ def others_core_seconds() -> float:
 def in_own_process(job: Row, settings: Iterable[str], seconds: float) -> Row:
     """`measure` in a new interpreter; the compiled code of each preset is kept in a folder beside the stack."""
     command = [sys.executable, __file__, "--json", "--frames", str(job["stack"]), "--preset", job["preset"]]
-    command += ["--threads", str(job["threads"]), "--seconds", str(seconds)] + ["--still"] * job["still"]
+    command += ["--threads", str(job["threads"]), "--at-once", str(job["at_once"]), "--seconds", str(seconds)]
+    command += ["--still"] * job["still"]
     command += [word for setting in settings for word in ("--set", setting)]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(job["stack"].parent / job["preset"])}
     run = subprocess.run(command, capture_output=True, text=True, env=environment)
@@ -329,6 +337,7 @@ def write_stacks(folder: Path, sizes: Iterable[str], count: int, clip: Path | No
 @click.option("--preset", "presets", multiple=True, type=click.Choice(list(PRESETS)), help="Default: all.")
 @click.option("--size", "sizes", multiple=True, default=SIZES, show_default=True, help="WIDTHxHEIGHT.")
 @click.option("--threads", "threads", multiple=True, type=click.IntRange(1), default=(1, 2), show_default=True)
+@click.option("--at-once", type=click.IntRange(1), default=AT_ONCE, show_default=True, help="Frames given together.")
 @click.option("--clip", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Clip for `video`.")
 @click.option("--count", type=click.IntRange(10), default=200, show_default=True, help="Frames of a stack.")
 @click.option("--rounds", type=click.IntRange(1), default=3, show_default=True)
@@ -337,15 +346,16 @@ def write_stacks(folder: Path, sizes: Iterable[str], count: int, clip: Path | No
 @click.option("--frames", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Measure this .npy once.")
 @click.option("--still", is_flag=True, help="With --frames: its first frame all the time.")
 @click.option("--json", "as_json", is_flag=True, help="JSON instead of tables.")
-def main(presets, sizes, threads, clip, count, rounds, seconds, settings, frames, still, as_json) -> None:
+def main(presets, sizes, threads, at_once, clip, count, rounds, seconds, settings, frames, still, as_json) -> None:
     if frames is not None:
-        row = measure(frames, presets[0] if presets else "ideal", settings, threads[0], still, seconds)
+        row = measure(frames, presets[0] if presets else "ideal", settings, threads[0], still, seconds, at_once)
         click.echo(json.dumps(row) if as_json else "\n".join(f"{key:14} {value}" for key, value in row.items()))
         return
     with tempfile.TemporaryDirectory() as folder:
         stacks = write_stacks(Path(folder), sizes, count, clip)
         combinations = itertools.product(stacks, presets or PRESETS, (True, False), threads)
-        jobs = [dict(zip(("stack", "preset", "still", "threads"), job, strict=True)) for job in combinations]
+        names = ("stack", "preset", "still", "threads")
+        jobs = [dict(zip(names, job, strict=True)) | {"at_once": at_once} for job in combinations]
         first = first_events(jobs, settings)
         medians = summarise(in_rounds(jobs, rounds, settings, seconds))
     found = {"speed": medians, "first_events": first}

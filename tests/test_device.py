@@ -39,11 +39,11 @@ PLAIN = {"overrides": ["random_phase=true", "mismatch=0", "crossing_noise=0", "r
 class Gathering(Dvs):
     """A sensor of a CPU that takes as many frames at a time as one on a card."""
 
-    at_once = FRAMES
     given: ClassVar[list[int]] = []
 
     def __init__(self, *arguments: Any, memory: Any, **options: Any):
         super().__init__(*arguments, **options)
+        self.at_once = FRAMES
 
     def see_all(self, frames: Sequence[Frame]) -> list[Events]:
         assert all(isinstance(frame.light, torch.Tensor) for frame in frames)

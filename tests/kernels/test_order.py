@@ -28,7 +28,7 @@ def test_ordered_by_time_row_column(sizes, last_us, crowded, seed):
     ends = np.cumsum([0, *sizes])
     n, keys = ends[-1], np.empty(ends[-1], np.uint64)
     for k, part in enumerate(parts):
-        order_keys(part, last_us, keys[ends[k] : ends[k + 1]])
+        order_keys(*among_others(part, rng), last_us, keys[ends[k] : ends[k + 1]])
     t, x, y, p, label = (np.full(n, 77, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint8, np.uint8))
     for share in range(len(parts)):
         unpack(keys, ends, share, len(parts), WIDTH, 1000, t, x, y, p, label)
@@ -39,3 +39,16 @@ def test_ordered_by_time_row_column(sizes, last_us, crowded, seed):
     assert np.array_equal(y * np.int64(WIDTH) + x, pixel)
     assert np.array_equal(p, want >> 2 & 1)
     assert np.array_equal(label, want & 3)
+
+
+def among_others(keys, rng):
+    """The keys in runs, some of them empty, between others that are not meant: (all, where runs begin, and end)."""
+    cuts = np.sort(rng.integers(0, len(keys) + 1, rng.integers(0, 4)))
+    runs, begins, ends, count = [], [], [], 0
+    for run in np.split(keys, cuts):
+        others = rng.integers(0, 1 << 63, rng.integers(0, 3), np.uint64)
+        begins.append(count + len(others))
+        count = begins[-1] + len(run)
+        ends.append(count)
+        runs += [others, run]
+    return np.concatenate(runs), np.array(begins), np.array(ends)

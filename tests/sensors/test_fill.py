@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from vid2ev import DvsSpec, UsageError, load_sensor
 from vid2ev.sensors.batch import DvsBatch
 from vid2ev.sensors.dvs import Dvs
+from vid2ev.stream.events import Events
 from vid2ev.views.grid import NetCounts, Windows
 from vid2ev.views.requests import parse_representation
 
@@ -111,6 +112,21 @@ def test_counts_stay_at_the_end_of_their_type() -> None:
         sensor, grid = Dvs(spec, (2, 1)), NetCounts((2, 1), [0, 1000])
         sensor.fill(grid, np.array([[[1.0, 1.0]], [[factor, 1.0]]]), [0, 1_000_000])
         np.testing.assert_array_equal(grid.take(), [[[end, 0]]])
+
+
+def test_the_newest_event_is_the_newest_after_a_flash_of_many_decades() -> None:
+    """Of light that falls by 30 decades little more than rounding is left: the levels reached in it have no times of
+    their own, but an order."""
+    changed = ["timing=response", "photoreceptor_tau_us=300", "follower_tau_us=100", "dark_level=1", "filter=before"]
+    spec = load_sensor("ideal", [*changed, "threshold_on=0.15", "threshold_off=0.15", "max_crossings=4096"])
+    t_ns = [34048913, 34048914, 34048915, 37211192, 37211193, 45870836, 145870836]
+    light = np.float32([0, 1, 1e30, 1, 0, 1, 1])[:, None, None]
+    events = Events.concatenate(Dvs(spec, (1, 1)).steps(light, t_ns))
+    assert len(events) > 900 and len(np.unique(events.t[-20:])) < 10
+    ends = np.unique(events.t)
+    grid = Windows((1, 1), parse_representation("sae"), [[0, end] for end in ends])
+    Dvs(spec, (1, 1)).fill(grid, light, t_ns)
+    np.testing.assert_array_equal(grid.take().max(axis=(1, 2, 3)), ends)
 
 
 def test_what_cannot_be_is_said() -> None:

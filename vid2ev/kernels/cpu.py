@@ -10,7 +10,7 @@ from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, LANE_COUNT, LOW, PITCH, STRIP, stride_of
-from vid2ev.kernels.naps import give_back
+from vid2ev.kernels.naps import AWAKE, give_back, of_frame
 from vid2ev.kernels.rows import RISEN, interval_of_row
 from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
 from vid2ev.kernels.settle import settle_lanes, shift_pixel
@@ -53,20 +53,33 @@ def walk_tile(
     """Advance blocks first_block ... last_block - 1 through some frames; returns the keys of their events.
 
     The light [., pixels] of frame k is in row `row` + k `rows`, its interval in row k of floats and ints
-    (`kernels.rows`); ends[k] becomes how many keys there are after it.
+    (`kernels.rows`).  The blocks go in groups, each through all frames before the next one begins, so that its state
+    stays in the cache: ends [groups, frames] becomes how many keys there are after each frame of each.
     """
     n, pixels = np.int64(0), np.int64(light.shape[1])
-    for k in range(ends.size):
-        if len(flags.leak) and floats[k, RISEN] > 0.0:
-            for pixel in range(first_block * BLOCK, min(last_block * BLOCK, pixels)):
-                shift_pixel(pixel, floats[k, RISEN], planes, flags, num, work)
-        iv = interval_of_row(floats[k], ints[k])
-        out, n = walk_blocks(
-            first_block, last_block, pixels, light[row + k * rows], lut, naps, planes, flags, num, iv, work, out, n,
-            tally,
-        )  # fmt: skip
-        ends[k] = n
+    groups, blocks = ends.shape[0], last_block - first_block
+    for group in range(groups):
+        first, last = first_block + blocks * group // groups, first_block + blocks * (group + 1) // groups
+        for k in range(ends.shape[1]):
+            if len(flags.leak) and floats[k, RISEN] > 0.0:
+                lift(first, last, pixels, floats[k, RISEN], naps, planes, flags, num, work)
+            iv = interval_of_row(floats[k], ints[k])
+            out, n = walk_blocks(
+                first, last, pixels, light[row + k * rows], lut, of_frame(naps, k), planes, flags, num, iv, work, out,
+                n, tally,
+            )  # fmt: skip
+            ends[group, k] = n
     return out
+
+
+@inner
+def lift(first_block, last_block, pixels, risen, naps, planes, flags, num, work):
+    """Take what the leak has risen into the memories of blocks; nobody there sleeps on without having been asked."""
+    first, last = first_block * BLOCK, min(last_block * BLOCK, pixels)
+    for pixel in range(first, last):
+        shift_pixel(pixel, risen, planes, flags, num, work)
+    if naps.wanted:
+        naps.state[first // STRIP : (last + STRIP - 1) // STRIP] = AWAKE
 
 
 @inner

@@ -17,10 +17,13 @@ import numpy as np
 from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernels.layout import BLOCK, LAG1, LAG2, PITCH, STRIP, last_light, stride_of
 from vid2ev.kernels.scan import CLOCK, LIGHT, NEW1, NEW2, NOISE0, NOISE1, SEEN, light_weights
+from vid2ev.stream.still import NOT_SAID
 
 F = np.float32
 AWAKE, NAPS, SLEEPS = range(3)
-HISTORY = 64  # intervals that can be made up for
+AT_ONCE = 16  # intervals that the walk goes through at a time, at most
+LONGEST = 64  # intervals that can be made up for
+HISTORY = LONGEST + AT_ONCE
 AGAIN, COLUMNS = 5, 6  # of the history: x1, x2, g, a, b of an interval, and 1 if those before it are the same
 # Planes of the scratch that nothing else uses: where there is no noise, and of pixels that sleep.
 X1, X2, G = NOISE0, NOISE1, SEEN
@@ -31,14 +34,29 @@ class Naps(NamedTuple):
     """What is known of the sleep of the strips; arrays of strips, but for the history."""
 
     wanted: bool
-    told: np.ndarray  # uint8: whether the light is that of the frame before; empty: nobody knows, and the light tells
+    told: np.ndarray  # uint8 [frames, strips or none]: if light is that of the frame before (`stream.still.told_of`)
     state: np.ndarray  # uint8: AWAKE, NAPS or SLEEPS
     since: np.ndarray  # int64: the first interval that the lags have still to be stepped through; -1: none
     until: np.ndarray  # float64: leak since its reference [nat] up to which the strip may sleep
     calm: np.ndarray  # uint8: whether no signal has further to go than a share of the smallest threshold
+    unasked: np.ndarray  # uint8: intervals for which it stays awake without being asked whether it may sleep
+    patience: np.ndarray  # uint8: how many those were last time
     slept: np.ndarray  # int64, of blocks: intervals that their strips have slept so far
     history: np.ndarray  # float64 [HISTORY, COLUMNS]: interval k is in row k % HISTORY
-    tick: int  # number of this interval
+    tick: int  # number of the first of these intervals
+
+
+@inner
+def of_frame(naps, k):
+    """What is known in frame k of those that the walk goes through: `tick` is its own, and `told` is of its strips, or
+    of none where the light has to tell."""
+    told = naps.told[k]
+    if told.size > 0 and told[0] == NOT_SAID:
+        told = told[:0]
+    return Naps(
+        naps.wanted, told, naps.state, naps.since, naps.until, naps.calm, naps.unasked, naps.patience,
+        naps.slept, naps.history, naps.tick + k,
+    )  # fmt: skip
 
 
 @inner

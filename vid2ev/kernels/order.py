@@ -18,30 +18,33 @@ _NEVER = np.uint64(1 << 36)
 
 
 @compiled
-def order_keys(keys, last_us, ordered):
-    """The keys of a part, whose time is at most last_us, into `ordered`."""
+def order_keys(keys, begins, ends, last_us, ordered):
+    """Those of a part, keys[begins[k] : ends[k]] of all k, into `ordered`; their time is at most last_us."""
     source, shift, left = keys, _TIME, last_us
     places = np.empty(min(last_us, np.int64(_MASK)) + 1, np.int64)
     while True:
-        target = ordered if left <= np.int64(_MASK) else np.empty(keys.size, np.uint64)
-        to_places(source, shift, places)
-        for i in range(source.size):
-            k = np.int64((source[i] >> shift) & _MASK)
-            target[places[k]] = source[i]
-            places[k] += 1
+        target = ordered if left <= np.int64(_MASK) else np.empty(ordered.size, np.uint64)
+        to_places(source, begins, ends, shift, places)
+        for run in range(begins.size):
+            for i in range(begins[run], ends[run]):
+                k = np.int64((source[i] >> shift) & _MASK)
+                target[places[k]] = source[i]
+                places[k] += 1
         if left <= np.int64(_MASK):
             break
         source, shift, left = target, shift + _PASS, left >> np.int64(_PASS)
+        begins, ends = np.zeros(1, np.int64), np.full(1, ordered.size)
     order_pixels(ordered)
 
 
 @inner
-def to_places(keys, shift, places):
+def to_places(keys, begins, ends, shift, places):
     """Where the keys of each digit begin in the order of digits."""
     for k in range(places.size):
         places[k] = 0
-    for i in range(keys.size):
-        places[np.int64((keys[i] >> shift) & _MASK)] += 1
+    for run in range(begins.size):
+        for i in range(begins[run], ends[run]):
+            places[np.int64((keys[i] >> shift) & _MASK)] += 1
     total = np.int64(0)
     for k in range(places.size):
         places[k], total = total, total + places[k]
@@ -78,7 +81,8 @@ def unpack(keys, ends, share, shares, width, first_us, t, x, y, p, label):
 
 @compiled
 def unpack_frames(keys, ends, first_us, width, t, x, y, p, label):
-    """Keys in no order to the arrays of `Events`: those of frame k, which begins at first_us[k], end at ends[k]."""
+    """Keys in no order to the arrays of `Events`: those of run k, of a frame that begins at first_us[k], end at
+    ends[k]."""
     first = np.int64(0)
     for k in range(ends.size):
         last = ends[k]

@@ -11,11 +11,15 @@ before, by what its frame says or by looking, it
 Events that are forced in such a strip go the usual way, their pixels alone: a shot takes the signal as the new memory,
 and a threshold is never so small that what is left of the hull or some leak would reach it (`stir`).
 
+To ask takes time where everything changes.  A strip that was asked in vain, as its light had changed or it was not at
+rest, is not asked in the next interval; after that not in the next three, and from then on only in every eighth.  What
+frames say costs nothing.
+
 The light of the frame before is in the state, as the walk takes it: mended, with shading, or as a level.
 
 The hull contains the signal at all times (`physics.photoreceptor`: the weights of a step are positive and their sum is
 at most 1).  In float32 a lag of the first pole never grows in steady light, rounding included, and one of the second by
-less than 2e-7 of the larger lag in a step, of which a nap has HISTORY at most: that is what SLACK is for.
+less than 2e-7 of the larger lag in a step, of which a nap has LONGEST at most: that is what SLACK is for.
 
 A pixel at, or within rounding of, a level is flagged by every scan, and the slow path finds nothing, because the end of
 the interval before was at the same signal: such a pixel does not keep its strip awake once its lags are too small for
@@ -33,7 +37,7 @@ from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
-from vid2ev.kernels.naps import AWAKE, HISTORY, NAPS, SLEEPS, borrow, catch_up
+from vid2ev.kernels.naps import AWAKE, LONGEST, NAPS, SLEEPS, borrow, catch_up
 from vid2ev.kernels.scan import NEW, NOISE0, STEEP
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.log_curve import log_level_32
@@ -43,6 +47,7 @@ SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
 ROOM = NOISE0  # a plane of the scratch: where pixels sleep there is no noise
 FEW = 32  # pixels
+PATIENCE = np.uint8(7)  # intervals
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
 
 
@@ -55,10 +60,11 @@ def doze(block, scratch, p0, size, theta, naps, flags, num, iv):
     asleep, at = 0, last_light(flags) if len(flags.light_bandwidth) else np.int64(INPUT * PITCH)
     for first in range(0, size, STRIP):
         strip, n = (p0 + first) // STRIP, min(STRIP, size - first)
-        if naps.told.size > 0:
-            same = naps.told[strip] > 0
-        else:
-            same = is_seen(block, at + first, scratch, NEW + first, n, flags, num)
+        if naps.unasked[strip] > 0:  # (awake, and up to date)
+            naps.unasked[strip] -= np.uint8(1)
+            continue
+        told = naps.told.size > 0
+        same = naps.told[strip] > 0 if told else is_seen(block, at + first, scratch, NEW + first, n, flags, num)
         if same:
             if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
                 settle_down(block[first:], scratch[first:], strip, n, theta, naps, flags, num, iv)
@@ -66,9 +72,18 @@ def doze(block, scratch, p0, size, theta, naps, flags, num, iv):
             naps.state[strip] = AWAKE
             if naps.since[strip] >= 0:
                 catch_up(block[first:], scratch[first:], strip, n, naps, flags, num)
-        asleep += np.int64(naps.state[strip] != AWAKE)
+        wakes = naps.state[strip] == AWAKE
+        asleep += np.int64(not wakes)
+        leave_alone(naps.unasked, naps.patience, strip, wakes and (same or not told))
     naps.slept[p0 // BLOCK] += asleep
     return asleep
+
+
+@inner
+def leave_alone(unasked, patience, strip, in_vain):
+    """For how many intervals a strip is not asked again, the longer the more often it was in vain."""
+    unasked[strip] = patience[strip] if in_vain else np.uint8(0)
+    patience[strip] = min(np.uint8(2 * patience[strip] + 1), PATIENCE) if in_vain else np.uint8(0)
 
 
 @inner
@@ -88,7 +103,7 @@ def next_run(first, p0, size, wanted, state):
 def sleeps_on(state, until, since, tick, leak):
     """Whether a strip that keeps its light sleeps, and may go on."""
     # (of numbers: a call with a whole record takes longer than what it asks)
-    return (state != AWAKE) & (until > leak) & ((since < 0) | (tick - since < HISTORY - 1))
+    return (state != AWAKE) & (until > leak) & ((since < 0) | (tick - since < LONGEST))
 
 
 @inner

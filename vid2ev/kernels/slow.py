@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
-from vid2ev.kernels.crossing import AT, LABEL, fresh_thresholds, leave_levels, load_thresholds, send
+from vid2ev.kernels.crossing import AT, LABEL, WHEN, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, lanes_with_more, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
 from vid2ev.kernels.response import batch_times, lane_times, load_responses, next_pieces, prepare_responses
@@ -56,6 +56,9 @@ def slower_rate(flags, iv):
 @inner
 def take_piece(work, count, planes, flags, num, iv, out, n, tally):
     """Events of each lane's piece, the memories in AT: (out, n)."""
+    if len(flags.straight) == 0:
+        for j in range(WHEN, WHEN + count):
+            work.lanes[j] = 0.0
     if len(flags.crossing_noise):
         return drawn_levels(work, count, planes, flags, num, iv, out, n, tally)
     if len(flags.uncounted):
@@ -88,6 +91,7 @@ def send_in_place(work, level, alive, count, planes, flags, num, iv, out, n, tal
         work.levels[j] = work.lanes[level + j]
     b = slower_rate(flags, iv)
     lane_times(work.levels, work.when, work.steps, work.guesses, work.live, alive, count, work.lanes, b, flags, num)
+    in_order(work.when, work.live, alive, work.lanes)
     return send(work.when, work.live, alive, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
 
 
@@ -101,7 +105,16 @@ def send_batch(work, count, planes, flags, num, iv, out, n, tally):
         batch_times(
             work.levels, work.when, work.steps, work.jobs, work.guesses, work.who, count, work.lanes, b, flags, num
         )
+        in_order(work.when, work.who, count, work.lanes)
     return send(work.when, work.who, count, work.lanes, work.pixels, planes, flags, num, iv, out, n, tally)
+
+
+@inner
+def in_order(when, who, count, lanes):
+    """No crossing of a piece is before the last one of its lane, the latest in WHEN: after a flash of many decades
+    levels are nearer to each other than the signal is known, and each has a root of its own in what rounding left."""
+    for k in range(count):
+        lanes[WHEN + who[k]] = when[k] = max(when[k], lanes[WHEN + who[k]])
 
 
 @inner

@@ -74,7 +74,7 @@ class Measure:
             settle_measure(light, self._shade, self._curve, self._half, self._found)
             self._dt_s = math.inf
         else:
-            self._advance(light, told_of(frame.still, self._last), (frame.t_ns - self._t_ns) * 1e-9)
+            self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import BLOCK
+from vid2ev.kernels.naps import AT_ONCE
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.clock import Clock, Step, first_count
@@ -22,7 +25,7 @@ from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.saved import clock, entry
-from vid2ev.stream.still import NOT_TOLD, Still, told_of
+from vid2ev.stream.still import Still, nothing_told, told_of
 
 if TYPE_CHECKING:
     from vid2ev.views.grid import Grid
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
-FRAMES = 16  # at a time: as many keys as stay in the cache
+AT_ONCE_PX, MOST = 1 << 22, 8  # pixels of frames that wait until they are seen together, and how many frames
 
 
 class Dvs:
@@ -52,8 +55,6 @@ class Dvs:
     Events of a step depend on the earlier frames only through the state, which `state` gives and `restore` takes.
     """
 
-    at_once = 1  # frames that are best given together, to `see_all`
-
     def __init__(
         self,
         spec: DvsSpec,
@@ -73,6 +74,7 @@ class Dvs:
         self._intake = Intake(self.size, transfer)
         self._pixels = Pixels(self.size, labels, threads, skip, part)
         self._first_ns = origin_ns
+        self.at_once = max(1, min(MOST, AT_ONCE_PX // (size[0] * size[1])))
         self._be(spec, seed, camera)
 
     def _be(self, spec: DvsSpec, seed: int, camera: int) -> None:
@@ -111,14 +113,14 @@ class Dvs:
             return self.restart(light, t_ns)
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
-        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of(still, self._seen))
+        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of([still], [self._seen]))
         self._seen = light
-        return self._passed_on(sent.ordered(0, self._pixels.tiles.each), t_ns)
+        return self._in_order(sent, 0, t_ns)
 
     def steps(self, light: np.ndarray, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames].
 
-        Faster than that if `skip` is off: some frames go through the walk at a time.
+        Faster than that: some frames go through the walk at a time.
         """
         return self.steps_of(np.asarray(light)[:, None], 0, t_ns)
 
@@ -176,8 +178,15 @@ class Dvs:
         return self.step(frame.light, frame.t_ns, frame.still)
 
     def see_all(self, frames: Sequence[Frame]) -> list[Events]:
-        """`see` for each frame."""
-        return [self.see(frame) for frame in frames]
+        """`see` for each frame.  Faster than that: frames of one shot go through the walk together.
+
+        Best are `at_once` at a time, of linear light.
+        """
+        sent: list[Events] = []
+        while rest := frames[len(sent) :]:
+            shot = list(takewhile(partial(_goes_on, rest[0].light.dtype), rest)) if self._t_ns is not None else []
+            sent += self._see_shot(shot[:AT_ONCE]) if len(shot) > 1 else [self.see(rest[0])]
+        return sent
 
     def run(self, frames: Iterable[Frame]) -> Iterator[Events]:
         """`see` for each frame, and `flush` at the end: one Events per frame, the empty ones too, and the rest."""
@@ -284,7 +293,7 @@ class Dvs:
             yield Events.empty(self.labels)  # (of the frame in which it settles)
         for sent, times in self._through(light, clip, t_ns):
             for k, t in enumerate(times):
-                yield self._passed_on(sent.ordered(k, self._pixels.tiles.each), t)
+                yield self._in_order(sent, k, t)
 
     def _through(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[tuple[Sent, list[int]]]:
         """What is sent in the frames of a clip of light [frames, clips, height, width], some at a time; their times."""
@@ -292,12 +301,27 @@ class Dvs:
             self.restart(light[0, clip], t_ns[0])
             light, t_ns = light[1:], t_ns[1:]
         flat, table = self._light(light)
-        clips, some = light.shape[1], 1 if self._pixels.sleep.naps.wanted else FRAMES
-        for first in range(0, len(t_ns), some):
-            times = t_ns[first : first + some]
-            steps = self._steps_to(times)
-            yield self._pixels.walk(flat, first * clips + clip, clips, table, steps, NOT_TOLD), times
+        clips = light.shape[1]
+        for first in range(0, len(t_ns), AT_ONCE):
+            times = t_ns[first : first + AT_ONCE]
+            steps, told = self._steps_to(times), nothing_told(len(times))
+            yield self._pixels.walk(flat, first * clips + clip, clips, table, steps, told), times
         self._seen = None
+
+    def _see_shot(self, frames: Sequence[Frame]) -> list[Events]:
+        """`see_all` of some frames after each other, at most AT_ONCE."""
+        lights, t_ns = [frame.light for frame in frames], [frame.t_ns for frame in frames]
+        for light in lights:
+            self._intake.check(np.shape(light))
+        flat, table = self._light(np.array(lights))
+        told = told_of([frame.still for frame in frames], [self._seen, *lights[:-1]])
+        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to(t_ns), told)
+        self._seen = lights[-1]
+        return [self._in_order(sent, k, t) for k, t in enumerate(t_ns)]
+
+    def _in_order(self, sent: Sent, frame: int, t_ns: int) -> Events:
+        """The events of a frame of those that went through the walk together."""
+        return self._passed_on(sent.ordered(frame, self._pixels.tiles.each), t_ns)
 
     def _passed_on(self, events: Events, t_ns: int) -> Events:
         """What of the events up to t_ns is sent by then, through all that comes behind the comparator."""
@@ -311,3 +335,8 @@ class Dvs:
         on = int(np.count_nonzero(events.p))
         self._polarities += (len(events) - on, on)
         return events
+
+
+def _goes_on(kind: np.dtype, frame: Frame) -> bool:
+    """Whether a frame may go through the walk with those before it, whose light is of a kind."""
+    return not frame.cut and frame.light.dtype == kind

@@ -34,8 +34,6 @@ class DvsOnCard(Dvs):
     Light may be a tensor of torch, on the device or not; it is then linear and floating point.
     """
 
-    at_once = FRAMES
-
     def __init__(
         self,
         spec: DvsSpec,
@@ -50,7 +48,7 @@ class DvsOnCard(Dvs):
     ):
         options: dict[str, Any] = {"labels": labels, "transfer": transfer, "origin_ns": origin_ns}
         super().__init__(spec, size, seed, camera=camera, skip=False, **options)
-        self._memory = memory
+        self._memory, self.at_once = memory, FRAMES
         self._load()
 
     def _load(self) -> None:

@@ -14,7 +14,7 @@ from vid2ev.kernels.work import new_work
 from vid2ev.sensors.clock import Step, as_counted
 from vid2ev.sensors.compiled import flags_at_rest, flags_of, numbers_of, planes_of
 from vid2ev.sensors.inside import Inside, inside_of, maps_of
-from vid2ev.sensors.sent import Sent
+from vid2ev.sensors.sent import Keys, Sent
 from vid2ev.sensors.sleep import Sleep
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part, Tiles
@@ -22,6 +22,7 @@ from vid2ev.stream.saved import entry
 from vid2ev.stream.still import strip_count
 
 STATE_PLANES = ("fast", "rest", "memory", "drawn", "t_last", "count", "t_reset")
+GROUP = 8  # blocks, of whose pixels each takes 20 to 60 bytes of a cache that has about a million
 TALLIED = (("swallowed", SWALLOWED), ("capped", CAPPED), ("not_finite", NOT_FINITE))
 
 
@@ -72,24 +73,23 @@ class Pixels:
         self.planes.t_last[...] = max(t_ns - self.numbers.refractory_ns - 1, np.iinfo(np.int64).min)
 
     def walk(self, light: np.ndarray, row: int, rows: int, table: np.ndarray, steps: list[Step], told: Any) -> Sent:
-        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; one, if strips sleep."""
-        self.sleep.begin(steps[0][0], told)
-        if any(risen > 0.0 for _, risen in steps):
-            self.sleep.wake()
+        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; `told`: see `Naps`."""
+        intervals = [interval for interval, _ in steps]
+        self.sleep.begin(intervals, told)
         floats, ints = interval_rows(steps)
         light = only_read(light)
-        ends = np.zeros((self.tiles.count, len(steps)), np.int64)
 
-        def walk(k: int, first: int, last: int) -> np.ndarray:
+        def walk(k: int, first: int, last: int) -> Keys:
+            ends = np.zeros((-(-(last - first) // GROUP) if len(steps) > 1 else 1, len(steps)), np.int64)
             self._buffers[k] = walk_tile(
                 first, last, light, row, rows, table, self.sleep.naps, self.planes, self.flags, self.numbers,
-                floats, ints, ends[k], self._work[k], self._buffers[k], self.tallies[k],
+                floats, ints, ends, self._work[k], self._buffers[k], self.tallies[k],
             )  # fmt: skip
-            return self._buffers[k][: ends[k, -1]]
+            return Keys(self._buffers[k], ends)
 
         parts = self.tiles.each_blocks(walk)
-        self.sleep.end()
-        return Sent(parts, ends, [interval for interval, _ in steps], self.size[0], self._labels)
+        self.sleep.end(len(steps))
+        return Sent(parts, intervals, self.size[0], self._labels)
 
     def state(self) -> dict[str, np.ndarray]:
         """All that later events depend on and that is in the pixels, and what was tallied (copies)."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,38 +16,55 @@ from vid2ev.stream.events import Events
 WORTH_THREADS = 1 << 15  # events that take longer to put in order than threads take to wake
 
 
+class Keys(NamedTuple):
+    """Keys of events of some pixels (`kernels.crossing`), group after group of them, each frame after frame."""
+
+    keys: np.ndarray  # uint64; there may be more, which mean nothing
+    ends: np.ndarray  # int64 [groups, frames], how many there are after each frame of each group
+
+    def runs(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Where those of a frame begin and end in each group."""
+        begins = self.ends.ravel()[frame - 1 :: self.ends.shape[1]] if frame else np.append(0, self.ends[:-1, -1])
+        return begins[: len(self.ends)].copy(), self.ends[:, frame].copy()
+
+
 @dataclass(frozen=True)
 class Sent:
-    """Keys of events of some frames (`kernels.crossing`), in parts of pixels; those of a pixel are in order of time."""
+    """What is sent in some frames, in parts of pixels; keys of one pixel are in order of time."""
 
-    parts: list[np.ndarray]  # uint64, frame after frame
-    ends: np.ndarray  # int64 [parts, frames], how many of a part there are after each frame
+    parts: list[Keys]
     intervals: list[Interval]
     width: int
     labels: bool
 
     def ordered(self, frame: int, each: Callable) -> Events:
         """The events of a frame; `each` does a work for all numbers of parts, at the same time."""
-        begins = self.ends[:, frame - 1] if frame else np.zeros(len(self.parts), np.int64)
-        parts = [part[a:b] for part, a, b in zip(self.parts, begins, self.ends[:, frame], strict=True)]
-        ends = np.cumsum([0, *map(len, parts)])
-        n, count, interval = int(ends[-1]), len(parts), self.intervals[frame]
+        runs = [part.runs(frame) for part in self.parts]
+        ends = np.cumsum([0, *(int((stops - begins).sum()) for begins, stops in runs)])
+        n, count, interval = int(ends[-1]), len(runs), self.intervals[frame]
         if n == 0:
             return Events.empty(self.labels)
-        keys = np.empty(n, np.uint64)
+        keys = self._keys[:n]
         t, x, y, p, label = self._room(n)
         work = each if n > WORTH_THREADS else lambda part: [part(k) for k in range(count)]
-        work(lambda k: order_keys(parts[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
+        work(lambda k: order_keys(self.parts[k].keys, *runs[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
         work(lambda k: unpack(keys, ends, k, count, self.width, interval.first_us, t, x, y, p, label))
         return Events(t, x, y, p, label if self.labels else None)
 
     def unordered(self) -> Iterator[Events]:
         """The events of all frames, part by part; in order of time are those of a pixel alone."""
         first_us = np.array([interval.first_us for interval in self.intervals], np.int64)
-        for keys, ends in zip(self.parts, self.ends, strict=True):
-            t, x, y, p, label = self._room(len(keys))
-            unpack_frames(keys, ends, first_us, self.width, t, x, y, p, label)
+        for keys, ends in self.parts:
+            t, x, y, p, label = self._room(int(ends[-1, -1]))
+            since_us = np.tile(first_us, len(ends))
+            unpack_frames(keys[: len(t)], ends.ravel(), since_us, self.width, t, x, y, p, label)
             yield Events(t, x, y, p, label if self.labels else None)
+
+    @cached_property
+    def _keys(self) -> np.ndarray:
+        """Room for those of any frame."""
+        counts = sum(np.diff(part.ends.ravel(), prepend=0).reshape(part.ends.shape).sum(axis=0) for part in self.parts)
+        return np.empty(int(np.max(counts)), np.uint64)
 
     def _room(self, n: int) -> tuple[np.ndarray, ...]:
         u16, u8 = np.uint16, np.uint8
