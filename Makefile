@@ -1,6 +1,7 @@
-# make demo   install into .venv and convert the clip in examples/
-# make test   the tests, in the same environment
-# make lint   style, format and types
+# make demo        install into .venv and convert the clip in examples/
+# make test        the tests of every day, in the same environment
+# make test-long   those that kill programs, play GPUs, draw sensors at random or train
+# make lint        style, format and types
 
 PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11; do \
 	$$python -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
@@ -9,7 +10,7 @@ PYTEST_FLAGS ?= -n auto --dist loadfile
 BIN := .venv/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint clean
+.PHONY: demo test test-long lint clean
 
 demo: .venv/core
 	$(BIN)/vid2ev convert examples/demo.mp4 -o demo_events --overwrite
@@ -18,6 +19,9 @@ demo: .venv/core
 # (bytecode is kept: some hundred processes are started, and all of them import the same)
 test: .venv/dev
 	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest $(PYTEST_FLAGS)
+
+test-long: .venv/dev
+	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest $(PYTEST_FLAGS) -m "long and not slow"
 
 lint: .venv/dev
 	$(BIN)/ruff check --no-cache .

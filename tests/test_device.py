@@ -30,6 +30,8 @@ from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.upload import downloaded
 
+pytestmark = pytest.mark.long
+
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"
 NOISY = ["shot_rate_hz=20", "leak_rate_hz=1", "hot_probability=0.01", "hot_rate_hz=200"]
 OPTIONS: dict[str, Any] = {"upsample": "linear", "subframes": 3, "seed": 5, "labels": True, "threads": 1}

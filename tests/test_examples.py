@@ -24,6 +24,8 @@ from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.devices import missing_for_cuda
 from vid2ev.sources.with_depth import parse_depth
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[1]
 FROM_V2E, CAMERAS = ROOT / "docs" / "from_v2e.md", ROOT / "docs" / "cameras.md"
 

@@ -15,7 +15,10 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 SLOW = {"saved-recording": 4, "saved-frames": 4, "recordings": 4, "weights": 15, "meshes": 15, "scene": 15}
 SOME = 30  # of the others
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time are set as on Linux")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time are set as on Linux"),
+]
 
 
 def names() -> list[str]:

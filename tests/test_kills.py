@@ -11,7 +11,10 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and killed, as on Linux")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and killed, as on Linux"),
+]
 
 
 @pytest.mark.parametrize("commands", [["convert", "interpolate"], ["eval"]])

@@ -62,7 +62,7 @@ with tempfile.TemporaryDirectory() as folder:
     convert({CLIP!r}, folder + "/out", **{OPTIONS!r})
 """
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
 
 def run(directory: Path, killed_at: int = 0, **changed: object) -> subprocess.CompletedProcess[str]:

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from killed import converted
 
+pytestmark = pytest.mark.long
+
 CLIP = "synthetic:moving-edge,size=640x32,fps=100,duration_s=0.12"
 OPTIONS = {
     "overrides": ["shot_rate_hz=2"],

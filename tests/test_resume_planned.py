@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from killed import converted
 
+pytestmark = pytest.mark.long
+
 SIZE = (40, 30)
 FEW_HELD = f"from vid2ev.plan import planner; planner.HELD = {10 * SIZE[0] * SIZE[1] * 4}\n"
 OPTIONS = {

@@ -21,6 +21,8 @@ from vid2ev.formats import read_events
 from vid2ev.split import convert_split
 from vid2ev.stream.events import Events
 
+pytestmark = pytest.mark.long
+
 PROBED = ("90,60", "3,4", "50,10")
 FILES = ("events.h5", "preview.mp4", "noise_maps.npz")
 

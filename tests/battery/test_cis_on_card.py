@@ -23,6 +23,8 @@ from vid2ev.stream.frames import Frame
 
 from .card_memories import Tensors, memories
 
+pytestmark = pytest.mark.long
+
 SIZE = (9, 5)
 EVERYTHING: dict[str, Any] = {
     "exposure_us": 23_000, "line_us": 900, "shot_noise": True, "read_noise_e": 3, "prnu": 0.02, "dsnu": 4,

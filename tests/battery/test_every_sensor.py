@@ -16,6 +16,8 @@ from vid2ev.stream import Events
 from .combinations import Sensor, everyday, slow_ones
 from .drawn_clips import SIZE, Clip, clips
 
+pytestmark = pytest.mark.long
+
 NAT = 4e-6  # what float32 lets a level be off, and the margin of the scan
 sensors = pytest.mark.parametrize("sensor", everyday(), ids=lambda sensor: sensor.name)
 

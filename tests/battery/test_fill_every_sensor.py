@@ -18,6 +18,8 @@ from vid2ev.views.voxel import Voxel
 from .combinations import Sensor, everyday
 from .drawn_clips import SIZE, Clip, clips
 
+pytestmark = pytest.mark.long
+
 
 def two_of_each(times_us: list[int], windows_us: list[list[int]]) -> list[tuple]:
     """Grids with edges and windows at these times, twice."""

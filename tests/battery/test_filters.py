@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 
 from vid2ev.stream import Events
 
+pytestmark = pytest.mark.long
+
 NAT = 1e-6
 
 

@@ -13,6 +13,8 @@ from vid2ev.stream import Events
 
 from .combinations import DEAD, TWO_POLES
 
+pytestmark = pytest.mark.long
+
 NAT, US = 1e-6, 1
 LINES = {
     "nothing": {},

@@ -10,6 +10,8 @@ from vid2ev.sensors.dvs import DvsSpec
 
 from .combinations import TWO_POLES
 
+pytestmark = pytest.mark.long
+
 SENSORS = {
     "ideal": clean(filter="after", threshold_on=1e-3, threshold_off=1e-3),
     "two poles": clean(**TWO_POLES, filter="after", threshold_on=1e-3, threshold_off=1e-3),

@@ -14,6 +14,8 @@ from vid2ev.stream import Events
 
 from .combinations import DEAD, TWO_POLES
 
+pytestmark = pytest.mark.long
+
 SHAPE = (3, 4)
 UNEVEN = 1 - 1e-4 * math.pi
 AFTER = {

@@ -37,6 +37,8 @@ from .card_memories import memories
 from .combinations import COMPILED
 from .drawn_clips import SIZE, Clip, clips
 
+pytestmark = pytest.mark.long
+
 QUICK = ("paper",)
 
 

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from vid2ev.physics.crossing_noise import noisy_thresholds
 from vid2ev.physics.mismatch import FLOOR, clipped, fill_thresholds, reached_spread
 
+pytestmark = pytest.mark.long
+
 MEAN = 0.2
 
 

@@ -18,6 +18,8 @@ from vid2ev.cluster.task import Task
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 
+pytestmark = pytest.mark.long
+
 CLIP = "synthetic:moving-edge,size=32x24,fps=100,duration_s=0.3"
 QUICK: dict[str, Any] = {"upsample": "none", "preview": False, "threads": 1, "piece": 1}
 

@@ -117,6 +117,7 @@ def test_odd_values_in_the_first_frame(odd):
     assert (sent.p == (change > 0)).all()
 
 
+@pytest.mark.long  # (its kernel is nobody else's, and has everything in it)
 def test_odd_values_with_every_effect_on_stay_finite():
     rng = np.random.default_rng(2)
     light = 10 ** rng.uniform(-6, 6, (14, 33, 35))

@@ -23,6 +23,8 @@ from interp.data.sequences import Sequences
 from interp.data.settings import ClipSettings
 from vid2ev.errors import DataError, UsageError
 
+pytestmark = pytest.mark.long
+
 TINY = ClipSettings(size=(32, 32), scenes=0.0, photographs=1.0, sensors=SENSORS["clean"])
 SMALL = SampleSettings(size=24)
 

@@ -20,6 +20,8 @@ from interp.data.simulate import Light, simulated, steps_for
 from vid2ev import DvsSpec, load_cis, load_sensor
 from vid2ev.stream.frames import LUMINANCE
 
+pytestmark = pytest.mark.long
+
 GAP_US = 32_000
 SMALL = ClipSettings(size=(48, 32), sensors=SENSORS["clean"], scene_names=("spinning-shapes",))
 # (phases and noise are functions of the pixel's number: without them the world may be turned around)

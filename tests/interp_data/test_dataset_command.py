@@ -22,6 +22,8 @@ from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
 
+pytestmark = pytest.mark.long
+
 QUICK = {"count": 2, "size": (32, 24), "frames": 2}
 
 

@@ -21,6 +21,8 @@ from vid2ev.cluster.task import Task
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 
+pytestmark = pytest.mark.long
+
 BASELINES = ("linear", "bridge")
 
 

@@ -20,7 +20,7 @@ from interp.networks import make
 from interp.weights import save
 from vid2ev.errors import UsageError
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
 WARM = """
 import torch

@@ -10,6 +10,8 @@ from small_run import in_a_process, kept, session
 
 from vid2ev.errors import UsageError
 
+pytestmark = pytest.mark.long
+
 
 def test_two_processes_learn_what_one_does(tmp_path: Path) -> None:
     session(tmp_path / "one", steps=3)

@@ -15,7 +15,7 @@ from small_run import STEPS_OF_RUN, in_a_process, kept, session
 
 from interp.train.curves import read_curve
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
 
 @pytest.fixture(scope="module")

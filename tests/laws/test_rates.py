@@ -14,6 +14,8 @@ from against.clips import clean, feed, hold, noisy, per_pixel, play, start, unev
 
 from vid2ev.stream import Events
 
+pytestmark = pytest.mark.long
+
 SHAPE = (64, 64)
 PIXELS = SHAPE[0] * SHAPE[1]
 SLOW_NS, FAST_NS = 10_000_000, 100_000  # 100 Hz and 10 kHz frames

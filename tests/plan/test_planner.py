@@ -24,6 +24,8 @@ from vid2ev.stream import Events
 
 from .clips import distance
 
+pytestmark = pytest.mark.long
+
 SIZE = (40, 30)
 SPEC = clean(photoreceptor_tau_us=300, follower_tau_us=100, random_phase=True)
 QUIET: dict[str, Any] = {"upsample": "none", "preview": False, "fps": 200, "cuts": "keep"}

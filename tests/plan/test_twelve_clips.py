@@ -17,6 +17,8 @@ from vid2ev.sensors.spec import DvsSpec
 from .clips import MADE, REAL, SCENES, UNSEEN, is_there
 from .trials import drawn, hold, table, tried
 
+pytestmark = pytest.mark.long
+
 PAPER = DvsSpec().model_dump()
 SENSORS = {
     "poles": DvsSpec(**(PAPER | {"mismatch": 0, "crossing_noise": 0, "refractory_us": 0})),

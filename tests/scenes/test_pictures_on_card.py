@@ -23,6 +23,8 @@ from vid2ev.scenes.snapshot import Lamp, Mesh, Shape, Snapshot, Surface, Texture
 from vid2ev.scenes.source import open_scene
 from vid2ev.scenes.world import World
 
+pytestmark = pytest.mark.long
+
 CAMERA = Intrinsics.of_field((14, 14), 80)  # (with its margin one tile: of each thread the simulator makes one)
 LENS = Intrinsics(
     size=(14, 14), focal_px=(9, 9), centre_px=(6.5, 7), model="radtan", distortion=(-0.3, 0.05, 0.001, -0.002)
