@@ -83,7 +83,7 @@ def test_together_or_one_by_one(spec, seed, told, skip, threads, some):
 def test_how_many_are_best_together_depends_on_their_size():
     assert Dvs(SENSORS["ideal"], (64, 48)).at_once == MOST
     assert Dvs(SENSORS["ideal"], (AT_ONCE_PX // 1024 // 3, 1024)).at_once == 3
-    assert Dvs(SENSORS["ideal"], (8192, 1024)).at_once == 1
+    assert Dvs(SENSORS["ideal"], (8192, 2048)).at_once == 1
 
 
 def test_codes_and_light_do_not_go_together():

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Dvs", "DvsSpec"]
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
-AT_ONCE_PX, MOST = 1 << 22, 8  # pixels of frames that wait until they are seen together, and how many frames
+AT_ONCE_PX, MOST = 1 << 23, 8  # pixels of frames that wait until they are seen together, and how many frames
 
 
 class Dvs:
@@ -74,7 +74,7 @@ class Dvs:
         self._intake = Intake(self.size, transfer)
         self._pixels = Pixels(self.size, labels, threads, skip, part)
         self._first_ns = origin_ns
-        self.at_once = max(1, min(MOST, AT_ONCE_PX // (size[0] * size[1])))
+        self.at_once = max(1, min(MOST, AT_ONCE_PX // (size[0] * size[1])))  # frames best given together to `see_all`
         self._be(spec, seed, camera)
 
     def _be(self, spec: DvsSpec, seed: int, camera: int) -> None:
