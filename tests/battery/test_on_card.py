@@ -133,6 +133,17 @@ def test_frames_with_cuts_and_with_what_is_still_are_run_as_on_a_cpu():
 
 
 @memories
+def test_frames_seen_together_are_those_seen_one_by_one(memory):
+    """With cuts, one of them behind the first frame, in arrays of the host."""
+    light = np.exp(np.random.default_rng(8).normal(0, 0.7, (23, *SIZE[::-1]))).astype(np.float32)
+    frames = [Frame(light[k], 10**6 * k, cut=k in (1, 4)) for k in range(len(light))]
+    cpu, card = both("paper", Clip(np.zeros(1), light, 0, 3), memory)
+    assert_same([cpu.see(frame) for frame in frames], card.see_all(frames))
+    assert cpu.counts == card.counts
+    assert_same_state(cpu, card)
+
+
+@memories
 @two_specs
 def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(name, memory):
     rng, base, labels = np.random.default_rng(4), COMPILED[name].model_dump(), LABELS[name]

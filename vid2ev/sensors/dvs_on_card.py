@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,22 +77,14 @@ class DvsOnCard(Dvs):
             sent += self._some(light[some], [int(t) for t in t_ns[some]])
         return sent
 
-    def see_all(self, frames: Sequence[Frame]) -> list[Events]:
-        """`Dvs.see_all`, those of a shot together."""
-        sent: list[Events] = []
-        while rest := frames[len(sent) :]:
-            if rest[0].cut:
-                sent.append(self.restart(rest[0].light, rest[0].t_ns))
-                continue
-            shot = list(takewhile(lambda frame: not frame.cut, rest))
-            light = self._memory.joined([self._memory.light(frame.light)[None] for frame in shot])
-            sent += self.steps(light, [frame.t_ns for frame in shot])
-        return sent
-
     def fill(self, grid: Grid, light: Any, t_ns: Sequence[int]) -> None:
         """`Dvs.fill`; `DvsBatchOnCard.fill` leaves the grids on the device."""
         for events in self.steps(light, t_ns):
             grid.add(events)
+
+    def _see_shot(self, frames: Sequence[Frame]) -> list[Events]:
+        light = self._memory.joined([self._memory.light(frame.light)[None] for frame in frames])
+        return self.steps(light, [frame.t_ns for frame in frames])
 
     def _some(self, light: Any, t_ns: list[int]) -> list[Events]:
         seen, _ = self._light(light)
