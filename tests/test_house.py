@@ -34,6 +34,7 @@ FLOORS = {
     "kernel_extending": 0,
     "kernel_intrinsics": 1,
     "kernel_compiler": 1,
+    "kernel_elsewhere": 1,
     "stream": 1,
     "pictures": 1,
     "light": 2,

@@ -20,7 +20,7 @@ from typing import Any
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
-_COMPILED = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream", "upsample")
+_COMPILED = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream")
 _MARK = uuid.uuid4().hex[:8]
 
 

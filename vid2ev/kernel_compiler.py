@@ -11,7 +11,7 @@ kernels call is here made ready to be inlined, and no more, also where Python ca
 `with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
 **Caches.** numba compiles a function again where its own file has changed, but not where one has that it calls.  Here
-a kernel is of one version of all files that kernels are made of.
+a kernel is of one version of all files that kernels are made of, and of those beside its own.
 
 **Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
 """
@@ -87,15 +87,16 @@ def _for_python_and_kernels(function: Callable, options: dict[str, Any]) -> Any:
 
 def of_this_version(dispatcher: Any) -> Any:
     """The same; what was compiled of other files is compiled again."""
-    dispatcher._cache._cache_file._source_stamp = source_stamp()
+    dispatcher._cache._cache_file._source_stamp = source_stamp(Path(dispatcher.py_func.__code__.co_filename).parent)
     return dispatcher
 
 
 @functools.cache
-def source_stamp() -> tuple[tuple[str, int, int], ...]:
-    """Names, times and sizes of the files that kernels are made of."""
+def source_stamp(room: Path) -> tuple[tuple[str, int, int], ...]:
+    """Names, times and sizes of the files that the kernels of a folder are made of."""
     package = Path(__file__).parent
-    files = [*package.glob("kernel_*.py"), *(each for part in MADE_OF for each in (package / part).glob("*.py"))]
+    rooms = {*(package / part for part in MADE_OF), room}
+    files = [*package.glob("kernel_*.py"), *(each for part in rooms for each in part.glob("*.py"))]
     return tuple(sorted((file.name, (stat := file.stat()).st_mtime_ns, stat.st_size) for file in files))
 
 

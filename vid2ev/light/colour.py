@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.light.luminance import F, Steps, YuvCode, chroma_row, places
 
 
@@ -38,7 +38,7 @@ def rgb_of_rgb(
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _yuv(y, u, v, halvings, steps, table, to_bt709, out):
     scale, offset, neutral, per_cb, per_cr = steps
     height, width, _ = out.shape
@@ -59,7 +59,7 @@ def _yuv(y, u, v, halvings, steps, table, to_bt709, out):
             _mix(light[0, x], light[1, x], light[2, x], to_bt709, out[row, x])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _rgb(red, green, blue, table, to_bt709, out):
     last = np.uintp(table.size - 1)  # (a damaged file may hold codes beyond its depth)
     for row in range(out.shape[0]):
@@ -70,7 +70,7 @@ def _rgb(red, green, blue, table, to_bt709, out):
             _mix(r, g, b, to_bt709, out[row, x])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _mix(r, g, b, to_bt709, out):
     for channel in range(3):
         out[channel] = to_bt709[channel, 0] * r + to_bt709[channel, 1] * g + to_bt709[channel, 2] * b

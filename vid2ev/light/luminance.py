@@ -24,8 +24,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.light.transfer import parse_transfer
 
 STEPS, FINE_STEPS = 4096, 32768  # table entries per unit of signal
@@ -124,7 +124,7 @@ def luminance_of_rgb(
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
     """One row of chroma, less its neutral value, at the places of luma; `column` is room for the row before."""
     centre = (row + 0.5) / (1 << halvings_y) - 0.5
@@ -142,7 +142,7 @@ def chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
             out[(i << halvings_x) + phase] = column[i] + (column[i + 1] - column[i]) * share
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def places(luma, scale, offset, cb, per_cb, cr, per_cr, top, entry, share):
     """Where in the table the signals of a channel lie, along a row: the entry below, the share of the one above."""
     for x in range(entry.size):
@@ -155,7 +155,7 @@ def places(luma, scale, offset, cb, per_cb, cr, per_cr, top, entry, share):
 
 
 # Places first and look-ups after: the first loop runs in vectors, which a loop with a look-up in it cannot.
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _yuv(y, u, v, halvings, steps, tables, out):
     scale, offset, neutral, per_cb, per_cr = steps
     height, width = out.shape
@@ -180,7 +180,7 @@ def _yuv(y, u, v, halvings, steps, tables, out):
             out[row, x] = light
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _rgb(red, green, blue, table, weights, out):
     height, width = out.shape
     last = np.uintp(table.size - 1)  # (a damaged file may hold codes beyond its depth)

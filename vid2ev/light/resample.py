@@ -15,7 +15,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_compiler import compiled, inner
 
 
 class Taps(NamedTuple):
@@ -59,7 +60,7 @@ def _line(centre: Fraction, length: int) -> tuple[int, list[float]]:
     return below, [1.0] if place == below else [float(1 - (place - below)), float(place - below)]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _resample(light, rows, columns, out):
     first_row, row_count, row_weights = rows
     first_column, column_count, column_weights = columns
@@ -71,7 +72,7 @@ def _resample(light, rows, columns, out):
             _add_columns(row, c, channels, first_column, column_count, column_weights, out[j, :, c])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _add_lines(lines, first, weights, row):
     """The weighted sum of lines from the first one on."""
     row[:] = 0
@@ -81,7 +82,7 @@ def _add_lines(lines, first, weights, row):
             row[x] += weight * line[x]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _add_columns(row, channel, channels, first, counts, weights, out):
     """The weighted sums of the pixels of a row, in one of its channels."""
     flat, most, next_pixel = weights.reshape(-1), np.uintp(weights.shape[1]), np.uintp(channels)

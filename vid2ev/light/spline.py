@@ -18,8 +18,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.light.resample import Taps, resampled
 
 
@@ -54,7 +54,7 @@ def spline_taps(length: int, begin: float, step: float, outputs: int) -> Taps:
     return Taps(first, np.minimum(most, length - first), weights)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _weights(place, width, length, weights):
     """Weights about a place, those beyond the border moved on to it; the first pixel they are for."""
     low = int(np.floor(place - 2 * width - 0.5)) + 1
@@ -71,7 +71,7 @@ def _weights(place, width, length, weights):
     return first
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _taps(length, begin, step, firsts, weights):
     row = np.empty(weights.shape[1], np.float64)
     for i in range(firsts.size):
@@ -79,7 +79,7 @@ def _taps(length, begin, step, firsts, weights):
         weights[i] = row
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _turned(photograph, centre_x, centre_y, along, across, step, out):
     height, width, channels = out.shape
     rows, columns, _ = photograph.shape

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.pictures.colours import MOST, NEUTRAL, codes, event_colours
 
 EACH = MOST + 1  # counts of a polarity that are told apart
@@ -24,7 +24,7 @@ def reduced(light: np.ndarray, across: int, down: int) -> np.ndarray:
     return gray
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _gray(light, grays, gray):  # type: ignore[no-untyped-def]
     zero, one, most = np.float32(0), np.float32(1), np.float32(65535)
     for i in range(light.shape[0]):
@@ -33,7 +33,7 @@ def _gray(light, grays, gray):  # type: ignore[no-untyped-def]
             gray[i, j] = grays[np.uint16((shown if shown < one else one) * most)]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def count(x, y, p, column, row, counts):  # type: ignore[no-untyped-def]
     """Add events to counts [polarity, down, across], those of pixel (x, y) at (column[x], row[y])."""
     for i in range(len(x)):
@@ -42,7 +42,7 @@ def count(x, y, p, column, row, counts):  # type: ignore[no-untyped-def]
             counts[polarity, down, across] += 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-untyped-def]
     """Fill luma [height, 2 width] and chroma [2, height / 2, width]: gray in the left half, counts in the right.
 
@@ -67,7 +67,7 @@ def paint(gray, counts, colours, enlarged, luma, chroma):  # type: ignore[no-unt
             _tint(seen[0], seen[1], tints, colours[0, 0], u_row, v_row)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _look(gray, off, on, columns, codes, shown, left, right):  # type: ignore[no-untyped-def]
     """Luma of a row of both panels, and the codes of its counts."""
     for j in range(columns.size):
@@ -76,7 +76,7 @@ def _look(gray, off, on, columns, codes, shown, left, right):  # type: ignore[no
         codes[j], left[j], right[j] = code, gray[column], shown[code]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _tint(upper, lower, tints, ground, u_row, v_row):  # type: ignore[no-untyped-def]
     """Chroma of two rows of codes."""
     two, one = np.uintp(2), np.uintp(1)

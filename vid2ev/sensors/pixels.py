@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.kernel_elsewhere import Elsewhere
 from vid2ev.kernels.cpu import settle_tile, walk_tile
-from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Planes
+from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Interval, Planes
 from vid2ev.kernels.naps import rouse
 from vid2ev.kernels.rows import interval_rows
 from vid2ev.kernels.work import new_work
@@ -41,6 +42,8 @@ class Pixels:
 
     def __init__(self, size: tuple[int, int], labels: bool, threads: int, skip: bool, part: Part):
         self.size, self._labels, self._skip, self._total = size, labels, skip, size[0] * size[1]
+        self._threads = threads
+        self._elsewhere: Elsewhere | None = None  # (where the walk is compiled)
         self.tiles = Tiles(-(-self._total // BLOCK), threads, part)
         self._work = [new_work() for _ in range(self.tiles.count)]
         self._buffers = [np.empty(4096, np.uint64) for _ in range(self.tiles.count)]
@@ -60,6 +63,9 @@ class Pixels:
     def settle(self, flat: np.ndarray, table: np.ndarray, t_ns: int, count: int) -> None:
         """Settle in a frame of light, from which noise by count goes on at `count`."""
         light = only_read(flat[0])
+        if self._threads > 1:  # (a core for the walk, by far the longest of the kernels)
+            none = np.zeros((0, 0)), np.zeros((0, 0), np.int64), np.zeros((0, 0), np.int64)
+            self._elsewhere = Elsewhere(walk_tile, self._of_walk(0, 0, 0, only_read(flat), 0, 1, table, *none))
 
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
@@ -78,18 +84,33 @@ class Pixels:
         self.sleep.begin(intervals, told)
         floats, ints = interval_rows(steps)
         light = only_read(light)
+        if self._elsewhere:
+            self._wait_for_walk(self._elsewhere, intervals)
 
         def walk(k: int, first: int, last: int) -> Keys:
             ends = np.zeros((-(-(last - first) // GROUP) if len(steps) > 1 else 1, len(steps)), np.int64)
-            self._buffers[k] = walk_tile(
-                first, last, light, row, rows, table, self.sleep.naps, self.planes, self.flags, self.numbers,
-                floats, ints, ends, self._work[k], self._buffers[k], self.tallies[k],
-            )  # fmt: skip
+            self._buffers[k] = walk_tile(*self._of_walk(k, first, last, light, row, rows, table, floats, ints, ends))
             return Keys(self._buffers[k], ends)
 
         parts = self.tiles.each_blocks(walk)
         self.sleep.end(len(steps))
         return Sent(parts, intervals, self.size[0], self._labels)
+
+    def _of_walk(
+        self, k: int, first: int, last: int, light: np.ndarray, row: int, rows: int, table: np.ndarray,
+        floats: np.ndarray, ints: np.ndarray, ends: np.ndarray,
+    ) -> tuple:  # fmt: skip
+        """What the walk is called with for tile k."""
+        return (
+            first, last, light, row, rows, table, self.sleep.naps, self.planes, self.flags, self.numbers, floats, ints,
+            ends, self._work[k], self._buffers[k], self.tallies[k],
+        )  # fmt: skip
+
+    def _wait_for_walk(self, elsewhere: Elsewhere, intervals: list[Interval]) -> None:
+        """Until it is compiled; meanwhile what puts events in order is, by one event of no meaning."""
+        event = Keys(np.zeros(1, np.uint64), np.ones((1, 1), np.int64))
+        Sent([event], intervals, self.size[0], self._labels).ordered(0, self.tiles.each)
+        elsewhere.wait()
 
     def state(self) -> dict[str, np.ndarray]:
         """All that later events depend on and that is in the pixels, and what was tallied (copies)."""

@@ -10,14 +10,15 @@ Source: R. G. Keys, "Cubic convolution interpolation for digital image processin
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_compiler import inner
 
 F = np.float32
 _HALF, _ONE, _TWO, _THREE, _FOUR = F(0.5), F(1), F(2), F(3), F(4)
 
 
 # Places first and look-ups after: the first loop runs in vectors, which a loop with a look-up in it cannot.
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def places(start, y, across, down, time, pitch, x_last, y_last, entry, weights):
     """Where pixels of a row, from column `start` on, lie after `time` of the interval.
 
@@ -44,7 +45,7 @@ def places(start, y, across, down, time, pitch, x_last, y_last, entry, weights):
         b0[i], b1[i], b2[i], b3[i] = first, _ONE - first - third - last, third, last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def look_up(light, pitch, entry, weights, count, out):
     """Light at the first `count` of the places of `places`: run by run of places side by side, as most are."""
     first, flat, plane = 0, weights.reshape(-1), np.uintp(weights.shape[1])
@@ -56,7 +57,7 @@ def look_up(light, pitch, entry, weights, count, out):
         first = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _look_up_run(light, pitch, entry, weights, plane, first, last, out):
     """Light at places first ... last - 1, of which the first begins at `entry`, and each other one pixel later."""
     # (offsets that cannot be negative, and neighbours in the place of look-ups: this runs in vectors)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.stream.still import BRIGHTEST, STRIP, strip_count
 
 mark_our_kernels()
@@ -21,7 +21,7 @@ def still_strips(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     return same
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def compare(before, after, length, same):
     """Whether runs of this length are the same, into `same`."""
     for strip in range(same.size):
@@ -30,7 +30,7 @@ def compare(before, after, length, same):
         same[strip] = all_same(before[first:last], after[first:last])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def all_same(before, after):
     """Whether all of two arrays are the same light."""
     odd = np.uint32(0)
@@ -39,7 +39,7 @@ def all_same(before, after):
     return odd == 0
 
 
-@njit(nogil=True, error_model="numpy")
+@inner
 def is_kept(before, after):
     """Whether a pixel's light is what it was, and light as it should be."""
     return (before == after) & (after >= np.float32(0)) & (after <= _BRIGHTEST)

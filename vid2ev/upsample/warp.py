@@ -8,8 +8,8 @@ looks, for every pixel of the instant, back along its velocity into the frame be
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.stream.still import STRIP
 from vid2ev.upsample.cubic import look_up, places
 from vid2ev.upsample.stillness import is_kept
@@ -21,7 +21,7 @@ BLOCK = 16  # pixels of a row that are looked up if one of them moves
 _TINY = F(1e-20)  # in place of a sum of nothing
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def miss(flow, back, missed):
     """How far `back` fails to undo `flow`: missed [h, w] = |flow + back there|**2 / (0.01 lengths + 0.5).
 
@@ -53,7 +53,7 @@ def miss(flow, back, missed):
             missed[y, x] = error / (F(0.01) * lengths + _HALF)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def doubt(flow, gain, least):
     """Let nothing move where the gain [h, w] is not more than the least; the flow [h, w, 2] changes."""
     height, width = gain.shape
@@ -64,7 +64,7 @@ def doubt(flow, gain, least):
             flow[y, x, 1] = flow[y, x, 1] if kept else F(0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def splat(flow, sure, unsure, time, direction, share, slot, field):
     """Add a frame's velocities to `field`, at the places its pixels reach after `time` of the interval.
 
@@ -100,7 +100,7 @@ def splat(flow, sure, unsure, time, direction, share, slot, field):
                 place[slot] += part
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def settle(field, time, enough, motion):
     """From the sums of `splat` to motion [3, h, w]: velocity x and y [px of this grid per interval], weight of the
     frame before.
@@ -124,7 +124,7 @@ def settle(field, time, enough, motion):
             share[x] = seen_before / (seen_before + seen_after)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def carry(before, after, motion, time, out, still):
     """Light at `time` (share of the interval gone by) into out [h, w].
 
@@ -162,7 +162,7 @@ def carry(before, after, motion, time, out, still):
                 _mix(seen_before, seen_after, share, out[y, first:last])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _next_moving(across, down, start):
     """The next run of blocks of pixels from `start` on, a block's first, in each of which something moves: first and
     last."""
@@ -175,7 +175,7 @@ def _next_moving(across, down, start):
     return min(first, count), min(last, count)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _any_moves(across, down):
     """Whether any of some pixels moves."""
     moves = np.uint32(0)
@@ -184,14 +184,14 @@ def _any_moves(across, down):
     return moves != 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _mix(before, after, share, out):
     """What is seen in both frames, of which that before has a share."""
     for i in range(out.size):
         out[i] = after[i] + share[i] * (before[i] - after[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _fade(before, after, margined, motion, out, place, count):
     """What stands still, of `count` pixels of a row, from `margined` on in the frames and from `place` on elsewhere;
     returns whether any of them moves, and whether any is not the same in both frames, or not light."""
