@@ -110,9 +110,24 @@ FlagsAreConstants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types
 
 
 class InnerLibrary(JITCodeLibrary):
-    """The code of an inner function: optimised only as far as its loops vectorise, and without machine code."""
+    """The code of an inner function: optimised only as far as its loops vectorise, and without machine code.
+
+    Parts of it in which loops are within loops are added after that: they have been through it themselves, and no
+    loop that calls one vectorises.
+    """
 
     has_loops = True
+    put_into_loops = False
+    depth = 0  # of loops within each other
+
+    def finalize(self) -> None:
+        parts = [part for part in self._linking_libraries if isinstance(part, InnerLibrary)]
+        late = list(dict.fromkeys(part for part in parts if part.depth > 1))
+        self.depth = 0 if self.put_into_loops else self.has_loops + max([part.depth for part in parts], default=0)
+        self._linking_libraries = [part for part in self._linking_libraries if part not in late]
+        super().finalize()
+        for part in late:
+            self._final_module.link_in(part._get_module_for_linking(), preserve=True)
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout  # (the rest is done once all is linked)
@@ -196,6 +211,7 @@ class KernelCompiler(CompilerBase):
         if flags.no_cpython_wrapper:
             flags.no_compile = True
             self.state.library = InnerLibrary(targetctx.codegen(), "inner")
+            self.state.library.put_into_loops = bool(flags.forceinline)
         else:
             self.state.library = KernelLibrary(targetctx.codegen(), "kernel")
             self.state.library.enable_object_caching()
