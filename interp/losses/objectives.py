@@ -3,7 +3,7 @@
     Super SloMo, SloMoEvents   204 L1 + 102 warps + 0.005 features + smoothness of flows
     flow                       10 L1 of flows [px] + 102 warps + smoothness of flows, as of Super SloMo
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
-    the same, by DIS or by the light of events; rrin_light, rrin_events_guided     0.1 log error + 0.1 log unlikeness
+    the same, by DIS or by the light of events; rrin_light, rrin_events_guided     0.1 log error
     Time Lens                  L1 + 0.1 features
     rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
     E2VID, FireNet             L1 + features from the second image on; FireNet + 2 inconsistency
@@ -25,15 +25,7 @@ from collections.abc import Callable
 import torch
 
 from interp.losses.over_time import inconsistency, visibility
-from interp.losses.terms import (
-    absolute,
-    between_frames,
-    charbonnier,
-    log_error,
-    log_unlikeness,
-    pyramid,
-    smoothness,
-)
+from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks.frame_fed import Interpolated
 
 Terms = dict[str, torch.Tensor]
@@ -91,7 +83,7 @@ def supervised_residue(made: Interpolated, truth: torch.Tensor, progress: float 
 def by_ratio(made: Interpolated, truth: torch.Tensor) -> Terms:
     """The term for a network that starts from images that are nearly right, and flows that need no help: of sums of
     differences, those of the hardest pictures would decide, at the cost of the rest; truth [B, N, C, H, W]."""
-    return {"image": 0.1 * log_error(made.images, truth), "structure": 0.1 * log_unlikeness(made.images, truth)}
+    return {"image": 0.1 * log_error(made.images, truth)}
 
 
 def time_lens(made: Interpolated, truth: torch.Tensor, features: Features) -> Terms:

@@ -8,13 +8,12 @@ from pathlib import Path
 import pytest
 import torch
 from pairs import counts, frames
-from skimage.metrics import structural_similarity
 from torch.nn import functional as F
 
 from interp.losses import objectives
 from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
-from interp.losses.terms import absolute, between_frames, charbonnier, log_error, log_unlikeness, pyramid, smoothness
+from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks import make
 from interp.warp import warp
 from vid2ev import DataError, UsageError
@@ -174,29 +173,6 @@ def test_a_decibel_counts_the_same_in_every_picture() -> None:
         log_error(truth + only_the_hard_one * wrong, truth), (here + better) / 2, atol=0.02, rtol=0
     )
     assert float(log_error(truth, truth)) == pytest.approx(math.log(1e-6))
-
-
-def test_unlikeness_is_the_ssim_that_is_scored() -> None:
-    true, made = torch.rand(2, 2, 3, 24, 40, dtype=torch.float64)
-    scored = [
-        structural_similarity(
-            a.numpy(), b.numpy(), channel_axis=0, gaussian_weights=True, use_sample_covariance=False, data_range=1.0
-        )
-        for a, b in zip(made, true, strict=True)
-    ]
-    expected = sum(math.log(1 - each + 1e-4) for each in scored) / 2
-    assert float(log_unlikeness(made[None], true[None])) == pytest.approx(expected, rel=1e-5)
-    assert float(log_unlikeness(true, true)) == pytest.approx(math.log(1e-4))
-    assert float(log_unlikeness(made[..., :10], true[..., :10])) == 0  # no window fits in
-
-
-@pytest.mark.parametrize("scale", [0.0, 1.0, 1e4])
-def test_unlikeness_has_a_finite_slope_of_any_light(scale: float) -> None:
-    true = scale * torch.rand(1, 3, 16, 16)
-    for made in (true.clone(), torch.zeros(1, 3, 16, 16), 2 * true):
-        made.requires_grad_()
-        log_unlikeness(made, true).backward()
-        assert made.grad is not None and torch.isfinite(made.grad).all()
 
 
 def test_the_first_picture_from_events_does_not_count() -> None:
