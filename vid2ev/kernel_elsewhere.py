@@ -43,7 +43,7 @@ class Elsewhere:
     def wait(self) -> None:
         """Until the other process has ended, whatever it came to."""
         if process := _begun.get(self._key):
-            process.wait()
+            _end(process)
             _begun.pop(self._key, None)
 
 
@@ -67,6 +67,12 @@ def _begin(function: Any, types: tuple) -> Popen | None:
     return process
 
 
+def _end(process: Popen) -> None:
+    process.wait()
+    assert process.stdin is not None
+    process.stdin.close()
+
+
 def serve() -> None:
     """Compile the kernel that standard input asks for; end at once when that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # (which goes to both; whoever began this will say when to stop)
@@ -84,4 +90,4 @@ def _end_with_parent() -> None:
 def _end_all() -> None:
     for process in _begun.values():
         process.kill()
-        process.wait()
+        _end(process)

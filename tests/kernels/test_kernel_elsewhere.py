@@ -34,8 +34,13 @@ def seen(cache: Path, threads: int, python: str = sys.executable) -> dict:
     """What a program comes to that keeps what it compiles in a folder, and how often it compiled the walk itself."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
     ended = subprocess.run(
-        [sys.executable, "-c", SEEN, str(threads), python], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-W", "error", "-c", SEEN, str(threads), python],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
+    assert not ended.stderr  # (nothing is left open, which would be said there)
     return json.loads(ended.stdout)
 
 
