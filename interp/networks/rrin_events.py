@@ -101,10 +101,6 @@ class RrinEventsSpec(FrameFedSpec):
     def takes_events(self) -> bool:
         return bool(self.bins) or self.candidate != "none"
 
-    @property
-    def nearly_right(self) -> bool:
-        return self.first_flow == "dis"
-
 
 class RrinEvents(FrameFed):
     """RRINEvents; without events RRIN."""

@@ -49,10 +49,6 @@ class RrinEventsGuidedSpec(FrameFedSpec):
     )
     transfer: Transfer = Field(default="srgb", description="how the frames are coded: srgb or linear; free")
 
-    @property
-    def nearly_right(self) -> bool:
-        return True
-
 
 class RrinEventsGuided(FrameFed):
     """RRINEvents guided by light."""

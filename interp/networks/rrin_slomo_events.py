@@ -77,10 +77,6 @@ class RrinSlomoEventsSpec(EventInputSpec):
         elsewhere = self.flow_input != "frames" or self.flow == "guided" or self.reconstruct != "none"
         return super().takes_events or elsewhere
 
-    @property
-    def nearly_right(self) -> bool:
-        return self.flow in ("dis", "guided")
-
 
 class RrinSlomoEvents(FrameFed):
     """RRINSloMoEvents; pretrained parts are loaded with `interp.weights.load_part`."""

@@ -47,8 +47,3 @@ class FrameFedSpec(NetworkSpec):
     def takes_events(self) -> bool:
         """Whether what the network makes depends on events."""
         return True
-
-    @property
-    def nearly_right(self) -> bool:
-        """Whether it starts from images that are nearly right, and flows that need no help."""
-        return False

@@ -21,6 +21,7 @@ from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores, scores
 
+OF_RATIOS = ("rrin_light", "rrin_events_guided")
 OF_FEATURES = ("superslomo", "slomo_events", "timelens")  # whose loss looks at them, too
 
 
@@ -47,7 +48,7 @@ class FrameFedLearner(Learner):
         if self.features is not None:
             first, last = batch["frames"].unbind(1)
             return objectives.super_slomo(made, first, last, truth, self.features)
-        if self.network.spec.nearly_right:
+        if self.of in OF_RATIOS:
             return objectives.by_ratio(made, truth)
         if self.of == "rrin_events_light":
             return objectives.supervised_residue(made, truth, self.schedule.progress(self.trainer.global_step))

@@ -15,7 +15,6 @@ import pytest
 SEEN = """
 import json, sys
 import numpy as np
-from numba.core import event
 from vid2ev import Dvs, kernel_elsewhere, load_sensor
 from vid2ev.kernels.cpu import walk_tile
 
