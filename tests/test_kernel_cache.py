@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba.core.caching import IndexDataCacheFile
 
-import vid2ev.physics  # noqa: F401  (marks the names of this process)
+import vid2ev.kernel_compiler  # noqa: F401  (marks the names of this process)
 from vid2ev import kernel_cache
 
 

@@ -11,7 +11,8 @@ kernels call is here made ready to be inlined, and no more, also where Python ca
 `with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
 **Caches.** numba compiles a function again where its own file has changed, but not where one has that it calls.  Here
-a kernel is of one version of all files that kernels are made of, and of those beside its own.
+a kernel is of one version of all files that kernels are made of, and of those beside its own, and its file on disk has
+a name that no other process writes.
 
 **Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
 """
@@ -50,8 +51,11 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from vid2ev.kernel_cache import mark_our_kernels
 from vid2ev.kernel_call_types import kept_call_types
 from vid2ev.kernel_flags import Numba, pass_over_flags
+
+mark_our_kernels()
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 MADE_OF = ("kernels", "physics", "scenes/rays", "stream")

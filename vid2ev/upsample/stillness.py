@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import mark_our_kernels
 from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.stream.still import BRIGHTEST, STRIP, strip_count
 
-mark_our_kernels()
 _BRIGHTEST = np.float32(BRIGHTEST)
 
 
