@@ -33,7 +33,7 @@ WORD = "auto"
 @click.option(
     "--start", "starts", multiple=True, metavar="[PART=]WEIGHTS",
     help="Begin with these weights: of a file, a run, or the name of some that come with vid2ev; for a part such as"
-    " flow, those of a network trained for itself.",
+    " flow, those of a network trained for itself; features=FILE, of VGG16, for losses that look at features.",
 )  # fmt: skip
 @click.option(
     "--data", multiple=True, metavar="PATH", type=click.Path(exists=True),
@@ -88,12 +88,15 @@ def train(
     starts = parsed(options["starts"])
     path = Path(output or _usual_name(options, starts))
     job = _taken_up(path, options, starts) if resume else _job(options, starts)
+    check_installed()
     if dry_run:
+        from interp.train.made_of import learner_of
+        from interp.train.starts import begin
         from interp.train.told import described
 
+        begin(learner_of(job), starts)
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
-    check_installed()
     machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts)
     if machines.first:

@@ -30,11 +30,11 @@ class EventFedLearner(Learner):
     """E2VID or FireNet; the latter is also to agree over time."""
 
     network: EventFed
+    features: Perceptual
 
     def __init__(self, name: str, network: EventFed, recipe: Recipe, schedule: Schedule):
-        super().__init__(network, recipe, schedule)
+        super().__init__(network, recipe, schedule, Perceptual())
         self.over_time, self.bins = name == "firenet", int(network.spec.bins)  # type: ignore[union-attr, arg-type]
-        self.features = Perceptual()
 
     def made(self, batch: Batch) -> torch.Tensor:
         """Images [B, K, 1, H, W] after each window."""

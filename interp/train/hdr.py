@@ -34,10 +34,10 @@ class HdrLearner(Learner):
     """The HDR network."""
 
     network: Hdr
+    features: Perceptual
 
     def __init__(self, name: str, network: Hdr, recipe: Recipe, schedule: Schedule):
-        super().__init__(network, recipe, schedule)
-        self.features = Perceptual()
+        super().__init__(network, recipe, schedule, Perceptual())
 
     def made(self, batch: Batch) -> torch.Tensor:
         """Light [B, T, C, H, W] after the network."""

@@ -21,6 +21,7 @@ from torch import nn
 from torch.optim import AdamW, Optimizer
 from torch.optim.lr_scheduler import LambdaLR
 
+from interp.losses.perceptual import Perceptual
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores
@@ -31,6 +32,7 @@ class Learner(LightningModule):
     """A network that learns.  Families of networks add `parts` and `predicted`.
 
     schedule   of the learning rate; replaced once, where the steps are fixed on the way
+    features   what the loss looks at beside pictures, if it does
     skipped    steps whose gradients were not finite, so far
     table      mean scores of each group of clips, of the last validation, which was at step `validated_at`
                and took `validation_s`
@@ -38,9 +40,10 @@ class Learner(LightningModule):
                scenes nor real clips, neither clean nor noisy sensors are given up for the rest
     """
 
-    def __init__(self, network: nn.Module, recipe: Recipe, schedule: Schedule):
+    def __init__(self, network: nn.Module, recipe: Recipe, schedule: Schedule, features: Perceptual | None = None):
         super().__init__()
         self.network, self.recipe, self.schedule = network, recipe, schedule
+        self.features = features
         self.skipped = self._in_a_row = 0
         self.table: dict[str, Scores] = {}
         self.validated_at, self.validation_s = -1, 0.0

@@ -40,11 +40,11 @@ def run(
     begun_s = time.monotonic()
     learner = learner_of(job)
     if not resume:
-        begin(learner.network, starts)
+        begin(learner, starts)
     folder = RunFolder(path, job.kept(), resume, machines.first, starts)
     try:
-        if resume and not folder.checkpoint.exists():
-            begin(learner.network, folder.starts(job.starts))
+        if resume:
+            begin(learner, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = max(1, cores() - job.recipe.threads) if workers is None else workers
         with counting(quiet, CLIPS) as report:

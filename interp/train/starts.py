@@ -4,6 +4,7 @@ weights for parts of it.
     rrin_events_guided-tiny   the network, and which it is: training goes on with new data, or with another recipe
     flow=RUN                  a part, such as the flow of RRINSloMoEvents, trained for itself; `pretrained` parts are
                               frozen, others go on learning
+    features=FILE             VGG16, by whose features a loss that looks at features does so (`losses/perceptual.py`)
 
 A run keeps copies of the files, so that it can be carried anywhere, and their digests are part of its job.
 """
@@ -14,17 +15,21 @@ import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
-from torch import nn
 
 from interp import pretrained, weights
 from interp.blocks.frozen import Frozen
+from interp.losses.perceptual import Perceptual
 from interp.networks import make, spec_of
 from vid2ev.errors import UsageError
 
+if TYPE_CHECKING:
+    from interp.train.learner import Learner
+
 WHOLE = ""  # the part that is the network
+FEATURES = "features"  # and that of the loss
 
 
 def parsed(texts: Iterable[str]) -> dict[str, Path]:
@@ -69,10 +74,22 @@ def check_frozen(name: str, size: str, options: Mapping[str, Any], parts: Iterab
             )
 
 
-def begin(network: nn.Module, starts: Mapping[str, Path]) -> None:
-    """Give a network the weights, parts last.
+def begin(learner: Learner, starts: Mapping[str, Path]) -> None:
+    """Give what learns the weights, parts last.
 
     Raises UsageError for a part that it does not have, DataError for weights that are not of it.
     """
     for part, path in sorted(starts.items()):
-        weights.load_part(network, part, path) if part else weights.fill(network, path)
+        if part == FEATURES:
+            learner.features = _seen_by(learner.features, path)
+        elif part:
+            weights.load_part(learner.network, part, path)
+        else:
+            weights.fill(learner.network, path)
+
+
+def _seen_by(features: Perceptual | None, path: Path) -> Perceptual:
+    """VGG16 in place of the stand-in."""
+    if features is None:
+        raise UsageError(f"start {FEATURES}={path}: the loss of this network looks at no features; leave it out")
+    return Perceptual(path, features.squared)

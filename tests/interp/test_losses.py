@@ -9,6 +9,7 @@ import pytest
 import torch
 from pairs import counts, frames
 from torch.nn import functional as F
+from vgg16 import write_vgg16
 
 from interp.losses import objectives
 from interp.losses.over_time import inconsistency, visibility
@@ -127,11 +128,7 @@ def test_features_mind_blur_more_than_brightness() -> None:
 def test_vgg16_is_taken_from_a_file(tmp_path: Path) -> None:
     from safetensors.torch import save_file
 
-    places = {0: (3, 64), 2: (64, 64), 5: (64, 128), 7: (128, 128), 10: (128, 256), 12: (256, 256), 14: (256, 256)}
-    places |= {17: (256, 512), 19: (512, 512), 21: (512, 512)}  # torchvision's vgg16().features
-    tensors = {f"features.{k}.bias": torch.zeros(out) for k, (_, out) in places.items()}
-    tensors |= {f"features.{k}.weight": 0.02 * torch.randn(out, into, 3, 3) for k, (into, out) in places.items()}
-    save_file({**tensors, "classifier.0.bias": torch.zeros(4)}, tmp_path / "vgg16.safetensors")
+    write_vgg16(tmp_path / "vgg16.safetensors")
     features = Perceptual(tmp_path / "vgg16.safetensors", squared=True)
     assert sum(parameter.numel() for parameter in features.parameters()) == 7_635_264  # up to conv4_3
     assert torch.isfinite(features(torch.rand(1, 3, 16, 16), torch.rand(1, 3, 16, 16)))

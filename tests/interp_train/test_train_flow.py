@@ -14,7 +14,6 @@ from interp.networks import make
 from interp.train.flow import FlowLearner
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
-from interp.train.starts import begin
 from interp.train.true_flows import with_flow_between
 
 WAY = (4, 2)  # px to the right and down, from frame to frame
@@ -51,6 +50,6 @@ def test_it_finds_the_motion_of_a_texture_and_serves_others_frozen(tmp_path: Pat
     assert float((found - true).abs().mean()) < 0.3  # [px]
     weights.save(tmp_path / "weights.safetensors", "flow", network)
     other: Any = make("rrin_slomo_events", "tiny", flow="pretrained")
-    begin(other, {"flow": tmp_path / "weights.safetensors"})
+    weights.load_part(other, "flow", tmp_path / "weights.safetensors")
     with torch.no_grad():
         torch.testing.assert_close(other.prepare(first, last).flows, network(first, last))

@@ -10,6 +10,7 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 from small_run import Made, clips
+from vgg16 import write_vgg16
 
 from interp import pretrained, weights
 from interp.networks import make
@@ -48,6 +49,11 @@ def trained(path: Path, settings: list[str], starts: dict[str, Path], **rest: An
     return run(Job.of(settings=settings, starts=starts, **rest), path, machines=ALONE, quiet=True, starts=starts)
 
 
+def learnt(path: Path) -> dict[str, torch.Tensor]:
+    """All that was learnt by the last step of a run."""
+    return torch.load(path / "checkpoint.ckpt", weights_only=False)["state_dict"]
+
+
 def test_it_begins_with_the_weights_of_a_file(tmp_path: Path) -> None:
     """The network and its options are those of the file; where nothing is learnt its weights stay."""
     starts = parsed([SHIPPED])
@@ -63,13 +69,13 @@ def test_it_begins_with_the_weights_of_a_file(tmp_path: Path) -> None:
 def test_a_pretrained_part_stays_and_what_is_around_it_learns(tmp_path: Path, flow: Path) -> None:
     starts = {"flow": flow}
     assert trained(tmp_path / "run", [*COMBINED, "rate=0.1"], starts, network="rrin-slomo-events").finished
-    given, learnt = load_file(flow), load_file(tmp_path / "run" / "weights.safetensors")
-    assert all(torch.equal(learnt[f"flow.module.{name}"], given[name]) for name in given)
+    given, kept = load_file(flow), load_file(tmp_path / "run" / "weights.safetensors")
+    assert all(torch.equal(kept[f"flow.module.{name}"], given[name]) for name in given)
     network = weights.load(tmp_path / "run" / "weights.safetensors")
     torch.testing.assert_close(network.flow.module.state_dict(), given, rtol=0, atol=0)  # type: ignore[union-attr]
     own = ["network.flow=own", *FEW, "rate=0.01"]
     trained(tmp_path / "own", own, starts, network="rrin-slomo-events")
-    state = torch.load(tmp_path / "own" / "checkpoint.ckpt", weights_only=False)["state_dict"]
+    state = learnt(tmp_path / "own")
     assert any(not torch.equal(state[f"network.flow.{name}"], given[name]) for name in given)
 
 
@@ -90,6 +96,22 @@ def test_a_run_carries_what_it_began_with(tmp_path: Path, flow: Path, monkeypatc
     assert run(job, tmp_path / "carried", resume=True, machines=ALONE, quiet=True).finished
     ends = [load_file(tmp_path / name / "weights.safetensors") for name in ("whole", "carried")]
     assert ends[0].keys() == ends[1].keys() and all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+def test_a_loss_looks_by_vgg16_if_it_is_given(tmp_path: Path) -> None:
+    """And a run that was stopped and carried to where the file is not goes on by it, to the same weights."""
+    write_vgg16(tmp_path / "vgg16.safetensors")
+    starts = parsed([f"features={tmp_path / 'vgg16.safetensors'}"])
+    trained(tmp_path / "whole", FEW, starts, network="superslomo")
+    trained(tmp_path / "without", FEW, {}, network="superslomo")
+    job = Job.of("superslomo", settings=FEW, starts=starts)
+    after_one = iter([True])
+    run(job, tmp_path / "carried", machines=ALONE, quiet=True, starts=starts, stop=lambda: next(after_one))
+    (tmp_path / "vgg16.safetensors").unlink()
+    assert run(job, tmp_path / "carried", resume=True, machines=ALONE, quiet=True).finished
+    whole, carried, without = (learnt(tmp_path / name) for name in ("whole", "carried", "without"))
+    assert all(torch.equal(whole[name], carried[name]) for name in whole)
+    assert any(not torch.equal(whole[name], without[name]) for name in whole)
 
 
 def test_a_run_goes_on_only_with_the_weights_it_began_with(tmp_path: Path, flow: Path) -> None:
@@ -137,6 +159,7 @@ def test_weights_that_do_not_fit_are_refused_before_anything_is_there(tmp_path: 
     for part, path, sentence in (
         ("flow", shipped, "holds the weights of another network"),
         ("flows", flow, "has no part 'flows'; it has flow"),
+        ("features", flow, "the loss of this network looks at no features"),
     ):
         with pytest.raises((UsageError, DataError), match=sentence):
             trained(tmp_path / "run", FEW, {part: path}, network="rrin-slomo-events")
