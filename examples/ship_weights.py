@@ -24,6 +24,7 @@ from safetensors import safe_open
 from torch import nn
 
 from interp import pretrained, weights
+from interp.data.samples import SampleSettings
 from interp.train.curves import read_curve
 from interp.train.job import Job
 from interp.train.learner import means, overall
@@ -108,6 +109,9 @@ def _card(
     reports: tuple[Path, ...],
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
+    samples = [item for item in job["samples"].items() if item not in SampleSettings().model_dump(mode="json").items()]
+    changed = {"network": job["options"], "samples": dict(samples)}
+    set_to = "".join(f" --set {part}.{name}={value}" for part, of in changed.items() for name, value in of.items())
     steps = read_curve(run / "validation.csv")[-1]["step"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])
     begun = ", ".join(f"{part or 'all'} of sha256 {digest}" for part, digest in job.get("starts", {}).items())
@@ -116,8 +120,9 @@ def _card(
     lines = [
         f"# {job['network']}, {job['size']}",
         "",
-        f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']} --steps {steps}`,"
-        f" rate {recipe['rate']:g}, seed {recipe['seed']}, {steps} steps of {recipe['batch']} samples of"
+        f"Trained by `vid2ev train --network {job['network'].replace('_', '-')} --size {job['size']}"
+        f" --steps {steps}{set_to}`, rate {recipe['rate']:g}, seed {recipe['seed']},"
+        f" {steps} steps of {recipe['batch']} samples of"
         f" {job['samples']['size']} x {job['samples']['size']} pixels, {hours:.1f} hours on {machine}; the weights are"
         f" those of step {best}, whose validation was best,{_said_of(share)} stored in 16 bits."
         f"{f' They began with weights: {begun}.' * bool(begun)}"

@@ -5,7 +5,7 @@
     RRIN, RRINEvents, RRINSloMoEvents         Charbonnier
     Time Lens                  L1 + 0.1 features
     rrin_events_light          Charbonnier + 0.5 of the blend of warps + 0.25 of both warps, which fades + 0.1 pyramid
-    rrin_light, rrin_events_guided            0.1 log error
+    rrin_light, rrin_events_guided, RRINSloMoEvents that is guided    0.1 log error
     E2VID, FireNet             L1 + features from the second image on; FireNet + 2 inconsistency
     HDR                        100 inconsistency, from image to image and to the first + 10 features + 100 L1
                                + 3 log error of what is beyond the range of the frames

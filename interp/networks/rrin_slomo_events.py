@@ -2,11 +2,11 @@
 network.
 
     F_01, F_10 = flow(I0, I1, events?)                                   own, trained before and frozen, or DIS
-    F_t0, F_t1 = of these, or by the light that events tell              `guide.py`; V then of what agrees as well
-    dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, events, reconstructions?)
+    F_t0, F_t1 = of these, or by the light that events tell, C           `guide.py`; V then of what agrees as well
+    dF_t0, dF_t1, V0, V1 = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g1, g0, C?, events, reconstructions?)
     J = ((1 - t) V0 g0 + t V1 g1) / ((1 - t) V0 + t V1)                  V = sigmoid of what the UNet says
     I_t = J + UNet(I0, I1, J)                                            if refine is unet
-        = C' + m (J - C') + 3 s tanh(UNet(I0, I1, J, C', c, j))          if the light that events tell, C, guides
+        = C' + m (J - C') + 3 s tanh(UNet(I0, I1, J, C', events, c, j))  if C guides
 
 Source: Radomski et al., section III.A.3; depths are not given there: 5 levels for flow, 4 for the combined UNet, 3
 for the others.
@@ -25,6 +25,7 @@ from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
 from interp.candidates.guided import motion_between
+from interp.candidates.ramps import RISEN_CHANNELS
 from interp.light import Transfer
 from interp.networks.e2vid import E2vid, E2vidSpec
 from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
@@ -89,9 +90,10 @@ class RrinSlomoEvents(FrameFed):
         self.event_input = EventInput(spec.events, spec.bins, prepare=self._prepare if spec.prepare == "unet" else None)
         self.reconstruct = self._reconstruct()
         pictures = 0 if self.reconstruct is None else 3
-        channels = 4 * colours + 8 + self.event_input.channels + pictures
+        guided = spec.flow == "guided"
+        channels = 4 * colours + guided * colours + 8 + self.event_input.channels + pictures
         self.combined = Unet(channels, 6, rrin_layout(4, spec.base), zero)
-        taken, said = (4 * colours + OFFS, colours + 1) if spec.flow == "guided" else (3 * colours, colours)
+        taken, said = 3 * colours + guided * (colours + RISEN_CHANNELS + OFFS), colours + guided
         self.residue = Unet(taken, said, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
         self.multiple = MULTIPLE
 
@@ -126,14 +128,15 @@ class RrinSlomoEvents(FrameFed):
     def _guided(self, pair: Pair, times: torch.Tensor, guide: Guide, beside: list[torch.Tensor]) -> Interpolated:
         """Images at times [B, N], from the closed form on."""
         at, warps, visible = refined(
-            self.combined, pair, times, beside, self.spec.flow_scale, guide.flows, guide.unsure
+            self.combined, pair, times, [guide.light, *beside], self.spec.flow_scale, guide.flows, guide.unsure
         )
         agreed = guide.agreement(warps)
         carried, weights = blend(warps, F.logsigmoid(visible) + agreed, shares_at(times))
         start, off = guide.coloured(carried), guide.carried_off_by(agreed)
         said = torch.zeros_like(start[:, :, :1]).expand(-1, -1, start.shape[2] + 1, -1, -1)
         if self.residue is not None:
-            said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, guide.offs(off)])
+            seen = torch.cat([guide.found.channels(), guide.offs(off)], 2)
+            said = run(self.residue, [pair.frame_0, pair.frame_1, carried, start, seen])
         image = guide.image(start, carried, off, said)
         return Interpolated(image, pair.flows, at, warps, weights, carried)
 

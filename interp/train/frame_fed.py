@@ -26,14 +26,15 @@ OF_FEATURES = ("superslomo", "slomo_events", "timelens")  # whose loss looks at 
 
 
 class FrameFedLearner(Learner):
-    """A network that takes two frames, with the loss that its name stands for."""
+    """A network that takes two frames, with the loss that its name stands for, or what guides it."""
 
     network: FrameFed
 
     def __init__(self, name: str, network: FrameFed, recipe: Recipe, schedule: Schedule):
-        super().__init__(network, recipe, schedule)
+        features = Perceptual(squared=name != "timelens") if name in OF_FEATURES else None
+        super().__init__(network, recipe, schedule, features)
         self.of = name
-        self.features = Perceptual(squared=name != "timelens") if name in OF_FEATURES else None
+        self.nearly_right = name in OF_RATIOS or getattr(network.spec, "flow", "") == "guided"  # before it learns
 
     def made(self, batch: Batch) -> Interpolated:
         """What the network makes of a batch."""
@@ -48,7 +49,7 @@ class FrameFedLearner(Learner):
         if self.features is not None:
             first, last = batch["frames"].unbind(1)
             return objectives.super_slomo(made, first, last, truth, self.features)
-        if self.of in OF_RATIOS:
+        if self.nearly_right:
             return objectives.by_ratio(made, truth)
         if self.of == "rrin_events_light":
             return objectives.supervised_residue(made, truth, self.schedule.progress(self.trainer.global_step))
