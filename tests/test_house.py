@@ -28,6 +28,7 @@ FLOORS = {
     "cluster": 1,
     "requests": 1,
     "untrusted": 1,
+    "kernel_borrowing": 0,
     "kernel_cache": 0,
     "kernel_call_types": 0,
     "kernel_flags": 0,

@@ -7,6 +7,8 @@ effects are on.  numba prunes branches that are constant before it infers types,
 **Inner functions.** numba optimises each function and makes machine code of it, and again wherever it is called.  What
 kernels call is here made ready to be inlined, and no more, also where Python calls it as well.
 
+**Arguments** are borrowed (`kernel_borrowing.py`).
+
 **Passes.** Of numba's passes over a function those are left out that look for what kernels do not have: closures,
 `with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
@@ -35,7 +37,6 @@ from numba.core.compiler_machinery import FunctionPass, LoweringPass, PassManage
 from numba.core.ir_utils import get_definition, guard
 from numba.core.typed_passes import (
     IRLegalization,
-    NativeLowering,
     NoPythonBackend,
     NoPythonSupportedFeatureValidation,
     NopythonTypeInference,
@@ -51,6 +52,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from vid2ev.kernel_borrowing import LoweringWithBorrowing
 from vid2ev.kernel_cache import mark_our_kernels
 from vid2ev.kernel_call_types import kept_call_types
 from vid2ev.kernel_flags import Numba, pass_over_flags
@@ -201,7 +203,7 @@ PASSES = (
     PreLowerStripPhis,
     NoPythonSupportedFeatureValidation,
     IRLegalization,
-    NativeLowering,
+    LoweringWithBorrowing,
     CallableByKernels,
     NoPythonBackend,
 )
