@@ -32,7 +32,8 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 )  # fmt: skip
 @click.option(
     "--predictions", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
-    help="Score pictures that others have made: DIR/SEQUENCE/*.png, or DIR/SEQUENCE/METHOD/*.png; may be repeated.",
+    help="Score pictures that others have made: DIR/SEQUENCE/*.png, or DIR/SEQUENCE/METHOD/*.png; may be repeated."
+    " As many as frames, or as are rebuilt, or named by the number of the frame, from 0.",
 )  # fmt: skip
 @click.option("--skip", type=click.IntRange(1), default=7, show_default=True, help="Frames between two key frames.")
 @click.option(

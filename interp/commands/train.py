@@ -89,6 +89,8 @@ def train(
     path = Path(output or _usual_name(options, starts))
     job = _taken_up(path, options, starts) if resume else _job(options, starts)
     check_installed()
+    machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
+    machines.check_batch(job.recipe.batch)
     if dry_run:
         from interp.train.made_of import learner_of
         from interp.train.starts import begin
@@ -97,7 +99,6 @@ def train(
         begin(learner_of(job), starts)
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
-    machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts)
     if machines.first:
         _tell(outcome, path, as_json, quiet)

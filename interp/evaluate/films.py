@@ -20,7 +20,7 @@ from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
 from interp.representation.event_counts import count_events
-from vid2ev import Events, open_source
+from vid2ev import Events
 from vid2ev.errors import DataError
 from vid2ev.sources import is_scene
 
@@ -61,7 +61,7 @@ class Film:
     def __init__(self, video: str, protocol: Protocol, name: str, simulated: Simulated, limit: int | None = None):
         self.name, self.video, self._protocol, self._limit = name, video, protocol, limit
         self.multiple, self._simulated, self._told = protocol.multiple, simulated, Told()
-        source = open_source(video, colour="rgb", **simulated.edited(video))
+        source = simulated.opened(video)
         self.size, self.frames = source.size, source.frames_expected or 0
         count = max(self.frames - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
@@ -72,8 +72,9 @@ class Film:
         """See `interp.evaluate.group.Footage`; groups across a cut are counted."""
         told = self._told = Told()
         part, late, number = list[Seen](), Events.empty(), 0
+        source = self._simulated.opened(self.video)
         try:
-            with closing(self._simulated.seen(self.video)) as coming:
+            with closing(self._simulated.seen(self.video, source)) as coming:
                 for seen in coming:
                     told.see(seen.t_us)
                     part.append(seen)
@@ -92,6 +93,7 @@ class Film:
         except DataError as error:
             told.remarks.append(f"ended early: {error}")
         self.frames = told.frames
+        told.remarks += source.warnings
         if left := len(part) - 1:
             told.remarks.append(f"{left} frames after the last complete group of {self.multiple} are not rebuilt")
 

@@ -3,14 +3,21 @@
     DIR/SEQUENCE/*.png            one method, called like DIR
     DIR/SEQUENCE/METHOD/*.png     several; what is called GT is the truth, and is left alone
 
-They are sorted by name and paired with the frames of the sequence by position: the first is frame 0, a key frame.
-Where there are as many as frames to rebuild, and fewer than frames, key frames are taken to be left out.
+Sorted by name they are paired with the frames of the sequence:
+
+    as many as frames             one for each, the first is a key frame
+    as many as are rebuilt        one for each of those; key frames are left out
+    else                          by the number that their names end in: 0 is the first frame, a key frame
+
+Pictures numbered by frame are taken so as well where some are missing and what is left happens to be as many as are
+rebuilt: numbers without a gap are counted, those with gaps are of frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -37,32 +44,28 @@ class Predictions:
     folder: Path
     within: str | None
     identity: dict[str, Any]
-    files: tuple[Path, ...] = ()
-    with_keys: bool = True
+    files: Mapping[int, Path] = field(default_factory=dict)  # by the number of the frame
     sequential = False
 
     def begin(self, footage: Footage) -> Self:
         """See `interp.evaluate.rebuilders.Rebuilder`."""
         folder = self.folder / footage.name
         files = pictures_in(folder / self.within if self.within else folder)
-        rebuilt = (footage.frames - 1) // footage.multiple * (footage.multiple - 1)
-        return replace(self, files=tuple(files), with_keys=len(files) != rebuilt)
+        return replace(self, files=by_frame(files, footage.frames, footage.multiple))
 
     def frames(self, group: Group) -> Sequence[np.ndarray | None]:
         """See `interp.evaluate.rebuilders.Rebuilder`.  Raises DataError for a picture of another size."""
-        multiple = len(group.times_us) - 1
-        first = group.first if self.with_keys else group.first - group.first // multiple - 1
-        return [self._read(first + position, group.truth.shape[1:]) for position in group.positions]
+        return [self._read(group.first + position, group.truth.shape[1:]) for position in group.positions]
 
-    def _read(self, place: int, shape: tuple[int, ...]) -> np.ndarray | None:
+    def _read(self, frame: int, shape: tuple[int, ...]) -> np.ndarray | None:
         import cv2
 
-        if place >= len(self.files):
+        if frame not in self.files:
             return None
-        picture = next(iter(decoded(self.files[place], cv2.IMREAD_COLOR)), None)
+        picture = next(iter(decoded(self.files[frame], cv2.IMREAD_COLOR)), None)
         if picture is None or picture.shape != shape:
             size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
-            raise DataError(f"{self.files[place]}: {size}, expected a picture of {shape[1]}x{shape[0]}")
+            raise DataError(f"{self.files[frame]}: {size}, expected a picture of {shape[1]}x{shape[0]}")
         return picture[..., ::-1]
 
 
@@ -80,6 +83,29 @@ def predictions_in(folder: str | Path) -> list[Predictions]:
             f"{folder}: no predictions in it; expected SEQUENCE/*{SUFFIX}, or SEQUENCE/METHOD/*{SUFFIX}, in it"
         )
     return found
+
+
+def by_frame(files: Sequence[Path], frames: int, multiple: int) -> dict[int, Path]:
+    """Pictures, in order of their names, by the number of the frame that each is of.
+
+    frames, multiple   how many the sequence has, and how many there are for each key frame
+    Raises DataError where there is no telling.
+    """
+    ends = [re.search(r"(\d+)\D*$", path.stem) for path in files]
+    numbers = [int(end[1]) for end in ends if end]
+    known = len({*numbers}) == len(files)
+    gapless = known and max(numbers, default=0) - min(numbers, default=0) < len(files)
+    rebuilt = [frame for frame in range((frames - 1) // multiple * multiple) if frame % multiple]
+    if len(files) == frames or not files:
+        return dict(enumerate(files))
+    if len(files) == len(rebuilt) and (gapless or not known or max(numbers) >= frames):
+        return dict(zip(rebuilt, files, strict=True))
+    if known and (not gapless or min(numbers) == 0):
+        return dict(zip(numbers, files, strict=True))
+    raise DataError(
+        f"{files[0].parent}: {len(files)} pictures for {frames} frames, of which {len(rebuilt)} are rebuilt; expected"
+        " as many as either, or names that end in the number of the frame, from 0"
+    )
 
 
 def pictures_in(folder: Path) -> list[Path]:

@@ -101,7 +101,7 @@ def evaluate(
             report = None
         rows, about = _scored(found.footage, methods, frames, kept, report)
         if not rows:
-            reasons = [*found.unusable.values(), *(f"{name}: {of['not_scored']}" for name, of in about.items())]
+            reasons = [*found.unusable.values(), *(_unscored(name, of, protocol) for name, of in about.items())]
             raise DataError(f"no frame could be scored: {'; '.join(reasons[:3])}")
         for method in methods:
             prune(folder, method.name, rows)
@@ -114,6 +114,13 @@ def evaluate(
         if figures:
             write_figures(folder, found.footage, methods, rows)
     return Evaluation(rows, summary)
+
+
+def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
+    """Why nothing of a sequence was scored."""
+    if about["not_scored"]:
+        return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in about["not_scored"].items())
+    return f"{name}: {about['frames']} frames, expected {protocol.multiple + 1} or more; give a smaller --skip"
 
 
 def _check(methods: Sequence[Rebuilder]) -> None:

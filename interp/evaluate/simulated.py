@@ -17,6 +17,7 @@ from vid2ev.instants import Instant, instants
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.recipe import Recipe
 from vid2ev.sources import is_scene
+from vid2ev.sources.source import Source
 from vid2ev.toml_text import toml_value
 
 SCENE_HZ = 240.0  # of the truth of scenes, unless told otherwise
@@ -73,15 +74,19 @@ class Simulated:
         """The options of `open_source` for a film."""
         return ({"fps": SCENE_HZ} if is_scene(video) else {}) | self.options
 
-    def seen(self, video: str) -> Generator[Seen]:
-        """The frames of a film, all originals, with the events of the light of all of them and in between: those that
-        `vid2ev convert` writes."""
+    def opened(self, video: str) -> Source:
+        """A film as it is looked at."""
+        return open_source(video, colour="rgb", **self.edited(video))
+
+    def seen(self, video: str, film: Source) -> Generator[Seen]:
+        """The frames of a film that is `opened`, all originals, with the events of the light of all of them and in
+        between: those that `vid2ev convert` writes."""
         edited = self.edited(video)
         denser = {"fps": DENSER * edited["fps"]} if is_scene(video) else {}
         recipe = Recipe.of(video, self.spec, seed=self.seed, **(edited | denser))
         dvs = recipe.mounts[0].dvs()
         with closing(instants(recipe)) as light:
-            for frame in open_source(video, colour="rgb", **edited).frames():
+            for frame in film.frames():
                 yield Seen(srgb_codes(frame.light), frame.t_ns // 1000, *_until(frame.t_ns, light, dvs))
 
 

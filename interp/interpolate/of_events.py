@@ -24,13 +24,36 @@ class FramesBesideEvents(OfSource):
 
     def __init__(self, path: str, options: Options, events: Path):
         super().__init__(path, options, has_events=True)
-        self._cursor, self._events_path = EventCursor(events), events
-        self.event_size, self.contrast = self._cursor.size, options.contrast
+        self._cursor, self._events_path, self.contrast = EventCursor(events), events, options.contrast
+        corner, self._guessed = self._cursor.size, self._cursor.file.size is None
+        within = corner[0] <= self.size[0] and corner[1] <= self.size[1]
+        self.event_size: tuple[int, int] = self.size if self._guessed and within else corner
         self.apart = self.event_size != self.size
+
+    @property
+    def remarks(self) -> list[str]:
+        """Those of the source, and what events and frames do not say of each other."""
+        across, down = self.event_size
+        guessed = f"{self._events_path} does not state the size of its sensor, taken for {across}x{down}"
+        if not self._cursor.count:
+            return [*super().remarks, f"{self._events_path} holds no events"]
+        return [*super().remarks, *[guessed] * self._guessed, *self._elsewhere()]
+
+    def _elsewhere(self) -> Iterator[str]:
+        """Whether all events are before the frames, or after them."""
+        first, lasts_s = next(self._source.frames(0), None), self._source.duration_expected_s
+        if first is None or lasts_s is None or self._cursor.seen_us is None:
+            return
+        begin_s, seen_s = first.t_ns * 1e-9, [t_us * 1e-6 for t_us in self._cursor.seen_us]
+        if seen_s[0] > begin_s + lasts_s or seen_s[1] < begin_s:
+            yield (
+                f"no event lies beside a frame: events are from {seen_s[0]:g} to {seen_s[1]:g} s, frames from"
+                f" {begin_s:g} to {begin_s + lasts_s:g} s; give both by one clock"
+            )
 
     def describe(self) -> dict[str, Any]:
         """What source and event file are."""
-        about = {"path": str(self._events_path), "size": list(self._cursor.size), "contrast": self.contrast}
+        about = {"path": str(self._events_path), "size": list(self.event_size), "contrast": self.contrast}
         return super().describe() | {"events": about | {"identity": identity(self._events_path)}}
 
     def events(self, start_us: int, stop_us: int) -> Events | None:

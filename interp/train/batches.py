@@ -14,7 +14,7 @@ import torch
 from lightning.pytorch import LightningDataModule
 from torch.utils.data import DataLoader, Dataset, Sampler
 
-from vid2ev.errors import UsageError
+from interp.train.machines import check_shares
 
 Batch = dict[str, torch.Tensor]  # as of `interp.data`, with a dimension more in front
 
@@ -51,11 +51,7 @@ class Feed(LightningDataModule):
         """From the trainer's step on."""
         trainer = self.trainer
         assert trainer is not None
-        if self.batch % trainer.world_size:
-            raise UsageError(
-                f"batches of {self.batch} cannot be shared out evenly among {trainer.world_size} processes;"
-                " set batch to a multiple, or use fewer --devices"
-            )
+        check_shares(self.batch, trainer.world_size)
         steps = Steps(trainer.global_step, self.batch, trainer.global_rank, trainer.world_size)
         return DataLoader(
             self.training,

@@ -29,6 +29,11 @@ class Machines:
         without = cpu or not torch.cuda.is_available()
         return cls(processes if without and devices == "auto" else devices, nodes, "cpu" if cpu else "auto")
 
+    def check_batch(self, batch: int) -> None:
+        """Raise UsageError where a batch cannot be shared out evenly, among devices that are known."""
+        if self.devices != "auto":
+            check_shares(batch, self.devices * self.nodes)
+
     @property
     def first(self) -> bool:
         """Whether this process leads: those that it starts, and those of other machines, have their ranks set."""
@@ -37,6 +42,15 @@ class Machines:
 
 
 ALL = Machines()
+
+
+def check_shares(batch: int, processes: int) -> None:
+    """Raise UsageError where a batch cannot be shared out evenly."""
+    if batch % processes:
+        raise UsageError(
+            f"batches of {batch} cannot be shared out evenly among {processes} processes;"
+            " set batch to a multiple, or use fewer --devices"
+        )
 
 
 def cores() -> int:

@@ -74,6 +74,12 @@ class RunFolder:
         if self.first:
             shutil.rmtree(self.clips, ignore_errors=True)
 
+    def give_up(self) -> None:
+        """Nothing was begun: make room for another run."""
+        self.forget_clips()
+        if self.first:
+            (self.path / "run.json").unlink(missing_ok=True)
+
     def close(self) -> None:
         """Let others at it."""
         if self.first and self._lock is not None:

@@ -14,6 +14,7 @@ from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import RunFolder
 from interp.train.starts import begin
 from vid2ev.commands.progress import counting
+from vid2ev.errors import UsageError
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 
@@ -47,8 +48,13 @@ def run(
             begin(learner, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = max(1, cores() - job.recipe.threads) if workers is None else workers
-        with counting(quiet, CLIPS) as report:
-            feed = feed_of(job, folder.clips, step, spare, cores(), report)
+        try:
+            with counting(quiet, CLIPS) as report:
+                feed = feed_of(job, folder.clips, step, spare, cores(), report)
+        except UsageError:
+            if not resume:
+                folder.give_up()
+            raise
         outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:
             folder.forget_clips()

@@ -15,7 +15,7 @@ from interp.data.dataset_spec import DatasetSpec
 from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
-from interp.evaluate.predictions import predictions_in
+from interp.evaluate.predictions import by_frame, predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
 from interp.evaluate.run import evaluate
@@ -206,6 +206,45 @@ def test_predictions_are_paired_by_position(tmp_path: Path, with_keys: bool) -> 
     recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
     for group in recording.groups():
         np.testing.assert_array_equal(np.stack(found[0].begin(recording).frames(group)), group.truth)
+
+
+@pytest.mark.parametrize("lost", [(5,), (2, 3), (0, 4, 8, 12), (1, 6, 11), (3, 4, 5, 6)])
+def test_numbered_predictions_of_which_some_are_missing_are_of_the_frames_of_their_numbers(
+    tmp_path: Path, lost: tuple[int, ...]
+) -> None:
+    truth = pictures(13)
+    write_hsergb(tmp_path / "seq", truth)
+    write_predictions(tmp_path / "theirs" / "seq", truth)
+    for k in lost:
+        (tmp_path / "theirs" / "seq" / f"frame{k}.png").unlink()
+    (theirs,) = predictions_in(tmp_path / "theirs")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
+    running = theirs.begin(recording)
+    for group in recording.groups():
+        for place, true, made in zip(group.positions, group.truth, running.frames(group), strict=True):
+            if group.first + place in lost:
+                assert made is None
+            else:
+                np.testing.assert_array_equal(made, true)
+
+
+@pytest.mark.parametrize("names", [["a", "b", "c"], ["1", "2", "3", "4"], ["7a7", "8b7", "9c7"]])
+def test_predictions_of_which_nobody_can_tell_what_they_are_of_are_refused(names: list[str]) -> None:
+    with pytest.raises(DataError, match=r"\d pictures for 13 frames, of which 9 are rebuilt; expected as many as"):
+        by_frame([Path(f"{name}.png") for name in names], 13, 4)
+
+
+def test_what_cannot_be_scored_is_said(tmp_path: Path) -> None:
+    """Frames that are dropped for their times, and footage that is too short."""
+    write_film(tmp_path / "film.npz", pictures(4))
+    with pytest.raises(DataError, match=r"film: 4 frames, expected 9 or more; give a smaller --skip"):
+        evaluate([str(tmp_path / "film.npz")], tmp_path / "report", baselines=("linear",))
+    folder = tmp_path / "frames"
+    write_predictions(folder, pictures(4))
+    (folder / "timestamps.txt").write_text("# us\n0\n8000\n4000\n12000\n")
+    found = evaluate([str(folder)], tmp_path / "other", baselines=("linear",), protocol=Protocol(1, 1))
+    (known,) = found.summary["sequences"].values()
+    assert any("dropped 1 of 4 frames" in remark for remark in known["remarks"])
 
 
 def test_missing_predictions_are_counted_and_those_of_another_size_refused(tmp_path: Path) -> None:

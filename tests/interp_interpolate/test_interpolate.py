@@ -227,3 +227,14 @@ def test_hdr_stands_anywhere_among_the_arguments(tmp_path: Path, monkeypatch: py
     result = CliRunner().invoke(command, ["--hdr", "b", "-x", "2", "--method", "bridge", "--json"])
     assert result.exit_code == 0, result.output
     assert Path(json.loads(result.output)["hdr"]["weights"]).stem in pretrained.HDR
+
+
+def test_grey_frames_move_as_those_of_one_colour_do(tmp_path: Path) -> None:
+    grey = [frame[..., 0] for frame in moving(2)]
+    coloured = [np.repeat(frame[..., None], 3, 2) for frame in grey]
+    for name, pictures in (("grey", grey), ("coloured", coloured)):
+        interpolate(images(tmp_path / name, pictures), tmp_path / f"out_{name}", multiple=3, method="flow")
+    for k in range(4):
+        one, other = (read_codes(tmp_path / f"out_{name}" / f"{k:06d}.png") for name in ("grey", "coloured"))
+        assert one.ndim == 2
+        np.testing.assert_allclose(one, other[..., 0], atol=1)

@@ -56,6 +56,35 @@ def test_a_cursor_gives_each_event_once_and_goes_back_if_it_has_to(tmp_path: Pat
         same(cursor.between(start, stop), events.select((events.t > start) & (events.t <= stop)))
 
 
+def test_a_sensor_of_unknown_size_is_that_of_the_frames_if_all_events_are_within(tmp_path: Path) -> None:
+    """As of a file that states it; and it is said."""
+    frames = images(tmp_path / "frames", moving())
+    inside = drawn()
+    inside = inside.select((inside.x < 30) & (inside.y < 20))
+    made = {}
+    for format in ("csv", "npz"):
+        path = written(tmp_path / f"events{format_named(format).suffix}", inside, format)
+        take = open_take(str(frames), Options(events=path))
+        made[format] = take.event_size, take.apart, [text for text in take.remarks if "does not state" in text]
+    assert made["npz"] == (SIZE, False, [])
+    assert made["csv"][:2] == (SIZE, False) and made["csv"][2][0].endswith("taken for 64x48")
+    (tmp_path / "larger.csv").write_text("t,x,y,p\n0,99,10,1\n20000,0,0,0\n")
+    take = open_take(str(frames), Options(events=tmp_path / "larger.csv"))
+    assert take.event_size == (100, 11) and any("taken for 100x11" in text for text in take.remarks)
+
+
+@pytest.mark.parametrize("later_us", [10**9, -(10**9)])
+def test_events_by_another_clock_are_warned_of(tmp_path: Path, later_us: int) -> None:
+    frames = images(tmp_path / "frames", moving(), start_us=max(0, -later_us))
+    events = drawn()
+    late = Events(events.t + max(0, later_us), events.x, events.y, events.p)
+    (tmp_path / "late.csv").write_text(
+        "t,x,y,p\n" + "".join(f"{t},{x},{y},{p}\n" for t, x, y, p in zip(late.t, late.x, late.y, late.p, strict=True))
+    )
+    take = open_take(str(frames), Options(events=tmp_path / "late.csv"))
+    assert any("no event lies beside a frame" in text for text in take.remarks)
+
+
 def test_a_cursor_holds_no_more_than_a_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cursor = EventCursor(written(tmp_path / "a.npz", drawn(20_000)))
     taken: list[int] = []

@@ -74,6 +74,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--size", "huge"], "'huge' is not one of"),
         (["--dry-run", "--start", "features=firenet-paper"], "the loss of this network looks at no features"),
         (["--dry-run", "--start", "foo=firenet-paper"], "RrinEventsGuided has no part 'foo'; it has"),
+        (["--dry-run", "--cpu", "--set", "batch=3"], "batches of 3 cannot be shared out evenly among 2 processes"),
         (["--data", "nowhere"], "Path 'nowhere' does not exist"),
     ],
 )
@@ -82,6 +83,17 @@ def test_wrong_options_are_one_sentence_and_exit_code_2(arguments: list[str], se
     assert shown.exit_code == 2
     assert sentence in shown.output and "Traceback" not in shown.output
     assert not list(tmp_path.iterdir())
+
+
+def test_data_that_cannot_be_used_leave_room_for_another_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    from interp.train.made_of import feed_of
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runs, "feed_of", feed_of)
+        Path("nothing").mkdir()
+        shown = run("--data", "nothing", "-o", "run", *FEW)
+    assert shown.exit_code == 2 and "nothing: no recordings in it" in shown.output
+    assert run("-o", "run", *FEW).exit_code == 0
 
 
 def test_training_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
