@@ -46,14 +46,17 @@ def places(start, y, across, down, time, pitch, x_last, y_last, entry, weights):
 
 
 @inner
-def look_up(light, pitch, entry, weights, count, out):
-    """Light at the first `count` of the places of `places`: run by run of places side by side, as most are."""
-    first, flat, plane = 0, weights.reshape(-1), np.uintp(weights.shape[1])
+def look_up(light, pitch, entry, weights, plane, count, out):
+    """Light at the first `count` of the places of `places`: run by run of places side by side, as most are.
+
+    Its weights are flat here, rows of `plane`.
+    """
+    first, plane = 0, np.uintp(plane)
     while first < count:
         last, ahead = first + 1, entry[first] - np.int32(first)
         while last < count and entry[last] - np.int32(last) == ahead:
             last += 1
-        _look_up_run(light, pitch, entry[first], flat, plane, first, last, out)
+        _look_up_run(light, pitch, entry[first], weights, plane, first, last, out)
         first = last
 
 

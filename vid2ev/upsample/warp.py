@@ -135,7 +135,7 @@ def carry(before, after, motion, time, out, still):
     height, width = out.shape
     pitch, x_last, y_last = before.shape[1], F(width - 1), F(height - 1)
     entry, weights = np.empty(width, np.int32), np.empty((8, width), F)
-    seen_before, seen_after = np.empty(width, F), np.empty(width, F)
+    seen_before, seen_after, flat_weights = np.empty(width, F), np.empty(width, F), weights.reshape(-1)
     flat_before, flat_after, flat_motion, flat_out = (
         before.reshape(-1), after.reshape(-1), motion.reshape(-1), out.reshape(-1)
     )  # fmt: skip
@@ -156,9 +156,9 @@ def carry(before, after, motion, time, out, still):
             if first < last:
                 across, down, share = motion[0, y, first:last], motion[1, y, first:last], motion[2, y, first:last]
                 places(first, F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
-                look_up(flat_before, pitch, entry, weights, last - first, seen_before)
+                look_up(flat_before, pitch, entry, flat_weights, width, last - first, seen_before)
                 places(first, F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
-                look_up(flat_after, pitch, entry, weights, last - first, seen_after)
+                look_up(flat_after, pitch, entry, flat_weights, width, last - first, seen_after)
                 _mix(seen_before, seen_after, share, out[y, first:last])
 
 
