@@ -90,6 +90,8 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
     """The specification of a sensor of a kind; see `load_sensor`."""
     sensor = read_sensor(name_or_path, kind)
     values = dict(sensor.values)
+    if isinstance(overrides, str) or not all(isinstance(override, str) for override in overrides):
+        raise UsageError(f"overrides {overrides!r}: expected a list of texts, such as [{kind.example!r}]")
     for override in overrides:
         key, value = setting(override, kind.example)
         values[key.removeprefix(f"{kind.table}.")] = value

@@ -1,0 +1,33 @@
+"""What no sensor can be is refused in a sentence that says what is expected."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from vid2ev import Dvs, DvsSpec, UsageError, load_sensor
+
+
+@pytest.mark.parametrize(
+    ("size", "expected"),
+    [
+        ((0, 5), "33554432 pixels in all, and 65535 a side"),
+        ((100_000, 1), "33554432 pixels in all, and 65535 a side"),
+        ((8000, 8000), "33554432 pixels in all, and 65535 a side"),
+        ((2,), "two whole numbers"),
+        ((1.5, 2), "two whole numbers"),
+        ("ab", "two whole numbers"),
+        (5, "two whole numbers"),
+    ],
+)
+def test_a_size_that_cannot_be_is_refused(size: Any, expected: str) -> None:
+    with pytest.raises(UsageError, match=expected) as error:
+        Dvs(DvsSpec(), size)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("overrides", ["threshold_on=0.2", [("threshold_on", 0.2)], [1]])
+def test_overrides_that_are_no_list_of_texts_are_refused(overrides: Any) -> None:
+    with pytest.raises(UsageError, match=r"expected a list of texts, such as \['threshold_on="):
+        load_sensor("ideal", overrides)
