@@ -172,6 +172,11 @@ def test_nmnist(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.t, events.t + 8192 * (np.arange(1000) >= 500))
 
 
+def test_zeros_are_no_nmnist(tmp_path: Path) -> None:
+    (tmp_path / "zeros.bin").write_bytes(bytes(100_000))
+    assert recognise(tmp_path / "zeros.bin") is None
+
+
 @pytest.mark.skipif(not NMNIST.exists(), reason=f"{NMNIST.name} is not there")
 def test_nmnist_of_a_camera() -> None:
     found = describe_events(NMNIST)

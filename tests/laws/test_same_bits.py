@@ -161,6 +161,16 @@ def test_layout_and_type_of_the_light_do_not_matter():
     assert_same(sent, play(clean(), t_ns, np.stack(halved)))
 
 
+def test_the_byte_order_of_codes_does_not_matter():
+    codes = np.random.default_rng(0).integers(0, 1 << 16, (6, *SHAPE)).astype(np.uint16)
+    sent = []
+    for same in (codes, codes.astype(">u2")):
+        dvs = Dvs(clean(), SHAPE[::-1], transfer="srgb")
+        sent.append(Events.concatenate(dvs.steps(same, [1_000_000 * k for k in range(6)])))
+    assert len(sent[0]) > 1000
+    assert_same(*sent)
+
+
 def test_the_light_given_is_not_touched_nor_kept():
     t_ns, light = clip(12)
     want = play(EVERYTHING, t_ns, light)

@@ -28,7 +28,7 @@ def test_floating_point_is_linear_light(tmp_path: Path, dtype) -> None:
         assert frame.light.dtype == np.float32 and frame.t_ns == k * 1_000_000
 
 
-@pytest.mark.parametrize(("dtype", "bits"), [(np.uint8, 8), (np.uint16, 16)])
+@pytest.mark.parametrize(("dtype", "bits"), [(np.uint8, 8), (np.uint16, 16), (">u2", 16)])
 def test_integers_need_to_be_told_what_they_mean(tmp_path: Path, dtype, bits: int) -> None:
     stack = np.random.default_rng(0).integers(0, 2**bits, (3, 5, 6)).astype(dtype)
     path = saved(tmp_path, stack)

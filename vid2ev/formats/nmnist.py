@@ -3,8 +3,9 @@
     column 8 bits, row 8 bits, ON 1 bit, time 23 bits [us], big-endian
 
 An event in row 240 is none: from there on, times are 8192 us later.  There is nothing at the start by which such a file
-could be known; it is one if its size is that of whole events, they are on a sensor of 240x180, do not go back in time,
-and are not text.  N-MNIST has 34x34 pixels, and the file of an N-Caltech101 picture does not say how many it has.
+could be known; it is one if its size is that of whole events, they are on a sensor of 240x180, take time, do not go
+back in it, and are not text.  N-MNIST has 34x34 pixels, and the file of an N-Caltech101 picture does not say how many
+it has.
 
 Source: Orchard et al., Frontiers in Neuroscience 9:437 (2015), and its Read_Ndataset.m
 """
@@ -65,7 +66,7 @@ def _recognises(head: bytes, path: Path) -> bool:
     later = y == LATER_ROW
     t = (LATER_US * np.cumsum(later) + _time(high, middle, low))[~later]
     on_sensor = (x < SENSOR[0]) & (y < SENSOR[1]) | later
-    return bool(np.all(on_sensor) and np.all(t[1:] >= t[:-1]) and len(t))
+    return bool(np.all(on_sensor) and np.all(t[1:] >= t[:-1]) and len(t) and t[-1] > t[0])
 
 
 def _time(high: np.ndarray, middle: np.ndarray, low: np.ndarray) -> np.ndarray:

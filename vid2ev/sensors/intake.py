@@ -34,14 +34,15 @@ class Intake:
             with np.errstate(over="ignore"):  # (what is beyond float32 becomes infinite, and is mended)
                 flat = np.ascontiguousarray(light, np.float32)
             return flat.reshape(-1, pixels), np.empty(0, np.float32)
-        if light.dtype not in (np.uint8, np.uint16) or self.transfer is None:
+        codes = light.dtype.newbyteorder("=")
+        if codes not in (np.uint8, np.uint16) or self.transfer is None:
             raise UsageError(
                 f"light of type {light.dtype}: expected floating point (linear light), or uint8 or uint16 with"
                 " transfer='srgb', 'bt709', 'gamma:2.2' or 'linear'"
             )
-        if light.dtype not in self._tables:
-            self._tables[light.dtype] = _table(self.transfer, 8 * light.dtype.itemsize)
-        return np.ascontiguousarray(light).reshape(-1, pixels), self._tables[light.dtype]
+        if codes not in self._tables:
+            self._tables[codes] = _table(self.transfer, 8 * codes.itemsize)
+        return np.ascontiguousarray(light, codes).reshape(-1, pixels), self._tables[codes]
 
 
 def _table(transfer: str, bits: int) -> np.ndarray:

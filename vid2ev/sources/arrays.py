@@ -48,7 +48,7 @@ class ArrayStack:
         shape, dtype = stack.shape, stack.dtype
         if len(shape) not in (3, 4) or 0 in shape or (len(shape) == 4 and shape[3] != 3):
             raise DataError(f"{self.path}: array of shape {shape}, expected [N, H, W] or [N, H, W, 3]")
-        if dtype not in (np.uint8, np.uint16) and dtype.kind != "f":
+        if dtype.newbyteorder("=") not in (np.uint8, np.uint16) and dtype.kind != "f":
             raise DataError(f"{self.path}: array of type {dtype}, expected {TYPES}")
         if transfer == "auto" and dtype.kind != "f":
             raise UsageError(f"{self.path}: {dtype} codes that may mean anything; say what with --transfer {KNOWN}")
