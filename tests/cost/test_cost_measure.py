@@ -182,6 +182,12 @@ def test_what_cannot_be_meant_is_refused(clip: str, options: dict, said: str) ->
         measured(clip, clock=ticks(), **SIMPLE | options)
 
 
+def test_a_single_frame_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    np.save(tmp_path / "one.npy", np.zeros((1, 8, 8)))
+    with pytest.raises(UsageError, match=r"a single frame .* expected two or more, of a clip with more frames"):
+        measured(str(tmp_path / "one.npy"), clock=ticks(), **SIMPLE)
+
+
 def test_the_reference_draws_the_noise_that_is_drawn_in_a_stretch_from_the_middle(clip: str) -> None:
     """Noise by count is counted from one instant in all settings; else it would be the largest of their errors."""
     options = {"video": clip, "fps": 50, "start": 0.06, "subframes": 4, "tolerance": 0.01}

@@ -28,6 +28,11 @@ def flat(codes: list[int], shape: tuple[int, int] = (32, 48)) -> list[np.ndarray
     return [np.full(shape, code, np.uint8) for code in codes]
 
 
+def chroma_too(code: int) -> av.VideoFrame:
+    """A grey picture in yuv420p, for codecs that have no grey."""
+    return av.VideoFrame.from_ndarray(flat([code])[0], format="gray").reformat(format="yuv420p")
+
+
 # ---------------------------------------------------------------------------------------------------------- times
 
 
@@ -62,6 +67,33 @@ def test_a_clip_that_starts_late_keeps_its_times(encode) -> None:
     path = encode("a.mkv", flat([1, 2, 3]), stamps=[hours, hours + 33, hours + 66], time_base=Fraction(1, 1000))
     times = [frame.t_ns for frame in open_source(path).frames()]
     assert times == [(hours + k) * 1_000_000 for k in (0, 33, 66)]
+
+
+@pytest.mark.parametrize("begin_s", [0, 5, 100_000])
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv", "a.webm", "a.ts"])
+def test_what_a_header_says_counts_from_the_first_frame(encode, name: str, begin_s: int) -> None:
+    """Containers write how long a clip lasts, Matroska where it ends."""
+    codec = {"a.mkv": "ffv1", "a.webm": "libvpx-vp9"}.get(name, "libx264")
+    pictures = [chroma_too(code) for code in range(0, 100, 10)] if name == "a.webm" else flat([*range(0, 100, 10)])
+    source = open_source(
+        encode(name, pictures, codec=codec, stamps=[30 * begin_s + k for k in range(10)], options={"bf": "0"})
+    )
+    times = [frame.t_ns for frame in source.frames()]
+    if name != "a.ts":  # (whose muxer begins later)
+        assert times[0] == begin_s * 10**9
+    assert source.frames_expected == len(times) == 10
+    assert source.duration_expected_s == pytest.approx(1 / 3, abs=0.005)
+    assert source.warnings == []
+
+
+def test_matroska_by_others_says_how_long_it_lasts(encode) -> None:
+    """As mkvmerge writes it: from the first frame to the end, which libavformat counts from 0."""
+    path = encode("a.mkv", flat([*range(0, 200, 2)]), stamps=[30 + k for k in range(100)])
+    data, end, length = path.read_bytes(), b"00:00:04.33", b"00:00:03.33"
+    assert data.count(end) == 1 and data.count(b"Lavf") > 0
+    path.write_bytes(data.replace(end, length).replace(b"Lavf", b"mux "))
+    source = open_source(path)
+    assert source.frames_expected == 100 and source.duration_expected_s == pytest.approx(10 / 3, abs=0.01)
 
 
 def test_repeated_times_are_dropped_and_counted(encode) -> None:

@@ -154,7 +154,10 @@ def _rows(
     turns.next(ladder.reference.name)
     first = run(options, ladder.reference, threads, keep=True, views=views)
     if first.span_ns[0] >= first.span_ns[1]:
-        raise UsageError(f"{options['video']}: a single frame in the stretch; lengthen --duration")
+        raise UsageError(
+            f"{options['video']}: a single frame in the stretch that settings are tried on; expected two or more, of a"
+            " clip with more frames or by vid2ev cost with a longer --duration"
+        )
     reference = Reference(first.sent, (first.span_ns[0] // 1000, first.span_ns[1] // 1000))
     found = [(reference.errors_of_itself(), first.events)]
     for rung in ladder.rungs:

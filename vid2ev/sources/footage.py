@@ -31,7 +31,7 @@ class Footage(Protocol):
     codec: str
     rate: Fraction | None  # nominal, frames per second
     planned: int  # frames by the header, 0 if it does not say
-    end_s: Fraction | None  # by the header
+    end_s: Fraction | None  # by the header, on the clock of the pictures
     first: Any  # the first picture
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
@@ -50,12 +50,12 @@ class VideoFile:
         with self._opened() as (container, stream):
             self.rate = stream.average_rate or stream.guessed_rate
             self.planned: int = stream.frames
-            self.end_s = announced_end_s(container, stream)
             self.codec: str = stream.codec_context.name
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
             self.first = next(_decoded(container, stream, self.planned, []), None)
-        if self.first is None:
-            raise DataError(f"{self.path}: no frame in it can be decoded; {REMEDY}")
+            if self.first is None:
+                raise DataError(f"{self.path}: no frame in it can be decoded; {REMEDY}")
+            self.end_s = announced_end_s(container, stream, stamp_of(self.first) or Fraction(0))
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
         """The pictures from the first one on, or from a key frame before `since_s`, where such a one is known."""
@@ -128,15 +128,26 @@ def stamp_of(picture: Any) -> Fraction | None:
     return None if picture.pts is None else picture.pts * Fraction(picture.time_base)
 
 
-def announced_end_s(container: Any, stream: Any) -> Fraction | None:
-    """Where the stream ends [s] by the header: its tag (Matroska), or the duration if the file holds nothing else."""
+def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction | None:
+    """Where a stream that begins at `begin_s` ends [s] by the header: its tag (Matroska), or the duration if the file
+    holds nothing else.
+
+    Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there.
+    """
     tag = re.fullmatch(r"(\d+):(\d+):(\d+(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
     if tag:
         hours, minutes, seconds = map(Fraction, tag.groups())
-        return 3600 * hours + 60 * minutes + seconds
-    if container.duration and len(container.streams) == 1:
-        return Fraction(container.duration, 10**6)
-    return None
+        said_s = 3600 * hours + 60 * minutes + seconds
+    elif container.duration and len(container.streams) == 1:
+        said_s = Fraction(container.duration, 10**6)
+    else:
+        return None
+    is_end = "matroska" in container.format.name and _muxer(container).startswith("Lavf") and said_s > begin_s
+    return said_s if is_end else begin_s + said_s
+
+
+def _muxer(container: Any) -> str:
+    return next((text for key, text in container.metadata.items() if key.lower() == "encoder"), "")
 
 
 def reason(error: Exception) -> str:

@@ -75,11 +75,11 @@ class Video:
     @property
     def duration_expected_s(self) -> float | None:
         """From the first frame to the end, by the header."""
-        footage = self._footage
+        footage, lasting_s = self._footage, self._lasting_s()
         if self._fps is not None:
             return None if self.frames_expected is None else float(self.frames_expected / self._fps)
-        if footage.end_s is not None:
-            return float(footage.end_s - (stamp_of(footage.first) or 0))
+        if lasting_s is not None:
+            return float(lasting_s)
         return float(footage.planned / footage.rate) if footage.planned and footage.rate else None
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
@@ -121,8 +121,13 @@ class Video:
 
     def _estimate(self) -> int | None:
         """The number of frames, from duration and rate."""
-        end_s, rate = self._footage.end_s, self._footage.rate
-        return max(1, round(end_s * rate)) if end_s and rate else None
+        lasting_s, rate = self._lasting_s(), self._footage.rate
+        return max(1, round(lasting_s * rate)) if lasting_s and rate else None
+
+    def _lasting_s(self) -> Fraction | None:
+        """From the first picture to the end on the clock of the file, by the header."""
+        end_s = self._footage.end_s
+        return None if end_s is None else end_s - (stamp_of(self._footage.first) or 0)
 
     # ------------------------------------------------------------------------------------------------- to light
 
