@@ -8,6 +8,7 @@ import pickle
 import struct
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ import torch
 from interp import weights
 from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
+from vid2ev.commands.batch import sources_in
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import open_events
 from vid2ev.light.picture_files import read_picture
-from vid2ev.recording.exposures import read_codes
+from vid2ev.recording.exposures import read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
+from vid2ev.recording.pose_text import read_poses
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask
 from vid2ev.rig.calibration import read_calibration
 from vid2ev.rig.depth import DepthScale
@@ -33,6 +36,7 @@ from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
+from vid2ev.sources.motion import parse_motion
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.toml_text import parsed_toml
 from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes
@@ -52,6 +56,12 @@ def npz(path: Path, **members: bytes) -> Path:
         for name, content in members.items():
             archive.writestr(f"{name}.npy", content)
     return path
+
+
+def events_in(path: Path) -> list[Any]:
+    """All that an event file says."""
+    file = open_events(path)
+    return [file.size, *(getattr(part, name).tolist() for part in file.events() for name in "txyp")]
 
 
 @pytest.fixture
@@ -186,6 +196,36 @@ def test_scenes_have_so_many_things_and_no_more(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(f"[scene]\nduration_s = 1\n{things}")
     with pytest.raises(UsageError, match="expected at most 5,000 in all"):
         read_scene(tmp_path / "a.toml")
+
+
+RIG = '[[camera]]\nname = "a"\nkind = "dvs"\nsize = [8, 8]\n'
+SENSOR = "[dvs]\nthreshold_on = 0.3\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "read"),
+    [
+        ("timestamps.txt", "0.0\n0.5\n1.0\n", read_timestamps),
+        ("timestamps.txt", "# unit: ms\n0\n40\n", read_timestamps),
+        ("list.txt", "a.mp4\nb.mp4\n", lambda path: sources_in(str(path))),
+        ("poses.txt", "0.5 1 2 3 0 0 0 1\n", lambda path: [array.tolist() for array in read_poses(path)]),
+        ("spans.txt", "0 100\n", lambda path: read_spans(path).tolist()),
+        ("path.csv", "t,x,y\n0,0,0\n1,2,3\n", lambda path: vars(parse_motion(str(path)))),
+        ("sensor.toml", SENSOR, lambda path: load_sensor(path)),
+        ("rig.toml", RIG, read_rig),
+        ("events.csv", "t,x,y,p\n81,4,17,1\n", events_in),
+        ("events.csv", "%geometry:32,32\n4,17,1,81\n", events_in),
+        ("events.txt", "0.081000 4 17 1\n", events_in),
+        ("events.txt", "# t x y p\n32 32\n0.081000 4 17 1\n", events_in),
+    ],
+)
+def test_the_mark_that_windows_puts_before_a_text_is_no_part_of_it(
+    name: str, text: str, read: Callable[[Path], Any], tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    plain = str(read(tmp_path / name))
+    (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    assert str(read(tmp_path / name)) == plain
 
 
 def test_names_in_files_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

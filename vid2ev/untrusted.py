@@ -53,11 +53,14 @@ def limit_for(count: int) -> str:
 
 
 def read_text(path: Path) -> str:
-    """A text in UTF-8.  Raises OSError, UnicodeDecodeError, DataError for one that is too long to be meant."""
+    """A text in UTF-8, without the mark that Windows puts before it.
+
+    Raises OSError, UnicodeDecodeError, DataError for one that is too long to be meant.
+    """
     size = path.stat().st_size if path.is_file() else 0
     if size > TEXT_MB << 20:
         raise DataError(f"{path}: {size:,} bytes are too many for such a text; expected at most {TEXT_MB} MB")
-    return path.read_text(encoding="utf-8")
+    return path.read_text(encoding="utf-8-sig")
 
 
 def check_depth(path: Path, text: str) -> None:

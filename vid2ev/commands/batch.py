@@ -185,7 +185,7 @@ def _is_events(path: Path) -> bool:
 def _listed(path: Path) -> list[str]:
     """The lines of a list but for empty ones and those that begin with #.  Raises DataError, UsageError."""
     try:
-        lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+        lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, ValueError) as error:
         raise DataError(
             f"{path} cannot be read as a list of videos ({error}); give a text file, a line for each"

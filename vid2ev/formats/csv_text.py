@@ -16,7 +16,7 @@ from pathlib import Path
 from vid2ev.errors import DataError
 from vid2ev.formats.event_file import HEAD, Format, Recording
 from vid2ev.formats.sequential import reading
-from vid2ev.formats.text import FIELDS, TextEvents, write_lines
+from vid2ev.formats.text import FIELDS, MARK, TextEvents, write_lines
 
 NAMES = {"t": "ts|time|timestamp|t_us|time_us|timestamp_us", "x": "", "y": "", "p": "on|pol|polarity", "label": ""}
 GEOMETRY = re.compile(rb"%geometry:(\d{1,5}),(\d{1,5})\r?\n")
@@ -45,9 +45,10 @@ def write_events(path: Path, recording: Recording) -> None:
 
 def _columns(head: bytes) -> tuple[list[str], int, tuple[int, int] | None] | None:
     """The columns, the lines before the first event, and the size if it is there; None if it is no such text."""
+    head = head.removeprefix(MARK)
     if (found := GEOMETRY.match(head)) and re.match(rb"(%.*\n)*(\d+,\d+,-?\d,\d+\r?\n|$)", head[found.end() :]):
         return METAVISION, 1, (int(found[1]), int(found[2]))
-    line = head.partition(b"\n")[0].removeprefix(b"\xef\xbb\xbf")
+    line = head.partition(b"\n")[0]
     if not re.fullmatch(rb"[\x20-\x7e]{7,1000}\r?", line):
         return None
     names = [name.strip(" #\"'\r").lower().partition("@") for name in line.decode().split(",")]

@@ -18,7 +18,7 @@ from vid2ev.formats.event_file import HEAD, Format, Recording
 from vid2ev.formats.sequential import reading
 from vid2ev.formats.text import FIELDS, TextEvents, write_lines
 
-COMMENTS = re.compile(rb"(?:[#%][\t\x20-\x7e]{0,1000}\r?\n)*")
+COMMENTS = re.compile(rb"(?:\xef\xbb\xbf)?(?:[#%][\t\x20-\x7e]{0,1000}\r?\n)*")
 SIZE = re.compile(rb"[ \t]*([1-9]\d{0,4})[ \t]+([1-9]\d{0,4})[ \t]*(?:\r?\n|$)")
 EVENT = re.compile(rb"[ \t]*(?:[-+]?[\d.][\deE.+-]{0,40}[ \t]+){3}[-+]?[01](?:\.0*)?(?:[eE][-+]?0+)?[ \t]*(?:\r?\n|$)")
 DECIMALS, SECOND = 6, 10**6

@@ -15,6 +15,7 @@ from vid2ev.stream.events import Events
 LINES = 1 << 15  # written at a time
 LONGEST = 1 << 16  # bytes of a line that is read
 SHORTEST = 8  # bytes of a line that has an event
+MARK = b"\xef\xbb\xbf"  # that Windows puts before a text
 FIELDS = ("t", "x", "y", "p", "label")
 
 
@@ -56,6 +57,8 @@ class TextEvents(Sequential):
         """Whole lines, the number of the first, and whether the last had no end in the file."""
         rest, line = b"", 1 + self._skip
         with reading(self.path) as file:
+            if file.read(len(MARK)) != MARK:
+                file.seek(0)
             for _ in range(self._skip):
                 file.readline(LONGEST)
             while piece := file.read(PIECE):

@@ -53,7 +53,7 @@ def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError, UsageError if
     there is no such file."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError as error:
         raise UsageError(f"{path}: no such file; give a file of poses") from error
     except (OSError, UnicodeDecodeError) as error:

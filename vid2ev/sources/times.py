@@ -113,7 +113,7 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
     unit, column, words = None, -1, []
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read as text ({error}); expected one time per line") from error
     for number, line in enumerate(lines, 1):
