@@ -28,7 +28,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from llvmlite.binding import Linkage
+from llvmlite.binding import Linkage, get_host_cpu_features
 from numba import _dynfunc, njit  # type: ignore[attr-defined]
 from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
@@ -115,7 +115,28 @@ def of_plain_types(dispatcher: Any) -> Any:
 FlagsAreConstants = pass_over_flags(register_pass, FunctionPass, Numba(ir, types, guard, get_definition))
 
 
-class InnerLibrary(JITCodeLibrary):
+class WideLibrary(JITCodeLibrary):
+    """Code in vectors as wide as the machine has them.
+
+    LLVM takes half of them on Intel's machines, as the first that had wide ones ran slower for using them; later ones,
+    which have VBMI2, do not (sensors take 4 to 13 % less time by it, light carried along motion a fifth).
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        if has_wide_vectors():
+            for function in ir_module.functions:
+                if not function.is_declaration:
+                    set.add(function.attributes, '"prefer-vector-width"="512"')  # (llvmlite knows no such attribute)
+        super().add_ir_module(ir_module)
+
+
+@functools.cache
+def has_wide_vectors() -> bool:
+    """Whether the machine has vectors of 64 bytes, and is none the slower for them."""
+    return bool(get_host_cpu_features().get("avx512vbmi2"))
+
+
+class InnerLibrary(WideLibrary):
     """The code of an inner function: optimised only as far as its loops vectorise, and without machine code.
 
     Parts of it in which loops are within loops are added after that: they have been through it themselves, and no
@@ -150,7 +171,7 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
 
-class KernelLibrary(JITCodeLibrary):
+class KernelLibrary(WideLibrary):
     """The code of a kernel: its parts are its own, and what has one caller is put into it.
 
     A record goes to a part as its numbers, some hundred of them: a call that stays takes longer than to look at a strip
