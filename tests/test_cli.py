@@ -253,10 +253,31 @@ def test_sources_that_are_none() -> None:
     refused(2, "no such file", "info", "missing.h5")
     Path("text.h5").write_text("t x y p")
     refused(1, "text.h5 is named as event files are", "info", "text.h5")
+    Path("noise.raw").write_bytes(Path("noise.avi").read_bytes()[:5000])
+    refused(1, "noise.raw is named as event files are", "info", "noise.raw")
+    refused(1, "noise.raw", "convert", "noise.raw")
     refused(2, "add --frames-out", "convert", "synthetic:ramp", "--frames-by", "count:100")
     Path("odd").mkdir()
     Path("odd/manifest.json").write_text("[1, 2]")
     refused(1, "manifest", "info", "odd")
+
+
+@pytest.mark.parametrize("name", ["clip.h5", "clip.raw", "clip.txt", "clip.png"])
+def test_content_says_what_a_file_is_and_not_its_name(name: str) -> None:
+    """To all commands alike."""
+    clip = write_video(Path("clip.mp4"), 3)
+    expected = vid2ev("info", str(clip)).stdout
+    clip.rename(name)
+    assert vid2ev("info", name).stdout == expected.replace("clip.mp4", name)
+    assert vid2ev("convert", name, "-o", "out", "-q", *QUICK).exit_code == 0
+
+
+def test_a_list_of_videos_is_one_to_all_commands() -> None:
+    Path("list.txt").write_text("clip.mp4\n")
+    refused(2, "a list of videos; give one of them", "info", "list.txt")
+    Path("list.txt").write_text("clip.mp4\n", encoding="utf-16")
+    refused(2, "a list of videos; give one of them", "info", "list.txt")
+    refused(1, "cannot be read as a list of videos", "convert", "list.txt")
 
 
 def test_a_place_that_cannot_be_written() -> None:

@@ -22,6 +22,7 @@ CLIPS = {
 }  # fmt: skip
 
 LIST = ".txt"
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and is refused as what it is)
 
 Convert = Callable[[str, Path], dict[str, Any]]
 
@@ -32,7 +33,7 @@ def sources_in(video: str) -> list[str]:
     from vid2ev.light.recognise import natural
 
     folder = Path(video)
-    if folder.suffix.lower() == LIST and folder.is_file() and not _is_events(folder):
+    if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
     if video == "-" or not folder.is_dir() or _holds_pictures(folder) or (folder / "manifest.json").exists():
         return [video]
@@ -175,11 +176,15 @@ def _holds_pictures(folder: Path) -> bool:
     return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())
 
 
-def _is_events(path: Path) -> bool:
-    """Whether a text file holds events, which are no list."""
+def is_list(path: Path) -> bool:
+    """Whether a file named NAME.txt is a list: a text that holds no events."""
+    if path.suffix.lower() != LIST or not path.is_file():
+        return False
     from vid2ev.formats import recognise
+    from vid2ev.light.recognise import head_of
 
-    return recognise(path) is not None
+    head = head_of(path)
+    return (b"\0" not in head or head.startswith(UTF_16)) and recognise(path) is None
 
 
 def _listed(path: Path) -> list[str]:
@@ -193,6 +198,6 @@ def _listed(path: Path) -> list[str]:
     found = [line for line in lines if line and not line.startswith("#")]
     if not found:
         raise UsageError(f"{path} names no videos; expected a line for each")
-    if inner := next((line for line in found if Path(line).suffix.lower() == LIST), None):
+    if inner := next((line for line in found if is_list(Path(line))), None):
         raise UsageError(f"{path} names {inner}, a list within a list; expected videos and folders of them")
     return found

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vid2ev.commands.source_options import source_options
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    from vid2ev.sources import Source
 
 EVENT_SUFFIXES = {".aedat", ".aedat4", ".bag", ".dat", ".es", ".h5", ".hdf5", ".raw"}  # of no source of frames
 
@@ -25,6 +28,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
     from vid2ev.commands import summary
+    from vid2ev.commands.batch import is_list
     from vid2ev.formats import describe_events, recognise
 
     path = Path(file)
@@ -42,12 +46,24 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     elif (path / "metadata.yaml").is_file() or (path.is_file() and recognise(path)):  # (a folder of ROS 2, a file)
         found = describe_events(path)
         facts = summary.event_facts(found)
-    elif path.is_file() and path.suffix.lower() in EVENT_SUFFIXES:
-        raise DataError(f"{path} is named as event files are, but begins as none; it is damaged or something else")
+    elif is_list(path):
+        raise UsageError(f"{path} is a text, which vid2ev convert takes for a list of videos; give one of them")
     else:
-        from vid2ev.sources import open_source
-
-        source = open_source(file, **options)
+        source = _opened(path, file, options)
         found = {"path": file} | source.describe() | {"duration_expected_s": source.duration_expected_s}
         facts = [("source", summary.source_text(found)), *(("warning", text) for text in source.warnings)]
     click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))
+
+
+def _opened(path: Path, file: str, options: dict[str, Any]) -> Source:
+    """The source of frames, whatever its name; what is none is an event file that is damaged if it is named as one."""
+    from vid2ev.sources import open_source
+
+    try:
+        return open_source(file, **options)
+    except DataError as error:
+        if path.is_file() and path.suffix.lower() in EVENT_SUFFIXES:
+            raise DataError(
+                f"{path} is named as event files are, but begins as none; it is damaged or something else"
+            ) from error
+        raise

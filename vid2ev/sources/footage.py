@@ -79,7 +79,9 @@ class VideoFile:
         except (av.FFmpegError, ValueError) as error:
             raise DataError(f"{self.path}: not a video that can be read ({reason(error)}); {REMEDY}") from error
         with container:
-            if container.format.name.endswith("_pipe") or container.format.name == "image2":
+            if container.format.name == "image2":  # (by the name alone)
+                raise DataError(f"{self.path}: named as a picture is, but not one that can be read; {REMEDY}")
+            if container.format.name.endswith("_pipe"):
                 raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
             yield container, video_stream(container, self.name)
 
