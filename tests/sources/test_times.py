@@ -104,6 +104,38 @@ def test_a_bad_timestamp_file_is_refused_by_name(tmp_path: Path, text: str) -> N
         read_timestamps(file)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,0\n0,01\n0,02\n",
+        "0\n0,5\n1\n1,5\n",
+        "# unit: s\n0,9\n1,0\n1,1\n",
+        "0,5\n1,5\n2,5\n",
+        "a.png;0,000\nb.png;0,033\nc.png;0,067\n",
+        "-0,033\n0,000\n0,033\n",
+    ],
+)
+def test_a_decimal_comma_is_refused_by_name(tmp_path: Path, text: str) -> None:
+    (tmp_path / "timestamps.txt").write_text(text)
+    with pytest.raises(DataError, match=r"timestamps\.txt: '.*,.*' seems to have a decimal comma.*; write -?\d+\.\d"):
+        read_timestamps(tmp_path / "timestamps.txt")
+
+
+@pytest.mark.parametrize(
+    ("text", "last"),
+    [
+        ("0,0\n1,40\n2,80\n", 80),  # number and time
+        ("7,0\n7,40\n7,80\n", 80),  # camera and time
+        ("0001,00000\n0002,00040\n0003,00080\n", 80),
+        ("0,0,1000\n0,40,1040\n", 1040),
+        ("9,1000\n8,1040\n", 1040),
+    ],
+)
+def test_columns_of_whole_numbers_have_no_decimal_comma(tmp_path: Path, text: str, last: int) -> None:
+    (tmp_path / "timestamps.txt").write_text(text)
+    assert read_timestamps(tmp_path / "timestamps.txt")[0][-1] == Fraction(last, 1000)
+
+
 def test_a_binary_timestamp_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "timestamps.txt"
     file.write_bytes(b"\xff\xfe\x00\x80")

@@ -5,8 +5,8 @@ once, to the nearest nanosecond, by integer arithmetic, so that frame 10**6 of a
 frame 1.
 
 `timestamps.txt` holds one line per frame; the last column counts, blank lines and lines that begin with `#` do not.
-Below a line `# start_us end_us` (or s, ms, ns) they are the instants at which a frame sensor's shutter opens and
-closes, and the first column counts.  The unit is
+Columns have blanks or commas between them, and decimals a point.  Below a line `# start_us end_us` (or s, ms, ns) they
+are the instants at which a frame sensor's shutter opens and closes, and the first column counts.  The unit is
 
 * what a line `# unit: s` (or ms, us, ns), or just `# us`, or `# start_us end_us` says; without such a line
 * seconds, if any of the numbers has a decimal point or an exponent;
@@ -31,6 +31,7 @@ from vid2ev.untrusted import first_line, read_array
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
+DECIMAL_COMMA = re.compile(r"(?:^|[\s;])([+-]?\d{1,50})(?:,(\d{1,50}))?\s*$")  # or whole numbers, in columns
 LONGEST_WORD = 100  # digits of a time
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
@@ -111,7 +112,7 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
 
 def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
-    unit, column, words = None, -1, []
+    unit, column, rows = None, -1, []
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -124,8 +125,9 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
                 raise DataError(f"{path}, line {number}: unit '{stated[:40]}', expected s, ms, us or ns")
             unit, column = stated or unit, 0 if said and said[3] else column
         elif line.strip():
-            words.append(line.replace(",", " ").split()[column])
-    values = []
+            rows.append((line, column))
+    _check_commas([line for line, column in rows if column], path)
+    words, values = [line.replace(",", " ").split()[column] for line, column in rows], []
     for word in words:
         try:
             values.append(_number(word))
@@ -139,6 +141,29 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
     whole = all(re.fullmatch(r"[+-]?\d+", word) for word in words)
     unit = unit_of_integers([int(value) for value in values]) if whole else "s"
     return _in_seconds(values, unit, path), f"{unit}{GUESSED * whole}"
+
+
+def _check_commas(lines: Sequence[str], path: Path) -> None:
+    """Raise DataError for lines that end in numbers with a decimal comma.
+
+    Each could be two columns, too; but not if some lines have it and some have not, and these are no times if the last
+    column does not rise, or begins with zeros beside a number that stays, where decimals would rise.
+    """
+    found = [said.groups() for line in lines if (said := DECIMAL_COMMA.search(line))]
+    parted = [(whole, part) for whole, part in found if part]
+    if not parted or len(found) < len(lines) or not _rise(Fraction(f"{whole}.{part or 0}") for whole, part in found):
+        return
+    padded = any(re.match(r"0\d", part) for _, part in parted) and any(a[0] == b[0] for a, b in pairwise(parted))
+    if padded or len(parted) < len(found) or not _rise(Fraction(part) for _, part in parted):
+        whole, part = parted[-1]
+        raise DataError(
+            f"{path}: '{whole},{part}' seems to have a decimal comma, and commas stand between columns here; write"
+            f" {whole}.{part}, or if these are columns, blanks between them"
+        )
+
+
+def _rise(values: Iterable[Fraction]) -> bool:
+    return all(a < b for a, b in pairwise(values))
 
 
 def _number(word: str) -> Fraction:
