@@ -109,8 +109,9 @@ def _card(
     reports: tuple[Path, ...],
 ) -> str:
     recipe, clips = job["recipe"], job["clips"]
-    samples = [item for item in job["samples"].items() if item not in SampleSettings().model_dump(mode="json").items()]
-    changed = {"network": job["options"], "samples": dict(samples)}
+    usual = SampleSettings().model_dump(mode="json")
+    samples = {name: value for name, value in job["samples"].items() if value != usual[name]}
+    changed = {"network": job["options"], "samples": samples}
     set_to = "".join(f" --set {part}.{name}={value}" for part, of in changed.items() for name, value in of.items())
     steps = read_curve(run / "validation.csv")[-1]["step"]
     videos = ", ".join(Path(name).name for name in job["validation"]["videos"])

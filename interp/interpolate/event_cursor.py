@@ -15,7 +15,6 @@ class EventCursor:
 
     size          width and height of the sensor [px]; where the file does not state it, the smallest that holds all
     covered_us    from the first event to the last, or as the file says
-    seen_us       from the first event to the end; None without events
     Raises UsageError for a path where nothing is, DataError for what is no event file.
     """
 
@@ -26,10 +25,14 @@ class EventCursor:
         self.count = self._recording.count
         begin_us = self._recording.start_us
         self.covered_us = begin_us, begin_us + self._recording.duration_us
-        first = next(self._recording.blocks(), None)
-        self.seen_us = None if first is None else (int(first.t[0]), self.covered_us[1])
         self._blocks: Iterator[Events] = iter(())
         self._held, self._from_us = Events.empty(), None if self.count else begin_us
+
+    @property
+    def seen_us(self) -> tuple[int, int] | None:
+        """From the first event to the end; None without events."""
+        first = next(self._recording.blocks(), None)
+        return None if first is None else (int(first.t[0]), self.covered_us[1])
 
     def between(self, start_us: int, stop_us: int) -> Events:
         """The events in (start_us, stop_us]."""

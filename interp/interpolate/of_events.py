@@ -42,9 +42,10 @@ class FramesBesideEvents(OfSource):
     def _elsewhere(self) -> Iterator[str]:
         """Whether all events are before the frames, or after them."""
         first, lasts_s = next(self._source.frames(0), None), self._source.duration_expected_s
-        if first is None or lasts_s is None or self._cursor.seen_us is None:
+        seen_us = self._cursor.seen_us
+        if first is None or lasts_s is None or seen_us is None:
             return
-        begin_s, seen_s = first.t_ns * 1e-9, [t_us * 1e-6 for t_us in self._cursor.seen_us]
+        begin_s, seen_s = first.t_ns * 1e-9, [t_us * 1e-6 for t_us in seen_us]
         if seen_s[0] > begin_s + lasts_s or seen_s[1] < begin_s:
             yield (
                 f"no event lies beside a frame: events are from {seen_s[0]:g} to {seen_s[1]:g} s, frames from"

@@ -49,6 +49,10 @@ class RrinEventsGuidedSpec(FrameFedSpec):
     )
     transfer: Transfer = Field(default="srgb", description="how the frames are coded: srgb or linear; free")
 
+    @property
+    def guided(self) -> bool:
+        return True
+
 
 class RrinEventsGuided(FrameFed):
     """RRINEvents guided by light."""

@@ -75,8 +75,12 @@ class RrinSlomoEventsSpec(EventInputSpec):
 
     @property
     def takes_events(self) -> bool:
-        elsewhere = self.flow_input != "frames" or self.flow == "guided" or self.reconstruct != "none"
+        elsewhere = self.flow_input != "frames" or self.guided or self.reconstruct != "none"
         return super().takes_events or elsewhere
+
+    @property
+    def guided(self) -> bool:
+        return self.flow == "guided"
 
 
 class RrinSlomoEvents(FrameFed):
@@ -90,10 +94,9 @@ class RrinSlomoEvents(FrameFed):
         self.event_input = EventInput(spec.events, spec.bins, prepare=self._prepare if spec.prepare == "unet" else None)
         self.reconstruct = self._reconstruct()
         pictures = 0 if self.reconstruct is None else 3
-        guided = spec.flow == "guided"
-        channels = 4 * colours + guided * colours + 8 + self.event_input.channels + pictures
+        channels = 4 * colours + spec.guided * colours + 8 + self.event_input.channels + pictures
         self.combined = Unet(channels, 6, rrin_layout(4, spec.base), zero)
-        taken, said = 3 * colours + guided * (colours + RISEN_CHANNELS + OFFS), colours + guided
+        taken, said = 3 * colours + spec.guided * (colours + RISEN_CHANNELS + OFFS), colours + spec.guided
         self.residue = Unet(taken, said, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
         self.multiple = MULTIPLE
 
@@ -114,7 +117,7 @@ class RrinSlomoEvents(FrameFed):
         if self.reconstruct is not None:
             beside, once = [first_last_and_target(once[0], times)], once[1:]
         events = self.event_input.at(pair, once, times)
-        if self.spec.flow == "guided":
+        if self.spec.guided:
             return self._guided(
                 pair, times, guide_of(pair, times, self.spec.transfer, gate_of(pair)), [*events, *beside]
             )

@@ -47,3 +47,8 @@ class FrameFedSpec(NetworkSpec):
     def takes_events(self) -> bool:
         """Whether what the network makes depends on events."""
         return True
+
+    @property
+    def guided(self) -> bool:
+        """Whether it begins as the closed form that the light of events guides (`guide.py`)."""
+        return False

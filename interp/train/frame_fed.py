@@ -21,7 +21,6 @@ from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores, scores
 
-OF_RATIOS = ("rrin_light", "rrin_events_guided")
 OF_FEATURES = ("superslomo", "slomo_events", "timelens")  # whose loss looks at them, too
 
 
@@ -34,7 +33,7 @@ class FrameFedLearner(Learner):
         features = Perceptual(squared=name != "timelens") if name in OF_FEATURES else None
         super().__init__(network, recipe, schedule, features)
         self.of = name
-        self.nearly_right = name in OF_RATIOS or getattr(network.spec, "flow", "") == "guided"  # before it learns
+        self.nearly_right = name == "rrin_light" or network.spec.guided  # before it learns
 
     def made(self, batch: Batch) -> Interpolated:
         """What the network makes of a batch."""
