@@ -130,16 +130,32 @@ def chroma_row(plane, row, halvings_x, halvings_y, neutral, column, out):
     centre = (row + 0.5) / (1 << halvings_y) - 0.5
     above = int(np.floor(centre))
     share = F(centre - above)
-    upper, lower = max(above, 0), min(above + 1, plane.shape[0] - 1)
+    upper, lower = plane[max(above, 0)], plane[min(above + 1, plane.shape[0] - 1)]
     last = column.size - 1
-    for i in range(last):
-        code = F(plane[upper, i])
-        column[i] = code + (F(plane[lower, i]) - code) * share - neutral
+    for i in range(np.uintp(last)):
+        code = F(upper[i])
+        column[i] = code + (F(lower[i]) - code) * share - neutral
     column[last] = column[last - 1]
+    if halvings_x == 1:
+        _between_twos(column, out)
+        return
     for phase in range(1 << halvings_x):
         share = F(phase) / F(1 << halvings_x)
         for i in range((out.size - phase + (1 << halvings_x) - 1) >> halvings_x):
             out[(i << halvings_x) + phase] = column[i] + (column[i + 1] - column[i]) * share
+
+
+@inner
+def _between_twos(column, out):
+    """Chroma at twice as many places: every value, and between two of them their mean (in vectors: both are written by
+    one loop)."""
+    one, pairs = np.uintp(1), np.uintp(out.size >> 1)
+    for i in range(pairs):
+        here, right = column[i], column[i + one]
+        out[i + i] = here
+        out[i + i + one] = here + (right - here) * F(0.5)
+    if out.size & 1:
+        out[out.size - 1] = column[pairs]
 
 
 @inner
