@@ -21,6 +21,7 @@ from interp.data.sensor_ranges import SENSORS, SensorRanges
 from vid2ev import CisSpec, DvsSpec, UsageError, load_cis, load_sensor, open_source
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
+from vid2ev.sources import begins_s
 
 Layout = Literal["own", "hsergb", "bsergb"]
 EDGES_S = 0.022  # of a scene's light more than its exposures take: instants may be 10 ms apart, at both ends
@@ -109,8 +110,9 @@ def _of_videos(spec: DatasetSpec) -> list[Scene]:
         length_s = ((spec.frames - 1) / spec.cis_fps + exposure_s) * spec.slowdown + EDGES * frame_s
         if seconds < length_s:
             raise UsageError(f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames")
+        begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
         for part in range(math.floor(seconds / length_s)):
-            start_s = round(part * length_s, 6)
+            start_s = round(begin_s + part * length_s, 6)
             options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9), "slowdown": spec.slowdown}
             name = f"{Path(video).stem}-{place:03d}-{part:05d}"
             found.append(Scene(name, video, options | {"seed": int(chance(spec.seed, name).integers(1 << 62))}))

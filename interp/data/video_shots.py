@@ -18,7 +18,7 @@ from interp.data.chance import chance
 from interp.data.settings import ClipSettings
 from interp.data.shot import Beside, coarse
 from vid2ev import Frame, UsageError, open_source
-from vid2ev.sources import Source
+from vid2ev.sources import Source, begins_s
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
@@ -40,8 +40,9 @@ class VideoShot:
         draw = chance(seed, "video", number)
         for _ in range(TRIES):
             name = settings.video_files[int(draw.integers(len(settings.video_files)))]
-            source = _opened(name)
-            start_s, part = _place(source, name, settings.size, multiple, draw)
+            source, begin_s = _opened(name)
+            after_s, part = _place(source, name, settings.size, multiple, draw)
+            start_s = begin_s + after_s
             self._frames = _read(source, start_s, multiple + 3, part, settings.size, name)
             cuts = CutDetector(THRESHOLD)
             if not any(cuts.begins_shot(a, b) for a, b in pairwise(self._frames)):
@@ -66,14 +67,16 @@ class VideoShot:
 
 
 @lru_cache(maxsize=16)
-def _opened(name: str) -> Source:
-    return open_source(name, colour="rgb")
+def _opened(name: str) -> tuple[Source, float]:
+    """A film, and where it begins by its own clock [s]."""
+    source = open_source(name, colour="rgb")
+    return source, begins_s(source)
 
 
 def _place(
     source: Source, name: str, size: tuple[int, int], multiple: int, draw: np.random.Generator
 ) -> tuple[float, tuple[int, int, int, int]]:
-    """A start [s] and a part (left, top, width, height) of a film."""
+    """A start [s after the first frame] and a part (left, top, width, height) of a film."""
     count, seconds = source.frames_expected, source.duration_expected_s
     if not count or not seconds or count < multiple + 4:
         raise UsageError(f"{name}: {count} frames; expected at least {multiple + 4} for clips of {multiple}")

@@ -39,6 +39,17 @@ def test_the_truth_is_what_the_film_shows(tmp_path: Path) -> None:
             assert starts, "the nine frames stand in the film, one after the other; codes of 10 bits may round by one"
 
 
+def test_a_film_whose_clock_does_not_begin_at_0_is_drawn_from_all_over(tmp_path: Path) -> None:
+    early, late = Path(film(tmp_path / "film.npz")), tmp_path / "late" / "film.npz"
+    late.parent.mkdir()
+    frames = np.load(early)["frames"]
+    np.savez(late, frames=frames, timestamps=(7_000_000 + 20_000 * np.arange(len(frames))))
+    for number in range(4):
+        one, other = (made(ClipSettings(**FILMS, video_files=(str(path),)), 0, number) for path in (early, late))
+        np.testing.assert_array_equal(one.truth, other.truth)
+        np.testing.assert_array_equal(one.off_on, other.off_on)
+
+
 def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:
     settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz"),), slowdown=4)
     assert made(settings, 0, 0).gap_us == 40_000

@@ -100,6 +100,18 @@ def test_films_are_cut_into_scenes_of_the_right_speed(film: Path, tmp_path: Path
     assert "They are real films." in (tmp_path / "set" / "README.md").read_text()
 
 
+def test_a_film_whose_clock_does_not_begin_at_0_is_cut_from_its_beginning(film: Path, tmp_path: Path) -> None:
+    late = tmp_path / "film.npz"
+    frames = np.load(film)["frames"]
+    np.savez(late, frames=frames, timestamps=np.round(7e6 + 1e6 * np.arange(len(frames)) / 30).astype(np.int64))
+    facts = [
+        write_dataset(tmp_path / path.parent.name, DatasetSpec(videos=(str(path),), slowdown=4))
+        for path in (film, late)
+    ]
+    assert facts[0]["scenes"] == facts[1]["scenes"] == 1 and not facts[1]["left_out"]
+    assert facts[0]["samples"] == facts[1]["samples"]
+
+
 def test_a_film_that_is_too_short_is_refused(film: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected at least"):
         write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), slowdown=10))

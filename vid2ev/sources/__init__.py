@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import UsageError
-from vid2ev.sources.source import Source
+from vid2ev.sources.source import Source, begins_s
 from vid2ev.stream.frames import Colour
 
-__all__ = ["OPTIONS", "Source", "open_source"]
+__all__ = ["OPTIONS", "Source", "begins_s", "open_source"]
 
 SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "scene:", "camera:", "-"
 OPTIONS = ("transfer", "fps", "colour", "slowdown", "start", "stop", "crop", "size", "motion")  # of `open_source`

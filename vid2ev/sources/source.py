@@ -43,3 +43,10 @@ class Source(Protocol):
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on, in order of presentation, with strictly increasing times."""
+
+
+def begins_s(source: Source) -> float:
+    """The time of the first frame on the source's own clock [s]; 0 for a source without frames.  It opens the source
+    once more, so ask it of one that is rewindable."""
+    first = next(source.frames(), None)
+    return 0.0 if first is None else first.t_ns / 1e9
