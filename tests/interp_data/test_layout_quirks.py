@@ -176,6 +176,23 @@ def test_as_many_pictures_as_times_belong_together(tmp_path: Path, images: int, 
     assert sequence.remarks[0] == f"{images} pictures and {times} times: the first 4 are taken for pairs"
 
 
+@pytest.mark.parametrize("head", ["", "# exposure\n"])
+def test_a_picture_that_is_missing_takes_its_time_along(tmp_path: Path, head: str) -> None:
+    written(tmp_path / "seq", first=3, times=head + "".join(f"{STEP_US * (k + 1)}\n" for k in range(6)))
+    (tmp_path / "seq" / "images_corrected" / "000005.png").unlink()
+    sequence = open_sequence(tmp_path / "seq")
+    assert sequence.times_us.tolist() == [STEP_US * (k + 1) for k in (0, 1, 3, 4, 5)]
+    assert [int(sequence.frame(k)[0, 0, 0]) for k in range(5)] == [5, 15, 35, 45, 55]
+    assert "1 of 6 pictures are missing: their times are left out" in sequence.remarks
+
+
+def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
+    written(tmp_path / "seq")
+    write_codes(tmp_path / "seq" / "images_corrected" / "000002.png", np.zeros((8, 12, 3), np.uint8))
+    with pytest.raises(DataError, match=r"000002\.png: 12x8 pixels, expected 40x24"):
+        clip_of(open_sequence(tmp_path / "seq"), 1, 4)
+
+
 def test_lines_that_are_no_times_are_counted(tmp_path: Path) -> None:
     lines = "# exposure\nnan\nhead of file\n" + "".join(f"{STEP_US * (k + 1)} {STEP_US}\n\n" for k in range(6))
     written(tmp_path / "seq", "bsergb", times=lines)

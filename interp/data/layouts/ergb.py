@@ -5,8 +5,9 @@
               polarity
 
 Times are microseconds, one to a line.  Some folders have more pictures than times, or more times than pictures: the
-first ones belong together.  Some have lines above the times that are none.  Events lie on the pictures, between
-pixels; what lies beyond is dropped where they are counted (`Placed.within`), never moved to the border.
+first ones belong together.  Where pictures are missing by their numbers, and there is a time for each number, a picture
+has the time of its number.  Some have lines above the times that are none.  Events lie on the pictures, between pixels;
+what lies beyond is dropped where they are counted (`Placed.within`), never moved to the border.
 
 Sources: Tulyakov et al., "Time Lens", CVPR 2021, and "Time Lens++", CVPR 2022, and the READMEs of their data.
 """
@@ -55,8 +56,9 @@ class Ergb:
         names = LAYOUTS[layout]
         self.name, self.folder, self.remarks = folder.name, folder, list[str]()
         pictures, stamps = numbered(folder / names.images, ".png"), self._stamps(folder / names.images)
+        stamps = self._of_numbers(pictures, stamps)
         if len(stamps) != len(pictures):  # (a line for each: then lines that are no times have pictures, too)
-            stamps = [t_us for t_us in stamps if t_us is not None]
+            stamps = self._of_numbers(pictures, [t_us for t_us in stamps if t_us is not None])
         if not pictures or not stamps:
             raise DataError(f"{folder}: {len(pictures)} pictures and {len(stamps)} times; expected some of both")
         if len(pictures) != len(stamps):
@@ -69,7 +71,7 @@ class Ergb:
             raise DataError(f"{folder}: no picture has a time; expected one to a line of {STAMPS[0]}")
         self._images = [picture for picture, _ in timed]
         self.times_us = np.array([t_us for _, t_us in timed], np.int64)
-        self.size = self.frame(0).shape[1::-1]
+        self.size = self._picture(0).shape[1::-1]
         self.event_size = self.size
         self._parts = EventParts(folder / names.events, self.size)
         self.remarks += self._parts.remarks
@@ -88,12 +90,14 @@ class Ergb:
 
     def frame(self, k: int) -> np.ndarray:
         """Picture k, red, green, blue."""
-        import cv2
-
-        found = decoded(self._images[k], cv2.IMREAD_COLOR)
-        if not found:
-            raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
-        return found[0][..., ::-1]
+        picture = self._picture(k)
+        if picture.shape[1::-1] != self.size:
+            (width, height), (wide, high) = picture.shape[1::-1], self.size
+            raise DataError(
+                f"{self._images[k]}: {width}x{height} pixels, expected {wide}x{high} as the first picture has; leave it"
+                " out with its time"
+            )
+        return picture
 
     def key(self, k: int) -> np.ndarray:
         """Picture k."""
@@ -102,6 +106,24 @@ class Ergb:
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""
         return self._parts.between(start_us, stop_us)
+
+    def _picture(self, k: int) -> np.ndarray:
+        import cv2
+
+        found = decoded(self._images[k], cv2.IMREAD_COLOR)
+        if not found:
+            raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
+        return found[0][..., ::-1]
+
+    def _of_numbers(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:
+        """The times of the pictures' numbers, where some of these are left out and there is a time for each; else the
+        times as they are."""
+        numbers = [int(path.stem) for path in pictures]
+        span = numbers[-1] - numbers[0] + 1 if numbers else 0
+        if span != len(stamps) or span == len({*numbers}) or len({*numbers}) < len(numbers):
+            return stamps
+        self.remarks.append(f"{span - len(numbers)} of {span} pictures are missing: their times are left out")
+        return [stamps[number - numbers[0]] for number in numbers]
 
     def _stamps(self, folder: Path) -> list[int | None]:
         """The times [us] of the pictures; None of lines that say something else, which are counted."""
