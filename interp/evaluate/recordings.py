@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -59,7 +58,8 @@ class Recording:
     def about(self) -> dict[str, Any]:
         """See `interp.evaluate.group.Footage`."""
         times = self._sequence.times_us
-        rate_hz = 1e6 / float(np.median(np.diff(times))) if len(times) > 1 else math.nan
+        typical_us = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        rate_hz = 1e6 / typical_us if typical_us > 0 else 0.0  # (0 where there is no telling, as of films)
         return {
             "kind": type(self._sequence).__name__.lower(), "frames": self.frames, "size": list(self._sequence.size),
             "event_size": list(self._sequence.event_size), "rate_hz": round(rate_hz, 3), "groups": self._scored,

@@ -23,6 +23,7 @@ from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
 from interp.representation.event_counts import count_events
 from vid2ev import DataError, Events, UsageError, convert, events_of, open_source
+from vid2ev.recording.exposures import write_codes
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.source import SceneSource
@@ -60,6 +61,23 @@ def test_what_cannot_be_scored_is_named_and_counted(tmp_path: Path) -> None:
     assert about["not_scored"] == reasons and about["groups"] == 2
     assert {row.group for row in found.rows} == {0, 3}
     assert "no timestamp.txt" in found.summary["unusable"][str(tmp_path / "data" / "torn")]
+
+
+def test_sequences_without_a_rate_and_pictures_of_another_size_do_not_end_the_rest(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "data" / "seq", pictures(5))
+    write_hsergb(tmp_path / "data" / "one", pictures(1))
+    write_hsergb(tmp_path / "data" / "still", pictures(5), [STEP_US] * 5)
+    write_hsergb(tmp_path / "data" / "two", pictures(9))
+    picture = tmp_path / "data" / "two" / "images_corrected" / "000006.png"
+    write_codes(picture, pictures(1)[0, :12, :16])
+    found = evaluate([str(tmp_path / "data")], tmp_path / "report", baselines=["linear"], protocol=Protocol(3, 3))
+    of = found.summary["sequences"]
+    assert {name: about["groups"] for name, about in of.items()} == {"one": 0, "seq": 1, "still": 0, "two": 1}
+    assert of["still"]["not_scored"] == {"times of the frames do not increase": 1}
+    assert [(*of["two"]["not_scored"],)[0].split(";")[0]] == [
+        f"{picture}: 16x12 pixels, expected 40x24 as the first picture has"
+    ]
+    assert (of["one"]["rate_hz"], of["still"]["rate_hz"], of["seq"]["rate_hz"]) == (0.0, 0.0, 250.0)
 
 
 def test_a_limit_says_what_it_leaves_out(tmp_path: Path) -> None:

@@ -142,6 +142,7 @@ class _Pictures:
 
     def __init__(self, facts: dict[str, Any]):
         self._folder: Path = facts["folder"]
+        self._size: tuple[int, int] = facts["size"]
         raw = self._folder.name == KINDS["raw"]
         with as_stated(self._folder.parent / MANIFEST):
             self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
@@ -151,6 +152,12 @@ class _Pictures:
     def codes(self, number: int) -> np.ndarray:
         """Codes uint8, [H, W] or [H, W, 3]."""
         codes = read_codes(self._folder / f"{number:06d}.png")
+        if codes.shape[1::-1] != self._size:
+            (width, height), (wide, high) = codes.shape[1::-1], self._size
+            raise DataError(
+                f"{self._folder / f'{number:06d}.png'}: {width}x{height} pixels, expected {wide}x{high} as its manifest"
+                " says; copy the recording again"
+            )
         if self._picture is None:
             return codes
         if codes.max(initial=0) >= len(self._picture):
