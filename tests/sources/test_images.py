@@ -61,6 +61,17 @@ def test_timestamps_are_honoured(tmp_path: Path) -> None:
     assert [frame.t_ns for frame in open_source(tmp_path, fps=4).frames()] == [0, 250_000_000, 500_000_000]
 
 
+def test_times_go_to_the_images_that_their_lines_name(tmp_path: Path) -> None:
+    write(tmp_path, ["1.png", "2.png", "10.png"], stamps="rgb/1.png,0.0\nrgb/2.png,0.1\nrgb/10.png,0.2\n")
+    assert [frame.t_ns for frame in open_source(tmp_path).frames()] == [0, 100_000_000, 200_000_000]
+    (tmp_path / "timestamps.txt").write_text("1.png 0.0\n10.png 0.1\n2.png 0.2\n")  # (as text is sorted)
+    with pytest.raises(DataError, match=r"names 10\.png where the images, in natural order, have 2\.png"):
+        open_source(tmp_path)
+    (tmp_path / "timestamps.txt").write_text("1.png 0.0\n10.png 0.1\n")
+    with pytest.raises(DataError, match="2 times for 3 images"):
+        open_source(tmp_path)
+
+
 def test_start_skips_without_changing_what_follows(tmp_path: Path) -> None:
     write(tmp_path, [f"{k}.png" for k in range(5)], stamps="0\n40\n40\n80\n120\n")
     source = open_source(tmp_path)

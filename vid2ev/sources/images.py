@@ -117,7 +117,7 @@ class Images:
             raise UsageError(
                 f"{self.path}: images without times; give --fps, or a {TIMESTAMPS} with one line per image"
             )
-        stamps, unit = read_timestamps(file)
+        stamps, unit = read_timestamps(file, [place.name for place, _ in self._places])
         if len(stamps) != len(self._places):
             raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
         return stamps, unit

@@ -5,8 +5,9 @@ once, to the nearest nanosecond, by integer arithmetic, so that frame 10**6 of a
 frame 1.
 
 `timestamps.txt` holds one line per frame; the last column counts, blank lines and lines that begin with `#` do not.
-Columns have blanks or commas between them, and decimals a point.  Below a line `# start_us end_us` (or s, ms, ns) they
-are the instants at which a frame sensor's shutter opens and closes, and the first column counts.  The unit is
+Columns have blanks or commas between them, and decimals a point.  Where a column names the images, each line has to
+name its own.  Below a line `# start_us end_us` (or s, ms, ns) they are the instants at which a frame sensor's shutter
+opens and closes, and the first column counts.  The unit is
 
 * what a line `# unit: s` (or ms, us, ns), or just `# us`, or `# start_us end_us` says; without such a line
 * seconds, if any of the numbers has a decimal point or an exponent;
@@ -110,8 +111,9 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
     return stamps, unit
 
 
-def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
-    """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError."""
+def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fraction], str]:
+    """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError, for lines that name
+    other `images` than those that are there in their place, too."""
     unit, column, rows = None, -1, []
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -127,6 +129,7 @@ def read_timestamps(path: Path) -> tuple[list[Fraction], str]:
         elif line.strip():
             rows.append((line, column))
     _check_commas([line for line, column in rows if column], path)
+    _check_names([line for line, _ in rows], images, path)
     words, values = [line.replace(",", " ").split()[column] for line, column in rows], []
     for word in words:
         try:
@@ -160,6 +163,20 @@ def _check_commas(lines: Sequence[str], path: Path) -> None:
             f"{path}: '{whole},{part}' seems to have a decimal comma, and commas stand between columns here; write"
             f" {whole}.{part}, or if these are columns, blanks between them"
         )
+
+
+def _check_names(lines: Sequence[str], images: Sequence[str], path: Path) -> None:
+    """Raise DataError for a line that names another image than its own: its time would be given to the wrong one."""
+    if len(lines) != len(images):
+        return
+    known = set(images)
+    for line, image in zip(lines, images, strict=True):
+        named = known.intersection(Path(word).name for word in line.replace(",", " ").split())
+        if named and image not in named:
+            raise DataError(
+                f"{path}: names {min(named)} where the images, in natural order, have {image}; put its lines into that"
+                " order, or number the images in the order of the lines"
+            )
 
 
 def _rise(values: Iterable[Fraction]) -> bool:
