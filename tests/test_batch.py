@@ -45,6 +45,13 @@ def test_a_folder_stands_for_what_is_in_it() -> None:
     assert batch.sources_in("bare") == ["bare"]  # (which is refused in words)
 
 
+def test_no_name_does_not_stand_for_the_folder_one_is_in() -> None:
+    np.save("here.npy", np.ones((2, 6, 8), np.float32))
+    result = vid2ev("", "-o", "out/")
+    assert result.exit_code == 2 and "VIDEO '': no name" in result.stderr
+    assert not Path("out").exists()
+
+
 def test_one_failure_does_not_stop_the_rest() -> None:
     result = vid2ev("clips", "-o", "out")
     assert result.exit_code == 1
