@@ -120,6 +120,7 @@ def test_depth_maps_serve_as_a_plane_does(tmp_path: Path, depth: str) -> None:
         ({"cis": "paper", "overrides": ["cis.exposure_us=-1"]}, "exposure_us"),
         ({"cis": "paper", "overrides": ["exposure_us=1"]}, r"did you mean cis\.exposure_us"),
         ({"pictures": "png"}, "expected a frame camera"),
+        ({"overrides": ["cis.exposure_us=2000"]}, r"cis\.exposure_us=2000': expected a frame camera"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any], message: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -64,6 +64,11 @@ class Sensors:
             return Loaded("own", sensor)
         changes = [*(f"{key}={toml_value(value)}" for key, value in camera.set.items()), *self._changes(camera.kind)]
         return Loaded(str(sensor), (load_sensor if camera.kind == "dvs" else load_cis)(sensor, changes))
+
+    def check_changes(self, cameras: Iterable[Camera]) -> None:
+        """Raise UsageError for changes to frame sensors where none of the cameras has one."""
+        if (texts := self._changes("cis")) and all(camera.kind == "dvs" for camera in cameras):
+            raise UsageError(f"setting '{texts[0]}': expected a frame camera to change; add --frames, or leave it out")
 
     def _changes(self, kind: str) -> list[str]:
         return [text for text in self.overrides if text.strip().startswith("cis.") == (kind == "cis")]

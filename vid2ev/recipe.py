@@ -104,6 +104,7 @@ class Recipe:
         asked = asked.with_frames() if frame_camera else asked
         alone = rig is None and len(asked.cameras) == 1
         chosen = Sensors(sensor, cis or "paper", overrides)
+        chosen.check_changes(asked.cameras)
         sensors = [chosen.of(camera) for camera in asked.cameras]
         coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
         maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
