@@ -245,9 +245,10 @@ def test_a_small_photograph_enlarged_is_remarked_on(tmp_path: Path) -> None:
     ("spin", "expected pan, saccade, zoom or a file"),
     ("pan:sped=3", "parameter 'sped' is not one of duration_s, scale, speed, angle"),
     ("pan:speed=fast", "speed='fast', expected a number"),
-    ("pan:speed=nan", "expected finite numbers"),
+    ("pan:speed=nan", "motion pan: duration_s=1, scale=0, speed=nan, angle=0; expected finite numbers"),
     ("pan:duration_s=0", "a duration_s above 0"),
     ("zoom:factor=0", "factor 0.0"),
+    ("pan:speed=1e10,duration_s=1e-9", "too much for any rate of frames"),
     ("pan:speed=5000", "leaves the photograph"),
     ("pan:speed=170,scale=1", "leaves the photograph"),
     ("nowhere.csv", "no such file"),
@@ -272,6 +273,12 @@ def test_bad_paths_are_refused_by_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "path.csv").write_text(text)
     with pytest.raises(DataError, match=r"path\.csv"):
         open_source(photograph(tmp_path), motion=str(tmp_path / "path.csv"))
+
+
+def test_saccades_to_the_other_side_take_as_long() -> None:
+    t_s = np.linspace(0, 0.3, 301)
+    there, back = (Saccade(degrees=degrees, px_per_degree=1).at(t_s) for degrees in (20, -20))
+    np.testing.assert_allclose(np.column_stack(back[:2]), -np.column_stack(there[:2]), atol=1e-9)
 
 
 def test_motions_are_parsed() -> None:

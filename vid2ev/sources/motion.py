@@ -54,7 +54,11 @@ class Motion(ABC):
     def __post_init__(self) -> None:
         numbers = asdict(self).values()
         if not all(map(math.isfinite, numbers)) or not 0 < self.duration_s <= 1e6 or self.scale < 0:
-            raise UsageError(f"motion {self.describe()}: expected finite numbers, a duration_s above 0, a scale from 0")
+            given = ", ".join(f"{key}={value:g}" for key, value in asdict(self).items())
+            raise UsageError(
+                f"motion {self.name}: {given}; expected finite numbers, a duration_s above 0 and at most 1e6, a scale"
+                " from 0"
+            )
 
     @property
     def begin_s(self) -> float:
@@ -103,7 +107,7 @@ class Saccade(Motion):
         period = self.duration_s / 3
         jump = np.clip((t_s / period).astype(int), 0, 2)
         begin, end = self.CORNERS[jump].T, self.CORNERS[jump + 1].T
-        length = self.degrees * np.hypot(*(end - begin))
+        length = abs(self.degrees) * np.hypot(*(end - begin))
         share = np.clip((t_s - jump * period) / np.minimum(0.021 + 0.0022 * length, period), 0, 1)
         place = begin + (end - begin) * share**3 * (10 - 15 * share + 6 * share**2)
         x, y = place * self.degrees * self.px_per_degree
@@ -194,8 +198,10 @@ def _rows(path: Path) -> list[list[float]]:
         ) from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV ({error}); expected rows of t,x,y[,angle][,zoom]") from error
-    names = ["t", "x", "y", "angle", "zoom"][: max(map(len, lines), default=0)]
-    if lines and lines[0][0] == "t":
+    if not lines:
+        raise DataError(f"{path}: no rows; expected rows of t,x,y[,angle][,zoom]")
+    names = ["t", "x", "y", "angle", "zoom"][: max(map(len, lines))]
+    if lines[0][0] == "t":
         names = lines.pop(0)
     if not {"t", "x", "y"} <= set(names) <= {"t", "x", "y", "angle", "zoom"} or len(set(names)) < len(names):
         raise DataError(f"{path}: columns {', '.join(names)[:80]}; expected t,x,y[,angle][,zoom]")

@@ -31,6 +31,7 @@ from vid2ev.stream.frames import Colour, Frame
 LARGEST = (1280, 720)  # of the pictures made, if no size is given; on edge for upright photographs
 SLOWEST_FPS = 30
 STEP_PX = 0.5  # the most that anything moves from frame to frame
+FASTEST_PX_S = 4e8  # about as fast as frames a nanosecond apart can show by such steps
 FINENESS = 2  # pixels of the photograph, at least, for each that is seen, when a large one is made smaller in advance
 BORDER_PX = 2  # which the picture keeps from the border of the photograph
 
@@ -77,6 +78,11 @@ class Photograph:
         self._factor, self._corner = 1, (0, 0)
         self._shrink()
         speed = self.speed()
+        if fps is None and speed > FASTEST_PX_S:
+            raise UsageError(
+                f"{self.path}: the motion is up to {speed:.3g} px/s fast, too much for any rate of frames; make it"
+                " slower, or give a --fps"
+            )
         self._fps = parse_fps(max(SLOWEST_FPS, math.ceil(speed / STEP_PX * 1.01))) if fps is None else parse_fps(fps)
         if speed > self._fps:
             self.warnings.append(
