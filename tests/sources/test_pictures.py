@@ -279,3 +279,15 @@ def test_real_hdr_photographs() -> None:
         pixels = read_picture(folder / name).pixels
         assert pixels.shape[:2] == size and pixels.dtype.kind == "f"
         assert float((pixels.astype(np.float64) @ BT709_WEIGHTS).max()) == pytest.approx(brightest, rel=0.01)
+
+
+def test_an_animated_webp_is_no_single_picture(tmp_path: Path) -> None:
+    first, *rest = (Image.fromarray(np.full((6, 8, 3), level, np.uint8)) for level in (0, 128, 255))
+    first.save(tmp_path / "a.webp", save_all=True, append_images=rest, duration=40, lossless=True)
+    with pytest.raises(DataError, match=r"a\.webp: an animated WebP"):
+        open_source(tmp_path / "a.webp")
+    with pytest.raises(UsageError, match="is for a photograph"):
+        open_source(tmp_path / "a.webp", motion="pan")
+    first.save(tmp_path / "a.webp", lossless=True)
+    with pytest.raises(UsageError, match="a single picture"):
+        open_source(tmp_path / "a.webp")

@@ -3,12 +3,12 @@
     picture   PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000, OpenEXR, Radiance HDR
     array     .npy
     arrays    .npz, a ZIP archive of .npy files
-    video     everything else, and animated PNG
+    video     everything else, and animated PNG and WebP
 
 A file of JPEGs one after the other (Motion JPEG) begins like a JPEG; there the name decides, `.mjpg` or `.mjpeg`.
 
-Sources: PNG section 5.2 and its `acTL`; TIFF 6.0 page 13; ITU-T T.81 B.1.1.3; Radiance `filefmts`; OpenEXR file layout;
-numpy NEP 1.
+Sources: PNG section 5.2 and its `acTL`; RFC 9649 section 2.7 (WebP); TIFF 6.0 page 13; ITU-T T.81 B.1.1.3; Radiance
+`filefmts`; OpenEXR file layout; numpy NEP 1.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff"
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 PICTURES = (EXR, PNG, JPEG, *TIFF, b"BM", b"\0\0\0\x0cjP  ", b"#?RADIANCE", b"#?RGBE")
+ANIMATED = 0x02  # a flag of WebP
 NETPBM = re.compile(rb"P[1-7Ff]\s")
 HEAD = 4096
 
@@ -49,6 +50,8 @@ def recognise(path: Path) -> Kind:
     if head.startswith(JPEG) and path.suffix.lower() in MOTION_JPEG_SUFFIXES:
         return "video"
     webp = head.startswith(b"RIFF") and head[8:12] == b"WEBP"
+    if webp and head[12:16] == b"VP8X" and head[20:21] and head[20] & ANIMATED:
+        return "video"
     return "picture" if webp or head.startswith(PICTURES) or NETPBM.match(head) else "video"
 
 

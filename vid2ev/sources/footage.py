@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import av
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.recognise import recognise
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
 SEEKABLE = ("mp4", "matroska")  # containers with an index, and a presentation time for every picture
@@ -81,6 +82,11 @@ class VideoFile:
         with container:
             if container.format.name == "image2":  # (by the name alone)
                 raise DataError(f"{self.path}: named as a picture is, but not one that can be read; {REMEDY}")
+            if container.format.name == "webp_pipe" and recognise(self.path) == "video":
+                raise DataError(
+                    f"{self.path}: an animated WebP, of which FFmpeg decodes nothing; make a video, an animated PNG or"
+                    " a folder of pictures of it"
+                )
             if container.format.name.endswith("_pipe"):
                 raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
             yield container, video_stream(container, self.name)
