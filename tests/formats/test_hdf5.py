@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vid2ev.errors import Vid2evError
+from vid2ev.errors import UsageError, Vid2evError
 from vid2ev.formats import describe_events, open_events, read_events, survey
 from vid2ev.formats.event_file import BLOCK, Recording
 from vid2ev.formats.hdf5 import write_events
@@ -249,3 +249,12 @@ for limit in (0, 1, 100, 2048, 5000, 100_000, 1_000_000):
 """
     done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "full.h5")], capture_output=True, text=True)
     assert (done.returncode, done.stderr, done.stdout.split()) == (0, "", ["27"] * 7)  # EFBIG, as ENOSPC would be
+
+
+def test_of_a_recording_the_folder_with_events_is_named(tmp_path: Path) -> None:
+    for camera in ("cis", "dvs"):
+        (tmp_path / camera).mkdir()
+        (tmp_path / camera / "manifest.json").write_text("{}")
+    (tmp_path / "dvs" / "events.h5").touch()
+    with pytest.raises(UsageError, match=r"of the cameras cis, dvs; give one: .*dvs$"):
+        open_events(tmp_path)

@@ -223,9 +223,8 @@ def _within(folder: Path) -> Path:
     bag = folder / "metadata.yaml"
     cameras = sorted(path.parent.name for path in folder.glob("*/manifest.json"))
     if cameras and not bag.exists():
-        raise UsageError(
-            f"{folder} is a recording of the cameras {', '.join(cameras)}; give one: {folder / cameras[0]}"
-        )
+        seen = next((name for name in cameras if any((folder / name).glob("events.*"))), cameras[0])
+        raise UsageError(f"{folder} is a recording of the cameras {', '.join(cameras)}; give one: {folder / seen}")
     if (folder / "timestamps.txt").exists() or any((folder / name).exists() for name in ("raw", "frames.mp4")):
         raise UsageError(f"{folder} holds frames and no events; give the folder of an event camera")
     return bag if bag.exists() else folder / "events.h5"
