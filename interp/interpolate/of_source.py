@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +14,7 @@ import torch
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from vid2ev import Events, open_source
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 
 FINEST = 1001  # denominators of rates
@@ -30,16 +31,19 @@ class OfSource:
     def __init__(self, path: str, options: Options, has_events: bool = False):
         if options.contrast and not has_events:
             raise UsageError(f"--contrast says what events stand for, and {path} has none; leave it out")
-        self._source = open_source(
-            path,
-            transfer=options.transfer,
-            fps=options.source_hz,
-            colour="rgb",
-            start=options.start_s,
-            stop=options.stop_s,
-            crop=options.crop,
-            size=options.size,
-        )
+        try:
+            self._source = open_source(
+                path,
+                transfer=options.transfer,
+                fps=options.source_hz,
+                colour="rgb",
+                start=options.start_s,
+                stop=options.stop_s,
+                crop=options.crop,
+                size=options.size,
+            )
+        except (UsageError, DataError) as error:
+            raise type(error)(_by_its_name(str(error))) from error
         if not self._source.rewindable:
             raise UsageError(f"{path} can be read once only; save it as a file to interpolate it")
         self._about = self._source.describe()
@@ -58,7 +62,7 @@ class OfSource:
         """Those of the source."""
         bright = self._about.get("transfer") in BRIGHT
         clipped = [f"light above white is kept in EXR only: the transfer curve is {self._about['transfer']}"] * bright
-        return [*self._source.warnings, *clipped]
+        return [*map(_by_its_name, self._source.warnings), *clipped]
 
     @property
     def gaps_expected(self) -> int | None:
@@ -100,3 +104,8 @@ def _is_grey(about: dict[str, Any]) -> bool:
         )
         return all(read_picture(file).pixels.ndim == 2 for file in files[:1])
     return str(about.get("pixel_format", "")).startswith("gray")
+
+
+def _by_its_name(said: str) -> str:
+    """What a source says, with the name that its rate has here: --fps is that of the frames to make."""
+    return re.sub(r"(?<![\w-])--fps\b", "--source-fps", said)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from interp import pretrained
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate import frames, interpolate
 from interp.interpolate.choice import choice
+from interp.interpolate.take import Options
 from interp.networks import make
 from interp.representation.carried import footprint_of
 from interp.weights import save
@@ -238,3 +240,12 @@ def test_grey_frames_move_as_those_of_one_colour_do(tmp_path: Path) -> None:
         one, other = (read_codes(tmp_path / f"out_{name}" / f"{k:06d}.png") for name in ("grey", "coloured"))
         assert one.ndim == 2
         np.testing.assert_allclose(one, other[..., 0], atol=1)
+
+
+def test_images_without_times_are_told_the_option_that_gives_them(tmp_path: Path) -> None:
+    folder = images(tmp_path / "in", moving(2))
+    (folder / "timestamps.txt").unlink()
+    with pytest.raises(UsageError, match="give --source-fps, or"):
+        interpolate(folder, tmp_path / "out", method="linear")
+    options = Options(source_hz=Fraction(25))
+    assert interpolate(folder, tmp_path / "out", method="linear", multiple=2, options=options)["frames"] == 3
