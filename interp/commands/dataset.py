@@ -30,7 +30,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
 )  # fmt: skip
 @click.option(
     "--preset", type=click.Choice(["varied", "paper"]), default="varied", show_default=True,
-    help="varied: sensors drawn for each scene, 30 to 240 frames a second; paper: its Table I, 30 to 960.",
+    help="varied: sensors drawn for each scene or video, 30 to 240 frames a second; paper: its Table I, 30 to 960.",
 )  # fmt: skip
 @click.option(
     "--count", type=click.IntRange(1, 10**6), metavar="N",

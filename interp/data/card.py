@@ -27,7 +27,7 @@ def card_text(facts: dict[str, Any]) -> str:
         "Samples": f"{facts['samples']} ({spec['frames']} CIS frames a scene)",
         "DVS/CIS disparity": f"<= {facts['disparity_mm']:g} mm" if facts["disparity_mm"] else "0 mm",
         "Events": facts["events"],
-        "Sensors": "those of the paper" if spec["preset"] == "paper" else "drawn anew for every scene",
+        "Sensors": sensors_of(spec),
         "Layout": spec["layout"],
         "Seed": spec["seed"],
     }
@@ -41,3 +41,10 @@ def card_text(facts: dict[str, Any]) -> str:
         f"| | |\n| --- | --- |\n{table}\n\n## What has to be known\n\n{known}\n"
         + (f"\n## Left out\n\n{left_out}\n" if left_out else "")
     )
+
+
+def sensors_of(spec: dict[str, Any]) -> str:
+    """Whose sensors they are; parts of one film are seen by the same."""
+    if spec["preset"] == "paper":
+        return "those of the paper"
+    return f"drawn anew for every {'video' if spec['videos'] else 'scene'}"

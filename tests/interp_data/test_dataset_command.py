@@ -97,7 +97,8 @@ def test_films_are_cut_into_scenes_of_the_right_speed(film: Path, tmp_path: Path
     assert facts["disparity_mm"] == 0 and scene["samples"] == 48 and scene["key_frames"] == 7
     sequence = open_sequence(tmp_path / "set" / name)
     assert np.diff(sequence.times_us).mean() == pytest.approx(1e6 / 240, abs=1)
-    assert "They are real films." in (tmp_path / "set" / "README.md").read_text()
+    card = (tmp_path / "set" / "README.md").read_text()
+    assert "They are real films." in card and "| Sensors | drawn anew for every video |" in card
 
 
 def test_a_film_whose_clock_does_not_begin_at_0_is_cut_from_its_beginning(film: Path, tmp_path: Path) -> None:
