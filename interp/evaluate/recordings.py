@@ -82,6 +82,8 @@ class Recording:
 
     def _remarks(self) -> list[str]:
         multiple, remarks = self._protocol.multiple, list[str]()
+        if self.frames - self._begin < 2:
+            remarks.append("a single frame from its first key frame on, with none after it to rebuild")
         if left := max(self.frames - 1 - self._begin, 0) % multiple:
             remarks.append(f"{left} frames after the last complete group of {multiple} are not rebuilt")
         if self._begin:

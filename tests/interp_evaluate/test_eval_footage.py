@@ -77,6 +77,7 @@ def test_sequences_without_a_rate_and_pictures_of_another_size_do_not_end_the_re
     assert [(*of["two"]["not_scored"],)[0].split(";")[0]] == [
         f"{picture}: 16x12 pixels, expected 40x24 as the first picture has"
     ]
+    assert "a single frame" in of["one"]["remarks"][-1]
     assert (of["one"]["rate_hz"], of["still"]["rate_hz"], of["seq"]["rate_hz"]) == (0.0, 0.0, 250.0)
 
 
