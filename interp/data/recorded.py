@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -23,13 +24,21 @@ def recorded(settings: ClipSettings, seed: int, number: int, multiple: int) -> C
     Raises UsageError where no recording has a window of the multiple, or is as large as a clip.
     """
     draw = chance(seed, "recorded", number)
-    places = _places(settings.recording_folders, multiple, settings.size)
+    places, _ = _places(settings.recording_folders, multiple, settings.size)
     folder, first = places[int(draw.integers(len(places)))]
     sequence = _opened(folder)
     left, top = (int(draw.integers(have - want + 1)) for have, want in zip(sequence.size, settings.size, strict=True))
     return clip_of(
         sequence, int(first[int(draw.integers(len(first)))]), multiple, settings.bins, (left, top, *settings.size)
     )
+
+
+def left_out(settings: ClipSettings, multiple: int) -> list[str]:
+    """The recordings of which no clip of the multiple can be cut, each with the reason.
+
+    Raises UsageError where there is none of which one can.
+    """
+    return _places(settings.recording_folders, multiple, settings.size)[1]
 
 
 def clip_of(
@@ -81,25 +90,39 @@ def _opened(folder: str) -> Sequence:
 
 
 @lru_cache(maxsize=8)
-def _places(folders: tuple[str, ...], multiple: int, size: tuple[int, int]) -> list[tuple[str, np.ndarray]]:
-    """Sequences as large as a clip, each with the first frames of its windows; in order of their names."""
-    found, reasons = list[tuple[str, np.ndarray]](), list[str]()
+def _places(
+    folders: tuple[str, ...], multiple: int, size: tuple[int, int]
+) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
+    """Sequences as large as a clip, each with the first frames of its windows, in order of their names; and why others
+    have none."""
+    found, unfit = list[tuple[str, np.ndarray]](), list[str]()
     for folder in folders:
         paths, unusable = sequences_in(folder)
-        reasons += unusable.values()
+        unfit += [f"{path}: {reason}".replace(f"{path}: {path}", path) for path, reason in unusable.items()]
         for path in paths:
             try:
-                sequence = _opened(str(path))
-                if min(have - want for have, want in zip(sequence.size, size, strict=True)) < 0:
-                    reasons.append(f"{path}: frames of {sequence.size[0]}x{sequence.size[1]} are smaller than clips")
-                    continue
-                window = windows(sequence, multiple)
+                first, reason = _windows_of(path, multiple, size)
             except DataError as error:
-                reasons.append(str(error))
-                continue
-            reasons += [f"{path}: {count} windows: {reason}" for reason, count in window.unusable.items()]
-            if len(window.first):
-                found.append((str(path), window.first))
+                first, reason = np.empty(0, np.int64), str(error)
+            if len(first):
+                found.append((str(path), first))
+            else:
+                unfit.append(reason)
     if not found:
-        raise UsageError(f"no window of {multiple + 1} frames in {', '.join(folders)}: {'; '.join(reasons[:3])}")
-    return found
+        raise UsageError(f"no window of {multiple + 1} frames in {', '.join(folders)}: {'; '.join(unfit[:3])}")
+    return found, unfit
+
+
+def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.ndarray, str]:
+    """The first frames of a sequence's windows; and why there are none."""
+    sequence = _opened(str(path))
+    if min(have - want for have, want in zip(sequence.size, size, strict=True)) < 0:
+        (wide, high), (width, height) = sequence.size, size
+        return np.empty(0, np.int64), (
+            f"{path}: frames of {wide}x{high} are smaller than clips, {width}x{height}; give --set clips.size=[W,H] and"
+            " --set samples.size=N"
+        )
+    window = windows(sequence, multiple)
+    reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
+    too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"
+    return window.first, f"{path}: {', '.join(reasons) or too_few}"

@@ -66,6 +66,11 @@ class VideoShot:
             yield frame.light, coarse(frame.luminance, self._beside.coarser)
 
 
+def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
+    """Raise UsageError for a film that is too short or too small for clips, DataError for one that cannot be read."""
+    _fitting(_opened(name)[0], name, size, multiple)
+
+
 @lru_cache(maxsize=16)
 def _opened(name: str) -> tuple[Source, float]:
     """A film, and where it begins by its own clock [s]."""
@@ -77,16 +82,25 @@ def _place(
     source: Source, name: str, size: tuple[int, int], multiple: int, draw: np.random.Generator
 ) -> tuple[float, tuple[int, int, int, int]]:
     """A start [s after the first frame] and a part (left, top, width, height) of a film."""
+    count, seconds, fits = _fitting(source, name, size, multiple)
+    smaller = fits[int(draw.integers(len(fits)))]
+    wanted = smaller * size[0], smaller * size[1]
+    left, top = (int(draw.integers(have - want + 1)) for have, want in zip(source.size, wanted, strict=True))
+    return float(draw.uniform(0, seconds * (1 - (multiple + 4) / count))), (left, top, *wanted)
+
+
+def _fitting(source: Source, name: str, size: tuple[int, int], multiple: int) -> tuple[int, float, list[int]]:
+    """Frames and seconds of a film, and by how much clips of it can be made smaller."""
     count, seconds = source.frames_expected, source.duration_expected_s
     if not count or not seconds or count < multiple + 4:
         raise UsageError(f"{name}: {count} frames; expected at least {multiple + 4} for clips of {multiple}")
     fits = [each for each in SMALLER if all(each * want <= have for want, have in zip(size, source.size, strict=True))]
     if not fits:
-        raise UsageError(f"{name}: {source.size[0]}x{source.size[1]} pixels; expected at least {size[0]}x{size[1]}")
-    smaller = fits[int(draw.integers(len(fits)))]
-    wanted = smaller * size[0], smaller * size[1]
-    left, top = (int(draw.integers(have - want + 1)) for have, want in zip(source.size, wanted, strict=True))
-    return float(draw.uniform(0, seconds * (1 - (multiple + 4) / count))), (left, top, *wanted)
+        raise UsageError(
+            f"{name}: {source.size[0]}x{source.size[1]} pixels; expected at least {size[0]}x{size[1]}, or give --set"
+            " clips.size=[W,H] and --set samples.size=N"
+        )
+    return count, seconds, fits
 
 
 def _read(

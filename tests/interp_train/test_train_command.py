@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from small_run import Made, clips
@@ -16,6 +17,7 @@ from interp.networks import names
 from interp.train import runs
 from interp.train.batches import Feed
 from vid2ev.commands import Commands
+from vid2ev.recording.exposures import write_codes
 
 FEW = ["--steps", "3", "--set", "batch=2", "--set", "processes=1", "--set", "validations=1", "--workers", "0", "--cpu"]
 
@@ -94,6 +96,35 @@ def test_data_that_cannot_be_used_leave_room_for_another_run(monkeypatch: pytest
         shown = run("--data", "nothing", "-o", "run", *FEW)
     assert shown.exit_code == 2 and "nothing: no recordings in it" in shown.output
     assert run("-o", "run", *FEW).exit_code == 0
+
+
+def test_recordings_that_give_no_clips_are_named_before_training(tmp_path: Path) -> None:
+    for name, count in (("long", 9), ("short", 3)):
+        write_hsergb(tmp_path / "data" / name, count)
+    small = ("--set", "clips.size=[32,24]", "--set", "samples.size=16")
+    shown = run("--data", "data", "--dry-run", *small)
+    assert shown.exit_code == 0
+    assert f"note: not used: {Path('data', 'short')}: 3 frames, expected 9 or more" in shown.output
+    assert "long" not in shown.output
+    shown = run("--data", "data", "--dry-run")
+    assert shown.exit_code == 2 and "40x24 are smaller than clips, 128x128; give --set clips.size" in shown.output
+
+
+def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> None:
+    np.savez(tmp_path / "film.npz", frames=np.zeros((20, 24, 40, 3), np.float32), fps=30)
+    shown = run("--data", "film.npz", "--dry-run")
+    assert shown.exit_code == 2 and "film.npz: 40x24 pixels; expected at least 128x128" in shown.output
+
+
+def write_hsergb(folder: Path, count: int) -> None:
+    """A sequence in the HS-ERGB layout, of 40x24 pixels, with an event before each picture."""
+    pictures, events = folder / "images_corrected", folder / "events_aligned"
+    pictures.mkdir(parents=True)
+    events.mkdir()
+    for k in range(count):
+        write_codes(pictures / f"{k:06d}.png", np.full((24, 40, 3), 10 * k, np.uint8))
+        np.savez(events / f"{k:06d}.npz", x=np.zeros(1), y=np.zeros(1), t=np.array([4000 * (k + 1)]), p=np.ones(1))
+    (pictures / "timestamp.txt").write_text("".join(f"{4000 * (k + 1)}\n" for k in range(count)))
 
 
 def test_training_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
