@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vid2ev.commands.auto import Auto
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
+from vid2ev.untrusted import first_line
 
 if TYPE_CHECKING:
     from interp.train.fit import Outcome
@@ -165,11 +166,21 @@ def _job(options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
 
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
     """The job of a run that was begun, unless the command line says what it should be."""
+    from pydantic import ValidationError
+
     from interp.train.job import Job
     from interp.train.run_folder import begun_job
     from vid2ev.commands.progress import given
 
-    return _job(options, starts) if given() & options.keys() else Job(**begun_job(path))
+    if given() & options.keys():
+        return _job(options, starts)
+    try:
+        return Job(**begun_job(path))
+    except (ValidationError, TypeError) as error:
+        raise DataError(
+            f"{path / 'run.json'} does not say what is trained ({first_line(error, 150)}); copy the run again, or start"
+            " another"
+        ) from error
 
 
 def _seconds(text: str, option: str) -> float:

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator
 
-Range = tuple[float, float]
+
+def _rises(ends: tuple[float, float]) -> tuple[float, float]:
+    if not -math.inf < ends[0] <= ends[1] < math.inf:
+        raise ValueError(f"range {ends[0]:g} to {ends[1]:g}: expected two finite numbers, the lower one first")
+    return ends
+
+
+Range = Annotated[tuple[float, float], AfterValidator(_rises)]
 
 
 def chance(seed: int, *name: object) -> np.random.Generator:

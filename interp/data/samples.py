@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from torch.utils.data import Dataset
 
 from interp.data import alter
@@ -29,10 +29,18 @@ class SampleSettings(BaseModel):
     still: float = Field(default=0.35, ge=0, le=1, description="share with a part in which nothing happens")
     all_still: float = Field(default=0.03, ge=0, le=1, description="share in which nothing happens anywhere")
     compressed: float = Field(default=0.5, ge=0, le=1, description="share of the still parts that went through a JPEG")
-    quality: tuple[int, int] = Field(default=(40, 95), description="of that JPEG")
+    quality: tuple[Annotated[int, Field(ge=1, le=100)], Annotated[int, Field(ge=1, le=100)]] = Field(
+        default=(40, 95), description="of that JPEG, from, to"
+    )
     thinned: float = Field(default=0.15, ge=0, le=1, description="share that has lost events")
     lost: Range = Field(default=(0.0, 0.1), description="share of the events that these have lost")
     threshold_error: Range = Field(default=(0.9, 1.1), description="thresholds that are believed, over those that are")
+
+    @model_validator(mode="after")
+    def _rises(self) -> SampleSettings:
+        if self.quality[0] > self.quality[1]:
+            raise ValueError(f"quality {self.quality}: expected the lower one first")
+        return self
 
 
 UNALTERED = SampleSettings(backwards=0, still=0, all_still=0, thinned=0, threshold_error=(1, 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -25,7 +25,9 @@ class ClipSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    size: tuple[int, int] = Field(default=(128, 128), description="width and height of the frames [px]")
+    size: tuple[Annotated[int, Field(ge=16)], Annotated[int, Field(ge=16)]] = Field(
+        default=(128, 128), description="width and height of the frames [px]"
+    )
     multiples: tuple[int, ...] = Field(
         default=(8,), description="frames to rebuild per key frame: of 4, 8, 16, 32, each as often"
     )
@@ -40,8 +42,10 @@ class ClipSettings(BaseModel):
     recording_folders: tuple[str, ...] = Field(
         default=(), description="recordings: own, or in the HS-ERGB or BS-ERGB layout"
     )
-    slowdown: float = Field(default=1.0, gt=0, description="how many times slower than the world the videos play")
-    scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), description="of the scenes")
+    slowdown: float = Field(
+        default=1.0, gt=0, allow_inf_nan=False, description="how many times slower than the world the videos play"
+    )
+    scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), min_length=1, description="of the scenes")
     textures: tuple[str, ...] = Field(default=TRAINED_ON, description="photographs: bundled ones by name, or files")
     environments: tuple[str, ...] = Field(default=(), description="HDR pictures of all that is around, for scenes")
     motion: tuple[tuple[float, float, float], ...] = Field(
@@ -54,8 +58,8 @@ class ClipSettings(BaseModel):
     gap_ms: Range = Field(default=(8.0, 60.0), description="from key frame to key frame, even in the logarithm [ms]")
     rigs: float = Field(default=0.0, ge=0, le=1, description="share of clips whose event camera stands elsewhere")
     baseline_mm: Range = Field(default=(0.0, 15.0), description="how far from the frame camera [mm]")
-    coarser: tuple[int, ...] = Field(
-        default=(1, 2, 3), description="pixels of frames per pixel of events, across, in rigs"
+    coarser: tuple[Annotated[int, Field(ge=1)], ...] = Field(
+        default=(1, 2, 3), min_length=1, description="pixels of frames per pixel of events, across, in rigs"
     )
     sensors: SensorRanges = Field(default=SensorRanges(), description="ranges of the sensors")
     light: Literal["srgb", "linear"] = Field(
@@ -68,6 +72,10 @@ class ClipSettings(BaseModel):
             raise ValueError(f"multiples {self.multiples}: expected some of 4, 8, 16, 32")
         if self.bins % max(self.multiples) or self.bins > 64:
             raise ValueError(f"bins {self.bins}: expected a multiple of {max(self.multiples)} up to 64")
+        if self.gap_ms[0] <= 0:
+            raise ValueError(f"gap_ms {self.gap_ms}: expected times above 0")
+        if sum(share for share, _, _ in self.motion) <= 0 or any(not 0 <= low <= high for _, low, high in self.motion):
+            raise ValueError(f"motion {self.motion}: expected shares above 0, each with a range of pixels that rises")
         if sum(self.shares) <= 0:
             raise ValueError("no clips: expected a share of scenes, photographs, videos or recordings above 0")
         if self.videos > 0 and not self.video_files:

@@ -5,9 +5,11 @@ The defaults are those of `tiny` on two cores.  Where a number has no source, it
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+Share = Annotated[float, Field(ge=0, lt=1)]
 
 
 class Recipe(BaseModel):
@@ -24,7 +26,7 @@ class Recipe(BaseModel):
     rate: float = Field(1.5e-3, gt=0, description="highest learning rate")
     warm_up: int = Field(200, ge=0, description="steps until it is reached")
     rate_end: float = Field(0.01, ge=0, le=1, description="rate of the last step, as a share of the highest")
-    betas: tuple[float, float] = Field((0.9, 0.99), description="of AdamW: means over 10 and 100 steps")
+    betas: tuple[Share, Share] = Field((0.9, 0.99), description="of AdamW: means over 10 and 100 steps")
     weight_decay: float = Field(1e-4, ge=0, description="of AdamW")
     clip: float = Field(1.0, gt=0, description="longest gradient")
     mean: float = Field(0.998, ge=0, lt=1, description="weight of what was, in the running mean of the weights")

@@ -77,6 +77,14 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--start", "features=firenet-paper"], "the loss of this network looks at no features"),
         (["--dry-run", "--start", "foo=firenet-paper"], "RrinEventsGuided has no part 'foo'; it has"),
         (["--dry-run", "--cpu", "--set", "batch=3"], "batches of 3 cannot be shared out evenly among 2 processes"),
+        (["--dry-run", "--set", "betas=[2,3]"], "setting betas.0 = 2 is impossible: it must be less than 1"),
+        (["--dry-run", "--set", "clips.size=[1,1]"], "setting clips.size.0 = 1 is impossible"),
+        (["--dry-run", "--set", "clips.coarser=[0]"], "setting clips.coarser.0 = 0 is impossible"),
+        (["--dry-run", "--set", "clips.gap_ms=[0,8]"], "gap_ms (0.0, 8.0): expected times above 0"),
+        (["--dry-run", "--set", "clips.motion=[]"], "motion (): expected shares above 0"),
+        (["--dry-run", "--set", "clips.scene_names=[]"], "setting clips.scene_names = [] is impossible"),
+        (["--dry-run", "--set", "samples.lost=[0.5,0.1]"], "range 0.5 to 0.1: expected two finite numbers"),
+        (["--dry-run", "--set", "samples.quality=[90,10]"], "quality (90, 10): expected the lower one first"),
         (["--data", "nowhere"], "Path 'nowhere' does not exist"),
     ],
 )
@@ -125,6 +133,13 @@ def write_hsergb(folder: Path, count: int) -> None:
         write_codes(pictures / f"{k:06d}.png", np.full((24, 40, 3), 10 * k, np.uint8))
         np.savez(events / f"{k:06d}.npz", x=np.zeros(1), y=np.zeros(1), t=np.array([4000 * (k + 1)]), p=np.ones(1))
     (pictures / "timestamp.txt").write_text("".join(f"{4000 * (k + 1)}\n" for k in range(count)))
+
+
+def test_a_record_of_a_run_that_lacks_something_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.json").write_text('{"job": {"size": "tiny"}}')
+    shown = run("--resume", "-o", "run")
+    assert shown.exit_code == 1 and "run.json does not say what is trained" in shown.output
 
 
 def test_training_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
