@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,12 @@ def test_folders_of_others_are_not_touched(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "photos" / "one.png").touch()
     (tmp_path / "file").touch()
     (tmp_path / "here").mkdir()
+    (tmp_path / "shoot" / "raw").mkdir(parents=True)
+    (tmp_path / "shoot" / "raw" / "000001.png").touch()
+    with Folder(tmp_path / "mixed", JOB) as folder:
+        made(folder)
+    (tmp_path / "mixed" / "raw").mkdir()
+    (tmp_path / "mixed" / "raw" / "holiday.cr2").touch()
     partial_of(tmp_path / "taken").mkdir()
     (partial_of(tmp_path / "taken") / "thesis.tex").touch()
     monkeypatch.chdir(tmp_path / "here")
@@ -151,6 +158,8 @@ def test_folders_of_others_are_not_touched(tmp_path: Path, monkeypatch: pytest.M
     for directory, reason in {
         tmp_path / "photos": "one.png",
         tmp_path / "file": "is a file",
+        tmp_path / "shoot": "no manifest.json",
+        tmp_path / "mixed": r"no recording \(raw\)",
         tmp_path / "taken": "other files",
         Path("."): "within",
         Path(".."): "within",
@@ -160,6 +169,17 @@ def test_folders_of_others_are_not_touched(tmp_path: Path, monkeypatch: pytest.M
         with pytest.raises(UsageError, match=reason):
             check_free(directory, overwrite=True, resume=True)
     assert tree(tmp_path) == before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege there")
+@pytest.mark.parametrize("there", [True, False])
+def test_a_link_is_not_replaced(tmp_path: Path, there: bool) -> None:
+    if there:
+        (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "out").symlink_to("elsewhere")
+    with pytest.raises(UsageError, match="is a link"), Folder(tmp_path / "out", JOB):
+        pass
+    assert (tmp_path / "out").is_symlink() and not partial_of(tmp_path / "out").exists()
 
 
 def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:

@@ -37,6 +37,9 @@ FILES = re.compile(  # what a recording holds, and nothing else
     r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
     r"|noise_maps\.npz|truth|rig\.toml|manifest\.json"
 )
+WITHIN = re.compile(  # what the folders among them hold
+    r"\d{6,}\.(png|npy|npz)|(timestamps|poses)\.txt|slices\.csv|intrinsics\.json"
+)
 
 
 class Folder:
@@ -239,16 +242,23 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
         raise UsageError(
             f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
         )
+    if directory.is_symlink():
+        raise UsageError(f"{directory} is a link, which would be replaced; give the folder it leads to, or another one")
     if directory.exists() and not directory.is_dir():
         raise UsageError(f"{directory} is a file; choose a folder with -o")
     held = list(directory.iterdir()) if directory.is_dir() else []
-    others = {path.name for path in held if not (FILES.fullmatch(path.name) or _is_camera(path))}
+    others = {path.name for path in held if not (_may_be_made(path) or _is_camera(path))}
     if others:
         raise UsageError(
             f"{directory} holds files that are no recording ({min(others)}); choose another folder with -o"
         )
     if held and not (overwrite or resume):
         raise UsageError(f"{directory} exists; --overwrite replaces it, -o chooses another folder")
+    if held and not (directory / "manifest.json").is_file():
+        raise UsageError(
+            f"{directory} has no manifest.json, as a recording has, and holds {held[0].name}; choose another folder"
+            " with -o"
+        )
     partial = partial_of(directory)
     begun = {path.name for path in partial.iterdir()} if partial.is_dir() else set()
     if begun and not begun & {"job.json", "lock"}:
@@ -259,4 +269,11 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
 
 def _is_camera(path: Path) -> bool:
     """Whether a folder is that of a camera of a rig."""
-    return (path / "manifest.json").is_file() and all(FILES.fullmatch(child.name) for child in path.iterdir())
+    return (path / "manifest.json").is_file() and all(map(_may_be_made, path.iterdir()))
+
+
+def _may_be_made(path: Path) -> bool:
+    """Whether it has the name of something in a recording and, a folder, holds nothing but what that does."""
+    if not FILES.fullmatch(path.name):
+        return False
+    return not path.is_dir() or all(WITHIN.fullmatch(file.name) for file in path.rglob("*") if not file.is_dir())
