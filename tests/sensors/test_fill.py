@@ -144,3 +144,25 @@ def test_what_cannot_be_is_said() -> None:
         NetCounts(SIZE, [0, 5], dtype=np.uint8)
     with pytest.raises(UsageError, match="a start and a later stop"):
         Windows(SIZE, parse_representation("counts"), [[3, 2]])
+
+
+def test_a_time_for_each_frame_or_nothing_is_seen() -> None:
+    """Frames without a time, times without a frame, and a time that runs back after many good ones."""
+    light, t_ns = light_of(0)[0][:, 0], np.arange(FRAMES) * 1_000_000
+    sensor, same = Dvs(DvsSpec(), SIZE), Dvs(DvsSpec(), SIZE)
+    for each in (sensor, same):
+        each.step(light[0], -1_000_000)
+    for some, times in ((light[:20], t_ns), (light, t_ns[:20])):
+        with pytest.raises(UsageError, match=f"{len(times)} times for {len(some)} frames"):
+            sensor.steps(some, times)
+        with pytest.raises(UsageError, match=f"{len(times)} times for {len(some)} frames"):
+            sensor.fill(NetCounts(SIZE, [0, 1]), some, times)
+        with pytest.raises(UsageError, match="one for each frame and clip"):
+            DvsBatch([DvsSpec()] * 2, SIZE, [1, 2]).steps(np.stack([some] * 2, 1), np.stack([times] * 2, 1))
+    with pytest.raises(UsageError, match="expected a later one"):
+        sensor.steps(light, [*t_ns[:-1], 0])
+    with pytest.raises(UsageError, match="rows and columns"):
+        sensor.steps(np.stack([light] * 2, 1), t_ns)
+    for ours, others in zip(sensor.steps(light, t_ns), same.steps(light, t_ns), strict=True):
+        for name in ("t", "x", "y", "p"):
+            np.testing.assert_array_equal(getattr(ours, name), getattr(others, name))

@@ -120,13 +120,14 @@ class Dvs:
     def steps(self, light: np.ndarray, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames].
 
-        Faster than that: some frames go through the walk at a time.
+        Faster than that: some frames go through the walk at a time.  Raises UsageError as `step` does, and for another
+        number of times than of frames; then none of them has been seen.
         """
         return self.steps_of(np.asarray(light)[:, None], 0, t_ns)
 
     def steps_of(self, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> list[Events]:
         """`steps` of one of the clips of light [frames, clips, height, width]."""
-        return list(self._each(light, clip, [int(t) for t in t_ns]))
+        return list(self._each(light, clip, self._times_of(light, t_ns)))
 
     def fill(self, grid: Grid, light: np.ndarray, t_ns: Sequence[int]) -> None:
         """`steps`, but events go straight into a grid (`vid2ev.views.grid`), without being put in order.
@@ -137,7 +138,7 @@ class Dvs:
 
     def fill_of(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> None:
         """`fill` of one of the clips of light [frames, clips, height, width]."""
-        times = [int(t) for t in t_ns]
+        times = self._times_of(light, t_ns)
         if self._delayed is not None or self._frames is not None:
             for events in self._each(light, clip, times):
                 grid.add(events)
@@ -156,10 +157,10 @@ class Dvs:
         """
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
+        t_ns = self._later(t_ns, self._t_ns)
         self._seen = light
         if self._t_ns is None and self._frames is not None:
-            self._frames.origin_us = int(t_ns) // 1000
-        t_ns = self._later(t_ns, self._t_ns)
+            self._frames.origin_us = t_ns // 1000
         self._origin_ns = t_ns if self._origin_ns is None else self._origin_ns
         count = first_count(t_ns, self._origin_ns)
         self._settle(flat, table, t_ns, count)
@@ -267,6 +268,16 @@ class Dvs:
                 " sort the frames and drop repeated times"
             )
         return t_ns
+
+    def _times_of(self, light: np.ndarray, t_ns: Sequence[int] | np.ndarray) -> list[int]:
+        """The times of frames of light [frames, clips, height, width], each after the one before it."""
+        self._intake.check(np.shape(light)[2:])
+        if len(t_ns) != len(light):
+            raise UsageError(f"{len(t_ns)} times for {len(light)} frames of light: expected one for each")
+        times: list[int] = []
+        for t in t_ns:
+            times.append(self._later(t, times[-1] if times else self._t_ns))
+        return times
 
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Light [..., height, width] as the walk takes it, with the table of its codes."""

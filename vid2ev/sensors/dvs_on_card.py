@@ -69,12 +69,12 @@ class DvsOnCard(Dvs):
 
     def steps(self, light: Any, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames], in a few launches of kernels."""
-        sent = []
-        if self._t_ns is None and len(t_ns) > 0:
-            sent.append(self.restart(light[0], t_ns[0]))
-        for first in range(len(sent), len(t_ns), FRAMES):
+        sent, times = [], self._times_of(light[:, None], t_ns)
+        if self._t_ns is None and times:
+            sent.append(self.restart(light[0], times[0]))
+        for first in range(len(sent), len(times), FRAMES):
             some = slice(first, first + FRAMES)
-            sent += self._some(light[some], [int(t) for t in t_ns[some]])
+            sent += self._some(light[some], times[some])
         return sent
 
     def fill(self, grid: Grid, light: Any, t_ns: Sequence[int]) -> None:
