@@ -109,11 +109,11 @@ def test_between_two_frames_inverse_depth_is_interpolated(tmp_path: Path) -> Non
     assert depth.at(0, 0.25)[0, 0] == pytest.approx(1 / (0.75 / 2 + 0.25 / 2.2), rel=1e-6)
     before, after = (
         np.float32([2, 2, np.nan, 5, np.nan, np.inf, np.inf, 1]),
-        np.float32([2.1, 8, 3, np.nan, np.nan, np.inf, 2, 1]),
+        np.float32([2.1, 2.6, 3, np.nan, np.nan, np.inf, 2, 1]),
     )
     early, late = between(before, after, 0.4), between(before, after, 0.6)
     np.testing.assert_allclose(early, [1 / (0.6 / 2 + 0.4 / 2.1), 2, 3, 5, np.nan, np.inf, np.inf, 1], rtol=1e-6)
-    np.testing.assert_allclose(late, [1 / (0.4 / 2 + 0.6 / 2.1), 8, 3, 5, np.nan, np.inf, 2, 1], rtol=1e-6)
+    np.testing.assert_allclose(late, [1 / (0.4 / 2 + 0.6 / 2.1), 2.6, 3, 5, np.nan, np.inf, 2, 1], rtol=1e-6)
 
 
 @given(
