@@ -124,7 +124,8 @@ def test_changes_of_windows_in_a_row_add_up() -> None:
 
 
 def test_time_backwards_swaps_the_halves() -> None:
-    some, times = counts(2, (5, 7)), torch.tensor([[0.2, 0.5], [0.0, 0.9]])
+    some = EventCounts(counts(2, (5, 7)).off_on, torch.tensor([[0.1, 0.2], [0.3, 0.15]]))
+    times = torch.tensor([[0.2, 0.5], [0.0, 0.9]])
     forth = some.halves(times, 3)
     back = some.reversed().halves(1 - times, 3)
     torch.testing.assert_close(back, torch.cat([forth[:, :, 3:], forth[:, :, :3]], 2), rtol=0, atol=1e-5)

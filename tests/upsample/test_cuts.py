@@ -16,6 +16,7 @@ from vid2ev.instants import Instant, instants
 from vid2ev.recipe import Recipe
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.upsample import cuts
 from vid2ev.upsample.cuts import CutDetector
 
 F = np.float32
@@ -34,6 +35,12 @@ def photograph(name: str, shift: tuple[int, int] = (0, 0), size: tuple[int, int]
 def cuts_in(pictures: list[np.ndarray]) -> list[int]:
     detector, frames = CutDetector(0.15), [Frame(light, k * 10**7) for k, light in enumerate(pictures)]
     return [k for k, pair in enumerate(pairwise(frames), 1) if detector.begins_shot(*pair)]
+
+
+def test_what_is_neither_like_nor_unlike_begins_no_shot_and_ends_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    alike = iter([0.9, 0.3, 0.2, 0.2, 0.9, 0.2])
+    monkeypatch.setattr(cuts, "likeness", lambda *_: next(alike))
+    assert cuts_in([photograph("camera")] * 7) == [6]
 
 
 @pytest.mark.parametrize(("one", "other"), list(combinations(NAMES, 2)))
