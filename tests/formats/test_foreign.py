@@ -63,6 +63,13 @@ def test_evt3_of_a_camera(tmp_path: Path) -> None:
     assert rows(file) == expected and len(file.warnings) == 5  # (again, and nothing is said twice)
 
 
+def test_evt3_whose_upper_bits_go_back_by_less_than_half_and_whose_rows_are_of_exposures(tmp_path: Path) -> None:
+    words = [0x8BB8, 0x6000, 0x0007, 0x2002, 0x85DC, 0x6000, 0x2003, 0x1007, 0x2004]
+    file = opened(tmp_path, raw("3.0", words, 16), "evt3")
+    assert sorted(rows(file)) == [(1500 << 12, 3, 7, 0), (3000 << 12, 2, 7, 0)]
+    assert any(text.startswith("1 events outside of the 640x480") for text in file.warnings)
+
+
 def test_evt2_of_a_camera(tmp_path: Path) -> None:
     def event(p: int, low: int, x: int, y: int) -> int:
         return p << 28 | low << 22 | x << 11 | y
@@ -106,6 +113,15 @@ def test_evt3_sends_time_in_silence_and_vectors_where_they_are_shorter(tmp_path:
     for after, kind in enumerate((4, 4, 5), 1):  # the only pattern that Prophesee's decoder takes
         assert np.all(kinds[base + after] == kind)
     assert np.all((words[base] & 0x7FF) + 32 <= recording.size[0])
+
+
+def test_groups_of_evt3_do_not_reach_over_the_edge(tmp_path: Path) -> None:
+    x = np.tile(np.arange(280, 346, dtype=np.uint16), 3)
+    t, y, p = np.repeat([0, 5, 9], 66), np.full(len(x), 7, np.uint16), np.ones(len(x), np.uint8)
+    path = written(format_named("evt3"), recording_of(Events(t, x, y, p), (346, 260), 0, 100), tmp_path)
+    words = np.frombuffer(path.read_bytes().partition(b"% end\n")[2], "<u2")
+    base = words[words >> 12 == 3] & 0x7FF
+    assert set(base) == {256, 288} and rows(open_events(path)) == list(zip(t, x, y, p, strict=True))
 
 
 def test_evt2_sends_time_in_silence(tmp_path: Path) -> None:
@@ -164,12 +180,13 @@ def test_aedat2_of_a_dvs128_and_beyond_the_end_of_its_clock(tmp_path: Path) -> N
 
 
 def test_nmnist(tmp_path: Path) -> None:
-    events = events_of(np.arange(1000) * 300, (34, 34))
+    events, later = events_of(np.arange(400_000) * 20, (34, 34)), bytes([0, 240, 0, 0, 0])
     content = foreign.nmnist(events)
     assert_same(Events.concatenate(opened(tmp_path, content, "nmnist").events()), events)
-    later = content[:2500] + bytes([0, 240, 0, 0, 0]) + content[2500:]  # half way, 8.192 ms more
-    read = Events.concatenate(opened(tmp_path, later, "nmnist").events())
-    np.testing.assert_array_equal(read.t, events.t + 8192 * (np.arange(1000) >= 500))
+    content = content[:2500] + later + content[2500:-2500] + later + content[-2500:]  # 8.192 ms more, each time
+    read = Events.concatenate(opened(tmp_path, content, "nmnist").events())
+    turns = (np.arange(len(events)) >= 500).astype(int) + (np.arange(len(events)) >= len(events) - 500)
+    np.testing.assert_array_equal(read.t, events.t + 8192 * turns)
 
 
 def test_zeros_are_no_nmnist(tmp_path: Path) -> None:
