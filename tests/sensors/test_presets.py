@@ -101,6 +101,8 @@ def test_the_last_override_wins_and_the_others_stay() -> None:
         ("cis.bits=8", ["cis.bits", "unknown"]),
         ("threshold_on=-1", ["threshold_on = -1", "greater than 0", "0.15"]),
         ("threshold_on=0", ["threshold_on = 0", "greater than 0"]),
+        ("threshold_on=1e-30", ["threshold_on = 1e-30", "at least 1e-06 nat"]),
+        ("threshold_on=true", ["threshold_on = true", "a number", "0.15"]),
         ("threshold_on=nan", ["threshold_on = nan"]),
         ("threshold_on=inf", ["threshold_on = inf"]),
         ("threshold_on=big", ["threshold_on = 'big'", "number"]),

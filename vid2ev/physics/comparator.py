@@ -16,10 +16,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_validator
 
 from vid2ev.kernel_compiler import inlined
 from vid2ev.physics.random import PHASE, philox, unit
+
+LEAST_NATS = 1e-6  # of a threshold: crossings are solved to 2e-6 nat, and from 1e-16 on a level adds up to no other
 
 
 class Comparator(BaseModel, frozen=True, extra="forbid"):
@@ -40,6 +42,13 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
         le=1_000_000,
         description="crossings solved per pixel and monotone stretch of an interval; the rest is one step, and counted",
     )
+
+    @field_validator("threshold_on", "threshold_off")
+    @classmethod
+    def _is_above_rounding(cls, nats: float) -> float:
+        if nats < LEAST_NATS:
+            raise ValueError(f"it must be at least {LEAST_NATS:g} nat, half of what crossings are solved to")
+        return nats
 
 
 @inlined

@@ -95,6 +95,13 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
     for override in overrides:
         key, value = setting(override, kind.example)
         values[key.removeprefix(f"{kind.table}.")] = value
+    for key, value in values.items():
+        field = kind.spec.model_fields.get(key)
+        if isinstance(value, bool) and field is not None and field.annotation in (int, float):  # (pydantic: 1 or 0)
+            raise UsageError(
+                f"{key} = {str(value).lower()} in sensor {sensor.name} is impossible: it must be a number"
+                f" (default {field.default!r})."
+            )
     try:
         return kind.spec(**values)
     except ValidationError as error:
