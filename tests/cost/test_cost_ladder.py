@@ -112,7 +112,8 @@ def test_convert_understands_what_is_recommended() -> None:
             assert context.params[name] == value, rung
         texts = dict(text.split("=", 1) for text in context.params["overrides"])
         assert {*texts} == {*rung.settings}
-        Recipe.of(**{key: value for key, value in rung.applied({"video": CLIP}).items() if key != "effects"})
+        applied = rung.applied({"video": CLIP, "frame_camera": True})
+        Recipe.of(**{key: value for key, value in applied.items() if key != "effects"})
 
 
 def test_a_specification_is_changed_as_a_preset_is() -> None:
