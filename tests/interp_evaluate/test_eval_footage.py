@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from footage_made import STEP_US, pictures, write_film, write_hsergb, write_pred
 
 from interp.data.dataset import write_dataset
 from interp.data.dataset_spec import DatasetSpec
-from interp.data.layouts import open_sequence
+from interp.data.layouts import open_sequence, sequences_in
 from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
 from interp.evaluate.predictions import by_frame, predictions_in
@@ -110,6 +111,25 @@ def test_key_frames_of_an_own_recording_are_those_of_its_frame_camera(own: Path)
     assert groups[0].cameras.exposure_us == pytest.approx(4e6 / 960, abs=2)
     assert groups[0].events.contrast.flatten().tolist() == pytest.approx(sequence.contrast)
     assert f"{begin} frames before the first key frame are not rebuilt" in recording.about()["remarks"]
+
+
+@pytest.mark.parametrize("damage", ["cut short", "missing"])
+def test_an_own_recording_whose_events_are_torn_is_named_before_any_are_asked_for(
+    own: Path, tmp_path: Path, damage: str
+) -> None:
+    for name in ("torn", "whole"):
+        shutil.copytree(own, tmp_path / name)
+    file = tmp_path / "torn" / "dvs" / "events.h5"
+    if damage == "missing":
+        file.unlink()
+    else:
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    found, unusable = sequences_in(tmp_path)
+    assert [folder.name for folder in found] == ["whole"]
+    assert (
+        list(unusable) == [str(tmp_path / "torn")]
+        and str(tmp_path / "torn" / "dvs") in unusable[str(tmp_path / "torn")]
+    )
 
 
 def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from interp.data.layouts.sequence import Placed
-from vid2ev import CisSpec, DataError, read_events
+from vid2ev import CisSpec, DataError, UsageError, read_events
+from vid2ev.formats import open_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 
@@ -28,7 +29,7 @@ class Own:
     keys_folder     the pictures of the slow frame camera
     events_folder   what the event camera wrote
     Where there are no pictures of 8 bits (`--cis-out png`), they are made of the codes of the ADC, as those would be.
-    Raises DataError for a recording that has no events or no frames.
+    Raises DataError for a recording that has no events or no frames, or whose events cannot be read.
     """
 
     def __init__(self, folder: Path):
@@ -40,6 +41,7 @@ class Own:
             raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
         self._keys, self._frames = _Pictures(frames[0]), _Pictures(frames[-1])
         self.keys_folder, self.events_folder = frames[0]["folder"], events[0]["folder"]
+        _check_events(self.events_folder)
         self.times_us, key_times = self._frames.times_us, self._keys.times_us
         self._key_of = {
             int(k): number
@@ -81,6 +83,16 @@ class Own:
         parts = list(read_events(self.events_folder, start_us + 1, stop_us + 1))
         t, x, y, p = (np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in "txyp")
         return Placed(t.astype(np.int64), x.astype(np.float32), y.astype(np.float32), p.astype(np.uint8))
+
+
+def _check_events(folder: Path) -> None:
+    """Raise DataError where the events of a camera are missing or cut short: now, not when the first are asked for."""
+    try:
+        open_events(folder)
+    except UsageError as error:
+        raise DataError(
+            f"{folder}: its manifest speaks of events, and there are none; copy the recording again"
+        ) from error
 
 
 def _cameras(folder: Path) -> list[dict[str, Any]]:
