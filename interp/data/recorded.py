@@ -122,7 +122,7 @@ def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.nd
             f"{path}: frames of {wide}x{high} are smaller than clips, {width}x{height}; give --set clips.size=[W,H] and"
             " --set samples.size=N"
         )
-    window = windows(sequence, multiple)
+    window = windows(sequence, multiple, even=True)
     reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
     too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"
     return window.first, f"{path}: {', '.join(reasons) or too_few}"

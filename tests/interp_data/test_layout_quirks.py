@@ -295,6 +295,31 @@ def test_recorded_clips_are_drawn_from_all_that_can_be_used(tmp_path: Path) -> N
         recorded(settings, 0, 0, 32)
 
 
+@pytest.mark.parametrize("lost", [1, 4, 7])
+def test_no_clip_is_cut_where_frames_are_not_even_in_time(tmp_path: Path, lost: int) -> None:
+    # (clips take them to be so; one that is lost at the edge of a window leaves the others even)
+    late = [STEP_US * (k + 1 + (k >= lost)) for k in range(12)]
+    written(tmp_path / "seq", images=12, times="".join(f"{t}\n" for t in late))
+    save(tmp_path / "seq", "hsergb", 12, events_of(50, 13 * STEP_US, 14 * STEP_US))
+    sequence = open_sequence(tmp_path / "seq")
+    even = [first for first in range(8) if not first < lost <= first + 4]
+    assert windows(sequence, 4, even=True).first.tolist() == even
+    assert windows(sequence, 4, even=True).unusable == {
+        "the frames are not even in time, as where some are lost": 8 - len(even)
+    }
+    assert windows(sequence, 4).first.tolist() == [*range(8)]  # (who knows the frames' own times takes all)
+    settings = ClipSettings(
+        size=(16, 16), multiples=(4,), recordings=1, scenes=0, photographs=0, recording_folders=(str(tmp_path),)
+    )
+    assert {recorded(settings, 0, number, 4).about["first"] for number in range(20)} <= {*even}
+
+
+def test_frames_that_are_even_but_for_jitter_give_clips(tmp_path: Path) -> None:
+    jitter = np.random.default_rng(0).integers(-STEP_US // 10, STEP_US // 10, 12)
+    written(tmp_path / "seq", images=12, times="".join(f"{STEP_US * (k + 1) + jitter[k]}\n" for k in range(12)))
+    assert "not even" not in " ".join(windows(open_sequence(tmp_path / "seq"), 4, even=True).unusable)
+
+
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no recordings in it"):
         sequences_in(tmp_path)

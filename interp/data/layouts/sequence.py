@@ -10,6 +10,8 @@ import numpy as np
 
 from vid2ev import Events
 
+EVEN = 0.25  # of a step, that a frame may be off its place; where one is lost, some are off by 0.4 or more
+
 
 class Placed(NamedTuple):
     """Events at places between pixels: t int64 [us] in order, x and y float32 [px], p 1 for ON and 0 for OFF, uint8."""
@@ -80,8 +82,11 @@ class Windows:
     unusable: dict[str, int]
 
 
-def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0) -> Windows:
-    """The windows of a sequence that begin with each `every`-th frame from frame `begin` on."""
+def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0, even: bool = False) -> Windows:
+    """The windows of a sequence that begin with each `every`-th frame from frame `begin` on.
+
+    even   for those who take frames to be even in time: none where one is off, as around a lost one
+    """
     times = sequence.times_us
     since, end = sequence.covered_us
     good, unusable = [], dict[str, int]()
@@ -89,6 +94,8 @@ def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0) -
         part = times[k : k + multiple + 1]
         if (np.diff(part) <= 0).any():
             reason = "times of the frames do not increase"
+        elif even and not _are_even(part):
+            reason = "the frames are not even in time, as where some are lost"
         elif part[-1] > end:
             reason = "the events end before the last frame"
         elif part[0] < since:
@@ -100,3 +107,9 @@ def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0) -
             continue
         unusable[reason] = unusable.get(reason, 0) + 1
     return Windows(np.array(good, np.int64), unusable)
+
+
+def _are_even(times_us: np.ndarray) -> bool:
+    """Whether frames are where they would be if they were even in time between the first and the last."""
+    places = (times_us - times_us[0]) / (times_us[-1] - times_us[0]) * (len(times_us) - 1)
+    return bool(np.abs(places - np.arange(len(times_us))).max() <= EVEN)
