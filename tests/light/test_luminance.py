@@ -69,18 +69,39 @@ def test_even_chroma_is_even_whatever_its_grid(halvings: tuple[int, int], size: 
 
 
 def test_chroma_is_sited_left_and_centred_between_rows() -> None:
-    """A ramp of chroma over the picture is the same ramp on the fine grid, shifted by where its samples lie."""
+    """A ramp of chroma over the picture is the same ramp on the fine grid, shifted by where its samples lie; seen in
+    red, as linear light of all three channels has the luminance of luma, whatever the chroma."""
     rows, columns = np.indices((12, 16))
-    y = np.full((24, 32), 128, np.uint8)
+    y, red = np.full((24, 32), 128, np.uint8), (1.0, 0.0, 0.0)
     for ramp, fine in (
         (100 + 2 * columns, 100 + np.indices((24, 32))[1]),
         (100 + 2 * rows, 100 + np.indices((24, 32))[0] - 0.5),
     ):
         code = YuvCode(8, False, MATRICES[1], (1, 1))
         u = np.full_like(ramp, 128).astype(np.uint8)
-        light = luminance_of_yuv([y, u, ramp.astype(np.uint8)], (32, 24), code, signal_table("linear"), BT709_WEIGHTS)
-        expected = by_the_book(y, np.full_like(y, 128), fine, code, "linear", BT709_WEIGHTS)
+        light = luminance_of_yuv([y, u, ramp.astype(np.uint8)], (32, 24), code, signal_table("linear"), red)
+        expected = by_the_book(y, np.full_like(y, 128), fine, code, "linear", red)
         np.testing.assert_allclose(light[1:-1, :-1], expected[1:-1, :-1], atol=1e-6)
+        assert np.ptp(expected) > 0.1
+
+
+def on_the_fine_grid(chroma: np.ndarray, size: tuple[int, int], halvings: tuple[int, int]) -> np.ndarray:
+    """Chroma at the places of luma: straight between samples, left in a row and centred between rows, and held beyond
+    the outermost."""
+    across, down = np.arange(size[0]) / 2 ** halvings[0], (np.arange(size[1]) + 0.5) / 2 ** halvings[1] - 0.5
+    full = np.stack([np.interp(across, np.arange(chroma.shape[1]), row) for row in chroma])
+    return np.stack([np.interp(down, np.arange(chroma.shape[0]), column) for column in full.T], axis=1)
+
+
+@pytest.mark.parametrize("halvings", [(1, 1), (1, 0), (0, 1), (2, 0), (2, 2)])
+@pytest.mark.parametrize("size", [(32, 24), (33, 25), (131, 7), (1, 1), (2, 3), (5, 1)])
+def test_chroma_is_straight_between_its_samples(halvings: tuple[int, int], size: tuple[int, int]) -> None:
+    rng, small = np.random.default_rng(0), tuple(-(-n >> k) for n, k in zip(size[::-1], halvings[::-1], strict=True))
+    y, u, v = (codes(rng, 8, shape) for shape in (size[::-1], small, small))
+    code, weights = YuvCode(8, False, MATRICES[1], halvings), (0.6, 0.0, 0.4)
+    light = luminance_of_yuv([y, u, v], size, code, signal_table("bt709"), weights)
+    fine = (on_the_fine_grid(chroma, size, halvings) for chroma in (u, v))
+    np.testing.assert_allclose(light, by_the_book(y, *fine, code, "bt709", weights), atol=1e-6)
 
 
 def test_rows_may_be_longer_than_the_picture() -> None:

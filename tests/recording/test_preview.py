@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
+from vid2ev.pictures.colours import MOST
 from vid2ev.recording.panels import COLOURS, GRAYS, NEUTRAL
 from vid2ev.recording.preview import RATE, Preview, rate_for
 from vid2ev.stream.events import Events
@@ -113,6 +114,17 @@ def test_every_event_is_shown_once_in_its_window(tmp_path: Path) -> None:
             found.setdefault((int(across), int(down)), []).append(int(number))
     expected = {(int(a), int(b)): [int(np.searchsorted(instants, t))] for a, b, t in zip(x, y, t_us, strict=True)}
     assert found == expected
+
+
+def test_more_events_than_can_be_told_apart_are_as_bright_as_the_most(tmp_path: Path) -> None:
+    events = Events.concatenate(
+        [events_at([1000] * MOST, 5), events_at([1000] * 700, 6), events_at([1000] * 700, 7, p=0)]
+    )
+    steps = [(frame_at(0), Events.empty()), (frame_at(10**8), events)]
+    shown = decoded(film(tmp_path / "preview.mp4", steps))
+    picture = shown[Fraction(0)][6 * 10 + 5, 640 + 5 :: 10]
+    assert abs(picture[5] - int(COLOURS[0, MOST, 0])) <= 6 and abs(picture[6] - picture[5]) <= 6
+    assert abs(picture[7] - int(COLOURS[MOST, 0, 0])) <= 6
 
 
 def test_a_long_silence_costs_nothing(tmp_path: Path) -> None:

@@ -59,6 +59,15 @@ def test_what_is_along_the_plane_of_the_picture_is_infinitely_far_out() -> None:
         assert pixels_of(np.array([0.0, 0.5, np.finfo(np.float64).tiny]), camera).tolist() == [74.5, np.inf]
 
 
+def test_a_fisheye_sees_nearly_all_that_is_before_it() -> None:
+    camera, angles = lens("fisheye", 150), np.radians([60, 75, 89])
+    points = np.stack([np.sin(angles), np.zeros(3), np.cos(angles)], axis=1)
+    seen = pixels_of(points, camera)
+    np.testing.assert_allclose(seen, opencv_pixels(points, camera), atol=1e-6)
+    rays = rays_of(seen, camera)
+    np.testing.assert_allclose(rays[:, 0], np.tan(angles), rtol=1e-6)
+
+
 def test_what_no_lens_sees_has_no_pixel() -> None:
     for name in LENSES:
         behind = pixels_of(np.array([[0, 0, -1.0], [1, 1, 0], [0.1, 0, -1e-12], [np.nan, 0, 1]]), lens(name))
