@@ -6,7 +6,8 @@ comparator's input is
 
     F(s) = curve(y(s)) + leak + noise,     y the response in the filter's domain, leak and noise linear in s
 
-and is followed from knot to knot: turning points, forced events, the end of a refractory period.
+and is followed from knot to knot: turning points, forced events, the end of a refractory period.  With `timing =
+"frame"` F stays at its start until the frame is there.
 """
 
 from __future__ import annotations
@@ -86,6 +87,8 @@ def path_of(block, scratch, i, flags, num, iv):
         if len(flags.log_input) == 0:
             start = log_level(max(start, 0.0), num.curve)
             after = log_level(max(after, 0.0), num.curve)
+        if num.frame_time:  # it stays as it is until the frame
+            return Path(start, after + drift, 0.0, 0.0, 0.0, 0.0, 0.0, False, base, 0.0, num.curve)
         rise = after - start
         return Path(start, after, rise, 0.0, 0.0, 0.0, 0.0, False, base, drift, num.curve)
     b = iv.b if two else 0.0
@@ -231,7 +234,7 @@ def walk_pixel(
         if not blind and (end >= on or end <= off):
             up = end >= on
             at = on if up else off
-            here = reach(path, at, s, stop, up)
+            here = stop if num.frame_time else reach(path, at, s, stop, up)
             solved += 1
             if solved > num.max_crossings:
                 tally[CAPPED] += 1
