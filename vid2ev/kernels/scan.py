@@ -12,7 +12,7 @@ from numba.core.extending import overload
 
 from vid2ev.kernel_compiler import INNER_OPTIONS, inner
 from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH, last_light
-from vid2ev.physics.elementary import expm1_32
+from vid2ev.physics.elementary import exp64, expm1_32
 from vid2ev.physics.log_curve import light_at, log_level_32
 from vid2ev.physics.photoreceptor import light_weights_32
 from vid2ev.physics.photoreceptor_noise import noise_draw, rice_expected, rice_gap
@@ -114,6 +114,7 @@ def advance(block, scratch, flagged, n, flags, num, iv):
     x1, w1, x2, g, w2 = F(iv.x1), F(iv.w1), F(iv.x2), F(iv.g), F(iv.w2)
     before, dark = last_light(flags), F(num.bandwidth_dark)
     per_light = F(iv.a) / (F(1.0) + dark)
+    gain0 = F(exp64(iv.leak0)) if len(flags.leak) else F(1.0)
     for i in range(n):
         if len(flags.light_bandwidth):
             # dt / tau1 at the mean light of the interval, which for a ramp of light is its exact integral.
@@ -131,7 +132,7 @@ def advance(block, scratch, flagged, n, flags, num, iv):
                 scratch[NEW2 + i] = (e2 - x2 * e2) + (g * e1 + w2 * du)
             if len(flags.log_input) == 0:
                 steep = np.int32(steep + np.int32(was_steep(block, i, flags, num) | gets_steep(scratch, i, flags, num)))
-        flagged[i] = np.uint8(reaches(block, scratch, i, flags, num, iv))
+        flagged[i] = np.uint8(reaches(block, scratch, i, gain0, flags, num, iv))
     return steep
 
 
@@ -145,15 +146,16 @@ def light_weights(clock, b, flags):
 
 
 @inner
-def reaches(block, scratch, i, flags, num, iv):
-    """Whether pixel i may cross a level in the interval."""
+def reaches(block, scratch, i, gain0, flags, num, iv):
+    """Whether pixel i may cross a level in the interval; `gain0` is that of the leak at its start."""
     poles = len(flags.poles)
     y = scratch[NEW + i]
     if poles > 0:
         y = y - scratch[(NEW1 if poles == 1 else NEW2) + i]
+    end = y
     if len(flags.log_compare):
         if not len(flags.log_input):
-            y = log_level_32(max(y, F(0.0)), num.curve)
+            y = end = log_level_32(max(y, F(0.0)), num.curve)
         y = y + F(iv.leak1)
         if len(flags.noise):
             scratch[SEEN + i] = y
@@ -162,7 +164,15 @@ def reaches(block, scratch, i, flags, num, iv):
         y = y * iv.gain + iv.shift
     flag = (y >= block[HIGH * PITCH + i]) | (y <= block[LOW * PITCH + i])
     if (poles > 0) & (len(flags.straight) == 0):
-        flag = flag | turns_at(block, scratch, i, flags) & may_reach(block, scratch, i, flags, iv)
+        flag = flag | turns_at(block, scratch, i, flags) & may_reach(block, scratch, i, gain0, flags, num, iv)
+    if (len(flags.leak) > 0) & (len(flags.straight) == 0):
+        start = block[INPUT * PITCH + i]
+        if poles > 0:
+            start = start - block[(LAG1 if poles == 1 else LAG2) * PITCH + i]
+        if len(flags.log_compare) and not len(flags.log_input):
+            start = log_level_32(max(start, F(0.0)), num.curve)
+        # (between its ends, and yet the leak may make it turn: it goes on rising before the light has begun to fall)
+        flag = flag | hull_reaches(max(start, end), min(start, end), block, scratch, i, gain0, flags, num, iv)
     return flag
 
 
@@ -180,20 +190,26 @@ def turns_at(block, scratch, i, flags):
 
 
 @inner
-def may_reach(block, scratch, i, flags, iv):
+def may_reach(block, scratch, i, gain0, flags, num, iv):
     """Whether the hull of an interval with a turning point reaches a level: y stays among inputs and first pole."""
     if len(flags.log_compare) and not len(flags.log_input):
         return True  # the hull in nats would cost another logarithm
     old, new = block[INPUT * PITCH + i], scratch[NEW + i]
     first = old - block[LAG1 * PITCH + i]
     top, bottom = max(old, max(new, first)), min(old, min(new, first))
+    return hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv)
+
+
+@inner
+def hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv):
+    """Whether what is between bottom and top reaches a level, with leak and noise wherever they are in the interval."""
     if len(flags.log_compare):
         top, bottom = top + F(iv.leak1), bottom + F(iv.leak0)
         if len(flags.noise):
             swing = max(abs(scratch[NOISE0 + i]), abs(scratch[NOISE1 + i]))
             top, bottom = top + swing, bottom - swing
     elif len(flags.leak):
-        top, bottom = top * iv.gain + iv.shift, bottom * iv.gain + iv.shift
+        top, bottom = top * iv.gain + iv.shift, (bottom + F(num.curve.dark)) * gain0
     return (top >= block[HIGH * PITCH + i]) | (bottom <= block[LOW * PITCH + i])
 
 

@@ -60,7 +60,7 @@ def load_quiet(block, scratch, flagged, keys, chance, first, last, p0, lanes, pi
     for j in range(first, last):
         s, lane = place_of_candidate(keys[j], iv)[1], shots + (j - first)
         here = value(path, s)
-        far = farthest(block, scratch, i, end - here, flags, iv)
+        far = farthest(block, scratch, i, end - here, flags, iv) + (iv.leak1 - iv.leak0)
         if chance[j] == 0.0 or not is_below_thresholds(far, p0 + i, planes.theta, flags, num):
             return 0
         lanes[AT + lane], lanes[WHEN + lane], pixels[lane] = here, s, p0 + i

@@ -1,0 +1,57 @@
+"""The leak turns the signal round where the light alone would not, and what it crosses meanwhile is sent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vid2ev import Dvs, DvsSpec
+
+THRESHOLD, LEAK_NAT_PER_S = 0.05, 50.0  # 1000 Hz
+DURATION_S, TAU_S = 0.03, 0.005
+
+
+def crossings(signal: np.ndarray) -> list[tuple[int, int]]:
+    """Index and polarity of each crossing of levels one threshold apart, from signal[0] on."""
+    memory, found, i = signal[0], [], 0
+    while True:
+        beyond = np.flatnonzero(np.abs(signal[i:] - memory) >= THRESHOLD)
+        if beyond.size == 0:
+            return found
+        i += int(beyond[0])
+        up = bool(signal[i] > memory)
+        memory += THRESHOLD if up else -THRESHOLD
+        found.append((i, int(up)))
+
+
+@pytest.mark.parametrize(
+    ("order", "tau_s", "log_curve"),
+    [("before", 0.0, "offset"), ("before", TAU_S, "offset"), ("before", TAU_S, "toe"), ("after", TAU_S, "offset")],
+)
+def test_a_leak_that_falling_light_overtakes(order, tau_s, log_curve):
+    """Light falls along a line and takes the signal back to about where it was, but the leak has lifted it meanwhile.
+
+    The signal has no turning point of the filter's own, and ends between its levels.
+    """
+    dark = 1e-3 if log_curve == "offset" else 0.0
+    t_s = np.linspace(0.0, DURATION_S, 600_001)
+    way_s = t_s - tau_s * -np.expm1(-t_s / tau_s) if tau_s else t_s  # the response to a slope of 1/s
+    fallen = LEAK_NAT_PER_S * DURATION_S - 0.3 * THRESHOLD
+    if order == "before":
+        slope = (1.0 + dark) * np.expm1(-fallen) / way_s[-1]
+        last, signal = 1.0 + slope * DURATION_S, np.log(1.0 + slope * way_s + dark)
+    else:
+        slope = -fallen / way_s[-1]
+        last, signal = (1.0 + dark) * np.exp(slope * DURATION_S) - dark, slope * way_s
+    expected = crossings(signal + LEAK_NAT_PER_S * t_s)
+    spec = DvsSpec(
+        threshold_on=THRESHOLD, threshold_off=THRESHOLD, mismatch=0, crossing_noise=0, refractory_us=0, filter=order,
+        random_phase=False, photoreceptor_tau_us=1e6 * tau_s, follower_tau_us=0, leak_rate_hz=1000.0,
+        log_curve=log_curve, dark_level=dark or 1e-3,
+    )  # fmt: skip
+    sensor = Dvs(spec, (1, 1))
+    sensor.step(np.ones((1, 1)), 0)
+    sent = sensor.step(np.full((1, 1), last), round(1e9 * DURATION_S))
+    assert len(expected) >= 4 and {p for _, p in expected} == {0, 1}
+    assert sent.p.tolist() == [p for _, p in expected]
+    np.testing.assert_allclose(sent.t, 1e6 * t_s[[i for i, _ in expected]], atol=1.0)
