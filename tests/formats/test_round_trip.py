@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recordings import all_events, assert_same, events_of, recording_of, recordings_for, sparse, written
 
+from vid2ev.errors import UsageError
 from vid2ev.formats import FORMATS, format_named, open_events, read_events, recognise, survey
 from vid2ev.stream.events import Events
 
@@ -51,6 +52,9 @@ def test_windows_and_blocks(tmp_path: Path, name: str) -> None:
     blocks = list(read_events(path, start, stop, block=64))
     assert all(0 < len(block) <= 64 for block in blocks)
     assert_same(Events.concatenate(blocks), events.select((events.t >= start) & (events.t < stop)))
+    for none in (0, -5):
+        with pytest.raises(UsageError, match=f"block {none}: expected at least 1"):
+            list(read_events(path, block=none))
 
 
 @pytest.mark.parametrize("name", WRITABLE)

@@ -73,9 +73,11 @@ def read_events(
 ) -> Iterator[Events]:
     """The events of a file or recording folder with start_us <= t < stop_us, at most `block` at a time.
 
-    Times are absolute, on the clock of the source.  Raises UsageError for a file that is not there, DataError for one
-    that is no event file, or damaged.
+    Times are absolute, on the clock of the source.  Raises UsageError for a file that is not there or blocks of no
+    events, DataError for a file that is no event file, or damaged.
     """
+    if block < 1:
+        raise UsageError(f"block {block}: expected at least 1 event at a time")
     yield from open_events(path).events(start_us, stop_us, block)
 
 
