@@ -21,6 +21,7 @@ from vid2ev.rig.depth import plane_of
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
+from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, scene_of
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
@@ -94,8 +95,7 @@ class Recipe:
         truth      some of `truth.KINDS`, to be written so many times a second
         The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
         """
-        if not 0 <= (seed := rest.get("seed", 0)) < 1 << 64:
-            raise UsageError(f"seed {seed}: expected a whole number from 0 to 2**64 - 1")
+        check_seed(seed := rest.get("seed", 0))
         if rest.get("bayer"):
             rest["bayer"] = check_pattern(rest["bayer"].upper())
         refuse_recordings(Path(video), rest.get("transfer", "auto"))

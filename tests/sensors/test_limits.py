@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from vid2ev import Dvs, DvsSpec, UsageError, load_sensor
+from vid2ev import Cis, CisSpec, Dvs, DvsSpec, UsageError, events_of, load_sensor
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,15 @@ def test_a_size_that_cannot_be_is_refused(size: Any, expected: str) -> None:
 def test_overrides_that_are_no_list_of_texts_are_refused(overrides: Any) -> None:
     with pytest.raises(UsageError, match=r"expected a list of texts, such as \['threshold_on="):
         load_sensor("ideal", overrides)
+
+
+@pytest.mark.parametrize(
+    "options", [{"seed": 1.5}, {"seed": "random"}, {"seed": None}, {"camera": 0.5}, {"threads": 1.5}]
+)
+def test_what_is_no_whole_number_is_refused(options: Any) -> None:
+    for sensor in (lambda: Dvs(DvsSpec(), (2, 2), **options), lambda: Cis(CisSpec(), (2, 2), **options)):
+        with pytest.raises(UsageError, match=f"{next(iter(options))} .*expected a whole number"):
+            sensor()
+    if "seed" in options:
+        with pytest.raises(UsageError, match="seed .*expected a whole number"):
+            events_of("synthetic:moving-edge", **options)

@@ -21,7 +21,23 @@ def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) ->
             f"size {width}x{height}: expected 1x1 to {PIXEL_LIMIT} pixels in all, and {LONGEST_SIDE} a side at most;"
             " scale the frames down"
         )
-    if not 0 <= seed < 1 << 64 or not 0 <= camera < 1 << 24:
-        raise UsageError(f"seed {seed}, camera {camera}: expected 0 to 2**64 - 1 and 0 to 2**24 - 1")
-    if threads < 1:
-        raise UsageError(f"threads {threads}: expected at least 1; leave it out for one")
+    check_seed(seed)
+    if not is_whole(camera, 0, (1 << 24) - 1):
+        raise UsageError(f"camera {camera!r}: expected a whole number from 0 to 2**24 - 1")
+    if not is_whole(threads, 1):
+        raise UsageError(f"threads {threads!r}: expected a whole number of at least 1; leave it out for one")
+
+
+def check_seed(seed: int) -> None:
+    """Raise UsageError for what is no seed."""
+    if not is_whole(seed, 0, (1 << 64) - 1):
+        raise UsageError(f"seed {seed!r}: expected a whole number from 0 to 2**64 - 1")
+
+
+def is_whole(number: object, least: int, most: int | None = None) -> bool:
+    """Whether a number is whole, and within these limits."""
+    try:
+        whole = operator.index(number)  # type: ignore[call-overload]
+    except TypeError:
+        return False
+    return least <= whole and (most is None or whole <= most)
