@@ -109,6 +109,9 @@ def by_frame(files: Sequence[Path], frames: int, multiple: int) -> dict[int, Pat
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The pictures in a folder, in natural order of their names; none where there is no folder."""
-    found = folder.iterdir() if folder.is_dir() else ()
+    """The pictures in a folder, in natural order of their names; none where there is no folder.
+
+    Hidden files are none: macOS puts ._NAME.png beside NAME.png on disks of others.
+    """
+    found = (path for path in folder.iterdir() if not path.name.startswith(".")) if folder.is_dir() else ()
     return sorted((path for path in found if path.suffix.lower() == SUFFIX), key=lambda path: natural(path.name))

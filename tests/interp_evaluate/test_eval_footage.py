@@ -247,6 +247,18 @@ def test_predictions_are_paired_by_position(tmp_path: Path, with_keys: bool) -> 
         np.testing.assert_array_equal(np.stack(found[0].begin(recording).frames(group)), group.truth)
 
 
+def test_hidden_files_are_no_predictions(tmp_path: Path) -> None:
+    # (macOS puts them beside those that it writes to disks of others)
+    truth = pictures(13)
+    write_hsergb(tmp_path / "seq", truth)
+    write_predictions(tmp_path / "results" / "seq" / "ours", truth)
+    (tmp_path / "results" / "seq" / "ours" / "._frame0.png").write_bytes(b"\0\5\x16\7")
+    (ours,) = predictions_in(tmp_path / "results")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
+    for group in recording.groups():
+        np.testing.assert_array_equal(np.stack(ours.begin(recording).frames(group)), group.truth)
+
+
 @pytest.mark.parametrize("lost", [(5,), (2, 3), (0, 4, 8, 12), (1, 6, 11), (3, 4, 5, 6)])
 def test_numbered_predictions_of_which_some_are_missing_are_of_the_frames_of_their_numbers(
     tmp_path: Path, lost: tuple[int, ...]
