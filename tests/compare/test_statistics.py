@@ -104,6 +104,13 @@ def test_a_refractory_period_is_the_floor_of_the_intervals() -> None:
     assert median_us is not None and 500 + 300 * math.log(2) < median_us < (500 + 300 * math.log(2)) * 10 ** (1 / 8)
 
 
+@pytest.mark.parametrize("gap_us", [9_999_999_999, 36_000_000_000])
+def test_intervals_of_hours_are_not_said_to_be_below_anything(gap_us: int) -> None:
+    found = statistics_of([events_of(np.array([0, gap_us, 2 * gap_us]))], (1, 1))
+    assert found.interval_us(5) is found.interval_us(50) is None and found.as_dict()["interval_us"]["95"] is None
+    assert f"intervals from {gap_us} us, half above {EDGES_US[-2]} us" in str(found)
+
+
 def test_a_moving_edge_has_no_isolated_event_and_noise_in_it_is_found() -> None:
     edge = [(1000 * x, x, y, 1) for x in range(30) for y in range(20)]
     noise = [(500_000 + 20_000 * k, 3 * k % 30, 7 * k % 20, 0) for k in range(40)]

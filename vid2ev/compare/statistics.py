@@ -86,16 +86,20 @@ class Statistics:
         return self._rate(sum(self.isolated))
 
     def interval_us(self, percent: int) -> int | None:
-        """The upper edge of the bin in which this percentile of the intervals is."""
+        """The upper edge of the bin in which this percentile of the intervals is; None without any, and of the last
+        bin, which has whatever is longer, too."""
         bin_of = percentile(self.intervals.sum(axis=0), percent)
-        return None if bin_of is None else int(EDGES_US[bin_of + 1])
+        return None if bin_of in (None, self.intervals.shape[1] - 1) else int(EDGES_US[bin_of + 1])
 
     def __str__(self) -> str:
         if self.rate_hz is None or self.on_share is None:
             return f"{self.events} events"
         text = f"{self.rate_hz:.3g} events/pixel/s, {100 * self.on_share:.3g} % ON; {self.isolated_hz:.3g} isolated"
+        if self.shortest_us is None:
+            return text
         middle_us = self.interval_us(50)
-        return text if middle_us is None else f"{text}; intervals from {self.shortest_us} us, half below {middle_us} us"
+        half = f"above {EDGES_US[-2]}" if middle_us is None else f"below {middle_us}"
+        return f"{text}; intervals from {self.shortest_us} us, half {half} us"
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers, ready for JSON."""
