@@ -323,5 +323,7 @@ def test_frames_that_are_even_but_for_jitter_give_clips(tmp_path: Path) -> None:
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no recordings in it"):
         sequences_in(tmp_path)
+    with pytest.raises(UsageError, match="gone: no such folder"):
+        sequences_in(tmp_path / "gone")
     with pytest.raises(UsageError, match="is no recording"):
         open_sequence(tmp_path)

@@ -54,9 +54,13 @@ def sequences_in(folder: str | Path) -> tuple[list[Path], dict[str, str]]:
 def opened_in(folder: str | Path) -> tuple[list[Sequence], dict[str, str]]:
     """The sequences in a folder and below it, in order, and the folders that cannot be used, with the reason.
 
-    Raises UsageError where there are none.
+    Raises UsageError where there are none, or no folder.
     """
     found, unusable = list[Sequence](), dict[str, str]()
+    if not Path(folder).is_dir():
+        raise UsageError(
+            f"{folder}: no such folder here; expected one with recordings, where it was when a run with it was begun"
+        )
     for path in _below(Path(folder), DEEPEST):
         try:
             found.append(open_sequence(path))
