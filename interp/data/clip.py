@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.recording.disk import write_npy
 from vid2ev.untrusted import first_line, json_of
 
 
@@ -61,7 +62,7 @@ def write_clip(path: Path, clip: Clip) -> None:
     beside = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
         with open(beside, "wb") as file:
-            np.lib.format.write_array(file, record, allow_pickle=False)
+            write_npy(file, record)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)

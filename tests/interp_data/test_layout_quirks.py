@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from interp.data.clip import write_clip
 from interp.data.layouts import open_sequence, sequences_in, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.sequence import Placed
@@ -327,3 +330,14 @@ def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
         sequences_in(tmp_path / "gone")
     with pytest.raises(UsageError, match="is no recording"):
         open_sequence(tmp_path)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_why_a_disk_does_not_take_a_clip_is_said(tmp_path: Path) -> None:
+    written(tmp_path / "seq", images=10)
+    clip = clip_of(open_sequence(tmp_path / "seq"), 1, 4)
+    (tmp_path / f"0.npy.{os.getpid()}.new").symlink_to("/dev/full")
+    with pytest.raises(OSError) as raised:
+        write_clip(tmp_path / "0.npy", clip)
+    assert raised.value.errno == errno.ENOSPC
+    assert [path.name for path in tmp_path.iterdir()] == ["seq"]

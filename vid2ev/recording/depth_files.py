@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import sync, whole_file
+from vid2ev.recording.disk import sync, whole_file, write_npy
 from vid2ev.recording.truth_arrays import (
     LARGEST,
     SMALLEST,
@@ -59,7 +59,7 @@ def read_depth(path: Path) -> np.ndarray:
 
 def _write_npy(path: Path, depth: np.ndarray) -> None:
     with whole_file(path) as file:
-        np.lib.format.write_array(file, depth, allow_pickle=False)
+        write_npy(file, depth)
 
 
 def _read_npy(path: Path) -> np.ndarray:

@@ -9,6 +9,7 @@ import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
 from typing import IO
 
@@ -103,6 +104,14 @@ def write_npz(path: Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
             entry.compress_type = zipfile.ZIP_DEFLATED
             with archive.open(entry, "w") as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
+
+
+def write_npy(file: IO[bytes], array: np.ndarray) -> None:
+    """An array as an npy file.  Raises OSError where the disk does not take it, which says why: numpy, straight into a
+    file, does not."""
+    content = BytesIO()
+    np.lib.format.write_array(content, array, allow_pickle=False)
+    file.write(content.getbuffer())
 
 
 def put_in_place(made: Path, path: Path, replaced: Path) -> None:
