@@ -12,7 +12,7 @@
     tensorboard/          the curves and pictures again
     clips/                a cache: what is missing there is made again
 
-No path stands in it, so it can be carried anywhere.
+No path stands in it but those of the data that it was given, so it can be carried to wherever these are.
 """
 
 from __future__ import annotations

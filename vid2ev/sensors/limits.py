@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import PIXEL_LIMIT
@@ -34,10 +35,10 @@ def check_seed(seed: int) -> None:
         raise UsageError(f"seed {seed!r}: expected a whole number from 0 to 2**64 - 1")
 
 
-def is_whole(number: object, least: int, most: int | None = None) -> bool:
+def is_whole(number: Any, least: int, most: int | None = None) -> bool:
     """Whether a number is whole, and within these limits."""
     try:
-        whole = operator.index(number)  # type: ignore[call-overload]
+        whole = operator.index(number)
     except TypeError:
         return False
     return least <= whole and (most is None or whole <= most)
