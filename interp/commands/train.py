@@ -12,7 +12,6 @@ import click
 
 from vid2ev.commands.auto import Auto
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import first_line
 
 if TYPE_CHECKING:
     from interp.train.fit import Outcome
@@ -171,6 +170,7 @@ def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]
     from interp.train.job import Job
     from interp.train.run_folder import begun_job
     from vid2ev.commands.progress import given
+    from vid2ev.untrusted import first_line
 
     if given() & options.keys():
         return _job(options, starts)
