@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import Flags, Interval, Numbers
 from vid2ev.sensors.compiled import interval_of
 
+LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 LEAK_REBASE_NAT = 0.5  # a leak that has risen so far goes into the memories, as the scan compares levels in float32
 
 Step = tuple[Interval, float]  # and what the leak has risen before it that goes into the memories [nat]
+
+
+def later(t_ns: int, last_ns: int | None) -> int:
+    """The time of a frame [int, ns]; raises UsageError for one that is not after the last, or too long after it."""
+    t_ns = int(t_ns)
+    if last_ns is not None and not last_ns < t_ns < last_ns + LONGEST_INTERVAL_NS:
+        raise UsageError(
+            f"frame time {t_ns} ns after {last_ns} ns: expected a later one, by at most 4.8 hours;"
+            " sort the frames and drop repeated times"
+        )
+    return t_ns
 
 
 def pace_of(num: Numbers) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from vid2ev.kernels.layout import BLOCK
 from vid2ev.kernels.naps import AT_ONCE
 from vid2ev.physics.delay import Delayed
 from vid2ev.physics.fixed_rate import EventFrames
-from vid2ev.sensors.clock import Clock, Step, first_count
+from vid2ev.sensors.clock import Clock, Step, first_count, later
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.intake import Intake
 from vid2ev.sensors.limits import check_sensor
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Dvs", "DvsSpec"]
 
-LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 AT_ONCE_PX, MOST = 1 << 23, 8  # pixels of frames that wait until they are seen together, and how many frames
 
 
@@ -157,7 +156,7 @@ class Dvs:
         """
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
-        t_ns = self._later(t_ns, self._t_ns)
+        t_ns = later(t_ns, self._t_ns)
         self._seen = light
         if self._t_ns is None and self._frames is not None:
             self._frames.origin_us = t_ns // 1000
@@ -259,16 +258,6 @@ class Dvs:
 
     # ------------------------------------------------------------------------------------------------- inside
 
-    def _later(self, t_ns: int, last_ns: int | None) -> int:
-        """The time of a frame, which must be after the last one."""
-        t_ns = int(t_ns)
-        if last_ns is not None and not last_ns < t_ns < last_ns + LONGEST_INTERVAL_NS:
-            raise UsageError(
-                f"frame time {t_ns} ns after {last_ns} ns: expected a later one, by at most 4.8 hours;"
-                " sort the frames and drop repeated times"
-            )
-        return t_ns
-
     def _times_of(self, light: np.ndarray, t_ns: Sequence[int] | np.ndarray) -> list[int]:
         """The times of frames of light [frames, clips, height, width], each after the one before it."""
         self._intake.check(np.shape(light)[2:])
@@ -276,7 +265,7 @@ class Dvs:
             raise UsageError(f"{len(t_ns)} times for {len(light)} frames of light: expected one for each")
         times: list[int] = []
         for t in t_ns:
-            times.append(self._later(t, times[-1] if times else self._t_ns))
+            times.append(later(t, times[-1] if times else self._t_ns))
         return times
 
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -290,7 +279,7 @@ class Dvs:
         """The intervals up to each of these times, which are then over."""
         assert self._t_ns is not None
         clock = Clock(self._t_ns, self._step, self._leak_since_ns, self._fresh_noise)
-        steps = [clock.step_to(self._later(t, clock.t_ns), self._pixels.flags, self._pixels.numbers) for t in t_ns]
+        steps = [clock.step_to(later(t, clock.t_ns), self._pixels.flags, self._pixels.numbers) for t in t_ns]
         self._be_at(clock)
         return steps
 
