@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from vid2ev import Cis, CisSpec, Dvs, DvsSpec, UsageError, events_of, load_sensor
@@ -43,3 +44,48 @@ def test_what_is_no_whole_number_is_refused(options: Any) -> None:
     if "seed" in options:
         with pytest.raises(UsageError, match=r"seed .*expected a whole number"):
             events_of("synthetic:moving-edge", **options)
+
+
+@pytest.mark.parametrize("spec", ["ideal", None, {"threshold_on": 0.2}])
+def test_what_is_not_the_parameters_of_a_sensor_is_refused(spec: Any) -> None:
+    with pytest.raises(UsageError, match=r"expected a DvsSpec, such as load_sensor\('ideal'\) gives"):
+        Dvs(spec, (2, 2))
+    with pytest.raises(UsageError, match=r"expected a CisSpec, such as load_cis\('ideal'\) gives"):
+        Cis(spec, (2, 2))
+
+
+@pytest.mark.parametrize("transfer", ["x", "gamma:0", 3])
+def test_a_transfer_that_is_none_is_refused_when_the_sensor_is_made(transfer: Any) -> None:
+    with pytest.raises(UsageError, match=r"transfer '.*': expected"):
+        Dvs(DvsSpec(), (2, 2), transfer=transfer)
+
+
+@pytest.mark.parametrize("t_ns", ["2", None, float("nan"), float("inf"), [1, 2]])
+def test_a_time_that_is_none_is_refused(t_ns: Any) -> None:
+    for sensor, light in ((Dvs(DvsSpec(), (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))):
+        sensor.step(light, 0)
+        with pytest.raises(UsageError, match="expected a whole number of nanoseconds"):
+            sensor.step(light, t_ns)
+    with pytest.raises(UsageError, match="1 times for 1 frames of light: expected a list"):
+        Dvs(DvsSpec(), (2, 2)).steps(np.zeros((1, 2, 2)), 5)  # type: ignore[arg-type]
+
+
+def test_what_is_no_state_of_the_sensor_is_refused() -> None:
+    for sensor, light in ((Dvs(DvsSpec(), (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))):
+        sensor.step(light, 0)
+        state = sensor.state()
+        for wrong in ({"a": 1}, *({**state, name: "x"} for name in state)):
+            with pytest.raises(UsageError, match="another sensor's state"):
+                sensor.restore(wrong)
+        for name in state.keys() - {"totals", "pending"}:  # (of exposures that are open)
+            with pytest.raises(UsageError, match=f"state without '{name}'"):
+                sensor.restore({other: array for other, array in state.items() if other != name})
+
+
+@pytest.mark.parametrize("pixels", [[-1], [4], [0.0], ["a"]])
+def test_nobody_looks_into_pixels_that_are_not_there(pixels: Any) -> None:
+    dvs = Dvs(DvsSpec(), (2, 2))
+    dvs.step(np.zeros((2, 2)), 0)
+    assert len(dvs.inside([0, 3]).signal) == 2  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="expected whole numbers from 0 to 3"):
+        dvs.inside(pixels)

@@ -60,7 +60,7 @@ def parse_transfer(name: str) -> Transfer:
     """The curve of a name: one of `CURVES`, or `gamma:G` with 0.1 <= G <= 10.  Raises UsageError."""
     if name in CURVES:
         return Transfer(name, *CURVES[name])
-    if name.startswith("gamma:"):
+    if str(name).startswith("gamma:"):
         gamma = _gamma(name)
         return Transfer(
             name,

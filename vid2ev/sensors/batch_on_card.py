@@ -14,7 +14,7 @@ from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
 from vid2ev.sensors.clock import Clock, Step, first_count, pace_of
 from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
-from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.limits import check_sensor, check_spec
 from vid2ev.sensors.pixel_planes import pixel_planes
 from vid2ev.sensors.spec import DvsSpec
 
@@ -48,6 +48,8 @@ class DvsBatchOnCard:
         cameras, size = cameras_of(specs, cameras), self.size
         for seed, camera in zip(seeds, cameras, strict=True):
             check_sensor(size, seed, camera, 1)
+        for spec in specs:
+            check_spec(spec, DvsSpec, "load_sensor('ideal')")
         self._flags = flags_of(specs[0], self.labels)
         if any(flags_of(spec, self.labels) != self._flags for spec in specs):
             raise UsageError("a batch of sensors with different effects: expected the same; make one of each kind")

@@ -13,7 +13,7 @@ from vid2ev.physics.shutter import interval_weights, opening_ns
 from vid2ev.sensors.cis_readout import frozen_of, numbers_of
 from vid2ev.sensors.cis_rows import Rows
 from vid2ev.sensors.cis_spec import CisSpec
-from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.limits import check_sensor, check_spec, time_ns
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.saved import clock, entry
@@ -58,6 +58,7 @@ class Cis:
         threads: int = 1,
         linear: bool = False,
     ):
+        check_spec(spec, CisSpec, "load_cis('ideal')")
         check_sensor(size, seed, camera, threads)
         width, height = size
         self.spec, self.size, self.seed, self.camera, self.linear = spec, (width, height), seed, camera, linear
@@ -127,8 +128,10 @@ class Cis:
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that a sensor of the same parameters, size, seed and camera gave.  Raises UsageError and
-        KeyError for another."""
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave.
+
+        Raises UsageError for another.
+        """
         self._open.clear()
         if not state:
             self._t_ns, self._first_ns, self._next = None, 0, 0
@@ -236,7 +239,7 @@ class Cis:
 
     def _later(self, t_ns: int) -> int:
         """The time of a frame, which must be after the last one."""
-        t_ns = int(t_ns)
+        t_ns = time_ns(t_ns)
         if self._t_ns is not None and t_ns <= self._t_ns:
             raise UsageError(
                 f"frame time {t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames and drop repeated"

@@ -7,6 +7,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import Flags, Interval, Numbers
 from vid2ev.sensors.compiled import interval_of
+from vid2ev.sensors.limits import time_ns
 
 LONGEST_INTERVAL_NS = 1 << 44  # 4.9 hours: what an event key can count in microseconds, with room to spare
 LEAK_REBASE_NAT = 0.5  # a leak that has risen so far goes into the memories, as the scan compares levels in float32
@@ -15,8 +16,8 @@ Step = tuple[Interval, float]  # and what the leak has risen before it that goes
 
 
 def later(t_ns: int, last_ns: int | None) -> int:
-    """The time of a frame [int, ns]; raises UsageError for one that is not after the last, or too long after it."""
-    t_ns = int(t_ns)
+    """The time of a frame [int, ns]; raises UsageError for none, and one not after the last or too long after."""
+    t_ns = time_ns(t_ns)
     if last_ns is not None and not last_ns < t_ns < last_ns + LONGEST_INTERVAL_NS:
         raise UsageError(
             f"frame time {t_ns} ns after {last_ns} ns: expected a later one, by at most 4.8 hours;"

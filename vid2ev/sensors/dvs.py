@@ -17,7 +17,7 @@ from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.clock import Clock, Step, first_count, later
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.intake import Intake
-from vid2ev.sensors.limits import check_sensor
+from vid2ev.sensors.limits import check_sensor, check_spec
 from vid2ev.sensors.pixels import Pixels
 from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.spec import DvsSpec
@@ -78,6 +78,7 @@ class Dvs:
 
     def _be(self, spec: DvsSpec, seed: int, camera: int) -> None:
         """A sensor without light."""
+        check_spec(spec, DvsSpec, "load_sensor('ideal')")
         self.spec, self.seed, self.camera, self.effects = spec, seed, camera, spec.effects()
         self._pixels.be(spec, seed, camera)
         self._frames = EventFrames(spec, *self.size, self.labels) if spec.frame_rate_hz > 0 else None
@@ -213,7 +214,10 @@ class Dvs:
         return state
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that a sensor of the same parameters, size, seed and camera gave."""
+        """Take up a state that a sensor of the same parameters, size, seed and camera gave.
+
+        Raises UsageError for another.
+        """
         self._pixels.restore(state)
         self._seen = None
         if not state:
@@ -227,7 +231,13 @@ class Dvs:
                 part.restore(state)
 
     def inside(self, pixels: np.ndarray) -> Inside:
-        """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`)."""
+        """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`).
+
+        Raises UsageError for pixels that this sensor does not have.
+        """
+        pixels, count = np.asarray(pixels), self.size[0] * self.size[1]
+        if pixels.dtype.kind not in "iu" or np.any((pixels < 0) | (pixels >= count)):
+            raise UsageError(f"pixels {pixels}: expected whole numbers from 0 to {count - 1}, y * width + x")
         leak_nat = self._pixels.numbers.leak_nat_per_ns * ((self._t_ns or 0) - self._leak_since_ns)
         return self._pixels.inside(pixels, leak_nat)
 
@@ -261,8 +271,8 @@ class Dvs:
     def _times_of(self, light: np.ndarray, t_ns: Sequence[int] | np.ndarray) -> list[int]:
         """The times of frames of light [frames, clips, height, width], each after the one before it."""
         self._intake.check(np.shape(light)[2:])
-        if len(t_ns) != len(light):
-            raise UsageError(f"{len(t_ns)} times for {len(light)} frames of light: expected one for each")
+        if np.shape(t_ns) != (len(light),):
+            raise UsageError(f"{np.size(t_ns)} times for {len(light)} frames of light: expected a list of one for each")
         times: list[int] = []
         for t in t_ns:
             times.append(later(t, times[-1] if times else self._t_ns))

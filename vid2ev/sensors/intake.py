@@ -7,14 +7,19 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.light.transfer import code_table
+from vid2ev.light.transfer import code_table, parse_transfer
 
 
 class Intake:
-    """The light of sensors of `size` (width, height); `transfer` is what uint8 and uint16 are coded with, if at all."""
+    """The light of sensors of `size` (width, height); `transfer` is what uint8 and uint16 are coded with, if at all.
+
+    Raises UsageError for another.
+    """
 
     def __init__(self, size: tuple[int, int], transfer: str | None):
         self.size, self.transfer = size, transfer
+        if transfer is not None:
+            parse_transfer(transfer)
         self._tables: dict[Any, np.ndarray] = {}
 
     def check(self, shape: tuple[int, ...]) -> None:

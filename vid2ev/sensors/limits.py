@@ -1,4 +1,4 @@
-"""What every sensor can be: its size, its seed, its number in a rig, its threads."""
+"""What every sensor can be: its kind, its size, its seed, its number in a rig, its threads; and when it sees."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import PIXEL_LIMIT
 
 LONGEST_SIDE = 65535  # columns and rows of events are uint16
+
+
+def check_spec(spec: Any, kind: type, example: str) -> None:
+    """Raise UsageError for what is not of a kind of parameters."""
+    if not isinstance(spec, kind):
+        raise UsageError(f"spec {spec!r}: expected a {kind.__name__}, such as {example} gives")
 
 
 def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) -> None:
@@ -33,6 +39,16 @@ def check_seed(seed: int) -> None:
     """Raise UsageError for what is no seed."""
     if not is_whole(seed, 0, (1 << 64) - 1):
         raise UsageError(f"seed {seed!r}: expected a whole number from 0 to 2**64 - 1")
+
+
+def time_ns(t_ns: Any) -> int:
+    """The time of a frame; raises UsageError for what is none."""
+    try:
+        if isinstance(t_ns, str | bytes):
+            raise TypeError
+        return int(t_ns)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise UsageError(f"frame time {t_ns!r}: expected a whole number of nanoseconds") from error
 
 
 def is_whole(number: Any, least: int, most: int | None = None) -> bool:

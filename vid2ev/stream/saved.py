@@ -14,8 +14,10 @@ LATEST_NS = 1 << 62
 
 
 def entry(state: Mapping[str, np.ndarray], name: str, dtype: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """An array of a state, of this type and shape; None is any length.  Raises UsageError for another one, KeyError."""
-    array = state[name]
+    """An array of a state, of this type and shape; None is any length.  Raises UsageError for another one, or none."""
+    if name not in state:
+        raise UsageError(f"state without '{name}': another sensor's state")
+    array = np.asarray(state[name])
     fits = len(array.shape) == len(shape) and all(b in (None, a) for a, b in zip(array.shape, shape, strict=True))
     if array.dtype != np.dtype(dtype) or not fits:
         raise UsageError(
@@ -26,7 +28,7 @@ def entry(state: Mapping[str, np.ndarray], name: str, dtype: Any, shape: tuple[i
 
 
 def clock(state: Mapping[str, np.ndarray], name: str, count: int) -> tuple[int, ...]:
-    """The whole numbers [int64] of a state, which are times or counts.  Raises UsageError, KeyError."""
+    """The whole numbers [int64] of a state, which are times or counts.  Raises UsageError."""
     numbers = tuple(int(number) for number in entry(state, name, np.int64, (count,)))
     if any(abs(number) >= LATEST_NS for number in numbers):
         raise UsageError(f"state with {max(numbers, key=abs)} in '{name}': no time can be that late")
@@ -36,7 +38,7 @@ def clock(state: Mapping[str, np.ndarray], name: str, count: int) -> tuple[int, 
 def events_of(
     state: Mapping[str, np.ndarray], prefix: str, size: tuple[int, int], labels: bool, dtypes: Mapping[str, Any]
 ) -> Events:
-    """Events of a state, in order of time and within a sensor of `size`.  Raises UsageError, KeyError."""
+    """Events of a state, in order of time and within a sensor of `size`.  Raises UsageError."""
     held = {name: entry(state, f"{prefix}{name}", dtype, (None,)) for name, dtype in dtypes.items()}
     t, x, y, p = (held[name] for name in "txyp")
     label = held["label"] if labels else None
