@@ -71,7 +71,9 @@ def test_a_time_that_is_none_is_refused(t_ns: Any) -> None:
 
 
 def test_what_is_no_state_of_the_sensor_is_refused() -> None:
-    for sensor, light in ((Dvs(DvsSpec(), (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))):
+    late = load_sensor("ideal", ["delay_us=5", "frame_rate_hz=100"])
+    dvs, cis = (Dvs(late, (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))
+    for sensor, light in (dvs, cis):
         sensor.step(light, 0)
         state = sensor.state()
         for wrong in ({"a": 1}, *({**state, name: "x"} for name in state)):

@@ -67,5 +67,5 @@ class Delayed:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that `state` gave."""
-        labelled = len(state["delayed_label"]) > 0
+        labelled = len(state.get("delayed_label", ())) > 0
         self.held = events_of(state, "delayed_", self.size, labelled, dict.fromkeys(FIELDS, np.int64))

@@ -12,9 +12,8 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import BLOCK
 from vid2ev.kernels.naps import AT_ONCE
-from vid2ev.physics.delay import Delayed
-from vid2ev.physics.fixed_rate import EventFrames
 from vid2ev.sensors.clock import Clock, Step, first_count, later
+from vid2ev.sensors.dvs_readout import DvsReadout
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.intake import Intake
 from vid2ev.sensors.limits import check_sensor, check_spec
@@ -24,7 +23,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.saved import clock, entry
+from vid2ev.stream.saved import clock
 from vid2ev.stream.still import Still, nothing_told, told_of
 
 if TYPE_CHECKING:
@@ -81,9 +80,7 @@ class Dvs:
         check_spec(spec, DvsSpec, "load_sensor('ideal')")
         self.spec, self.seed, self.camera, self.effects = spec, seed, camera, spec.effects()
         self._pixels.be(spec, seed, camera)
-        self._frames = EventFrames(spec, *self.size, self.labels) if spec.frame_rate_hz > 0 else None
-        self._delayed = Delayed(spec.delay_us, self.size) if spec.delay_us > 0 else None
-        self._polarities = np.zeros(2, np.int64)
+        self._readout = DvsReadout(spec, self.size, self.labels)
         self._t_ns: int | None = None
         self._origin_ns = self._first_ns
         self._seen: np.ndarray | None = None  # the light of the last frame, as it was given
@@ -139,13 +136,13 @@ class Dvs:
     def fill_of(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> None:
         """`fill` of one of the clips of light [frames, clips, height, width]."""
         times = self._times_of(light, t_ns)
-        if self._delayed is not None or self._frames is not None:
+        if not self._readout.at_once:
             for events in self._each(light, clip, times):
                 grid.add(events)
             return
         for sent, _ in self._through(light, clip, times):
             for events in sent.unordered():
-                grid.add(self._counted(events))
+                grid.add(self._readout.counted(events))
 
     def restart(self, light: np.ndarray, t_ns: int) -> Events:
         """Settle in a frame of light at t_ns [int, ns], as after a cut: the light before it is forgotten.
@@ -159,18 +156,13 @@ class Dvs:
         flat, table = self._light(light)
         t_ns = later(t_ns, self._t_ns)
         self._seen = light
-        if self._t_ns is None and self._frames is not None:
-            self._frames.origin_us = t_ns // 1000
+        if self._t_ns is None:
+            self._readout.begin(t_ns)
         self._origin_ns = t_ns if self._origin_ns is None else self._origin_ns
         count = first_count(t_ns, self._origin_ns)
         self._settle(flat, table, t_ns, count)
         self._be_at(Clock(t_ns, count))
-        if self._delayed is not None:
-            self._delayed.forget()
-        released = Events.empty(self.labels)
-        if self._frames is not None:
-            released = self._frames.push(released, t_ns // 1000)
-        return self._counted(released)
+        return self._readout.cut(t_ns)
 
     def see(self, frame: Frame) -> Events:
         """`step` to a frame, or `restart` where it begins a new shot."""
@@ -197,7 +189,7 @@ class Dvs:
 
     def flush(self) -> Events:
         """Events that fixed-rate mode holds back because their event frame lies ahead; otherwise none."""
-        return self._counted(self._frames.flush()) if self._frames is not None else Events.empty(self.labels)
+        return self._readout.flush()
 
     # ------------------------------------------------------------------------------------------------- state
 
@@ -208,10 +200,7 @@ class Dvs:
         state = self._pixels.state()
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise), self._origin_ns]
         state["clock"] = np.array(numbers, np.int64)
-        state["polarities"] = self._polarities.copy()
-        for part in (self._frames, self._delayed):
-            state |= part.state() if part is not None else {}
-        return state
+        return state | self._readout.state()
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave.
@@ -225,10 +214,7 @@ class Dvs:
             return
         self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = clock(state, "clock", 5)
         self._fresh_noise = bool(fresh)
-        self._polarities[...] = entry(state, "polarities", self._polarities.dtype, self._polarities.shape)
-        for part in (self._frames, self._delayed):
-            if part is not None:
-                part.restore(state)
+        self._readout.restore(state)
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`).
@@ -250,12 +236,12 @@ class Dvs:
     def counts(self) -> dict[str, int]:
         """Events sent (`on`, `off`), crossings `swallowed` by the refractory period, pixel-intervals `capped` at
         `max_crossings`, and pixels `not_finite` (or negative, or above 1e30) that were mended."""
-        off, on = (int(count) for count in self._polarities)
+        off, on = (int(count) for count in self._readout.polarities)
         return {"on": on, "off": off} | self._pixels.tallied()
 
     def forget_counts(self) -> None:
         """Count anew what `counts` has."""
-        self._pixels.tallies[...], self._polarities[...] = 0, 0
+        self._pixels.tallies[...], self._readout.polarities[...] = 0, 0
 
     def simulates(self, pixel: tuple[int, int]) -> bool:
         """Whether a pixel (x, y) is in the `part` that is simulated."""
@@ -331,20 +317,7 @@ class Dvs:
 
     def _in_order(self, sent: Sent, frame: int, t_ns: int) -> Events:
         """The events of a frame of those that went through the walk together."""
-        return self._passed_on(sent.ordered(frame, self._pixels.tiles.each), t_ns)
-
-    def _passed_on(self, events: Events, t_ns: int) -> Events:
-        """What of the events up to t_ns is sent by then, through all that comes behind the comparator."""
-        if self._delayed is not None:
-            events = self._delayed.push(events, t_ns // 1000)
-        if self._frames is not None:
-            events = self._frames.push(events, t_ns // 1000)
-        return self._counted(events)
-
-    def _counted(self, events: Events) -> Events:
-        on = int(np.count_nonzero(events.p))
-        self._polarities += (len(events) - on, on)
-        return events
+        return self._readout.push(sent.ordered(frame, self._pixels.tiles.each), t_ns)
 
 
 def _goes_on(kind: np.dtype, frame: Frame) -> bool:
