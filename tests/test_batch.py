@@ -48,7 +48,7 @@ def test_a_folder_stands_for_what_is_in_it() -> None:
 def test_no_name_does_not_stand_for_the_folder_one_is_in() -> None:
     np.save("here.npy", np.ones((2, 6, 8), np.float32))
     result = vid2ev("", "-o", "out/")
-    assert result.exit_code == 2 and "VIDEO '': no name" in result.stderr
+    assert result.exit_code == 2 and "nothing after 'convert': expected a value" in result.stderr
     assert not Path("out").exists()
 
 

@@ -272,6 +272,15 @@ def test_content_says_what_a_file_is_and_not_its_name(name: str) -> None:
     assert vid2ev("convert", name, "-o", "out", "-q", *QUICK).exit_code == 0
 
 
+@pytest.mark.parametrize(
+    ("words", "before"),
+    [(["convert", ""], "convert"), (["convert", CLIP, "-o", ""], "-o"), (["render", "--output=", "x"], "--output="),
+     (["info", "--json", ""], "--json"), ([""], "vid2ev")],
+)  # fmt: skip
+def test_nothing_is_not_taken_for_the_folder_one_is_in_or_the_default(words: list[str], before: str) -> None:
+    refused(2, f"nothing after '{before}': expected a value", *words)
+
+
 def test_a_list_of_videos_is_one_to_all_commands() -> None:
     Path("list.txt").write_text("clip.mp4\n")
     refused(2, "a list of videos; give one of them", "info", "list.txt")

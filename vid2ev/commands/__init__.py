@@ -9,11 +9,12 @@ from __future__ import annotations
 import difflib
 import sys
 from importlib.metadata import entry_points
+from itertools import pairwise
 from typing import Any
 
 import click
 
-from vid2ev.errors import DataError, Vid2evError
+from vid2ev.errors import DataError, UsageError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
 
@@ -29,6 +30,7 @@ class Commands(click.Group):
         return next(iter(found)).load() if found else None
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        refuse_nothing(args)
         names = self.list_commands(ctx)
         if args and args[0] not in names and not args[0].startswith("-"):
             close = difflib.get_close_matches(args[0], names, n=1, cutoff=0.5)
@@ -53,6 +55,13 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
+
+
+def refuse_nothing(words: list[str]) -> None:
+    """Raise UsageError for an empty word: as the name of a file it would be the folder one is in, or the default."""
+    for before, word in pairwise(["vid2ev", *words]):
+        if word == "" or (word.startswith("--") and word.endswith("=")):
+            raise UsageError(f"nothing after '{word or before}': expected a value; a shell's variable may be empty")
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -31,12 +31,10 @@ def sources_in(video: str) -> list[str]:
     """The sources that an argument stands for: itself, what a folder without pictures holds (videos, arrays and folders
     of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line.
 
-    Raises UsageError for no name and for a list without any, DataError for a list that cannot be read.
+    Raises UsageError for a list without any, DataError for a list that cannot be read.
     """
     from vid2ev.light.recognise import natural
 
-    if not video:  # (for a path that would be the folder one is in, with all its videos)
-        raise UsageError("VIDEO '': no name; give a video, a folder of images or a .npy array")
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
