@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from against.clips import clean, feed, noisy, play, start
 
+from vid2ev.physics.fixed_rate import EventFrames, FixedRate
 from vid2ev.sensors.dvs import DvsSpec
 from vid2ev.stream import Events
 
@@ -61,6 +62,20 @@ def test_events_are_the_first_crossing_of_each_event_frame(rate_hz, rounding):
     got = dict(zip(key.tolist(), fixed.p.tolist(), strict=True))
     assert {k: p for k, p in got.items() if k not in unsure} == {k: p for k, p in want.items() if k not in unsure}
     assert len(got.keys() - unsure) > 1_000
+
+
+@pytest.mark.parametrize("rate_hz", [29.97, 1000.0, 3000.0, 400_000.0])
+@roundings
+def test_each_microsecond_has_its_event_frame(rate_hz, rounding):
+    """The nearest one, the earlier of two that are equally near; or the next that is not before it."""
+    frames = EventFrames(FixedRate(frame_rate_hz=rate_hz, rounding=rounding), 1, 1)
+    frames.origin_us = START_NS // 1000
+    t_us = frames.origin_us + np.arange(100_000)
+    grid = frame_times(rate_hz, 100_000)
+    after = np.searchsorted(grid, t_us)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(t_us - grid[before] <= grid[after] - t_us, before, after)
+    assert np.array_equal(frames.frame_of(t_us), nearest if rounding == "nearest" else after)
 
 
 @roundings
