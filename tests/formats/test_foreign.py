@@ -13,6 +13,7 @@ from recordings import all_events, assert_same, dense, events_of, recording_of, 
 from vid2ev.errors import DataError
 from vid2ev.formats import describe_events, format_named, open_events, read_events, recognise
 from vid2ev.formats.event_file import EventFile
+from vid2ev.formats.sequential import Unwrapped
 from vid2ev.stream.events import Events
 
 NMNIST = Path(__file__).parents[2] / ".." / "shared" / "data" / "events" / "nmnist_sample.bin"
@@ -79,6 +80,23 @@ def test_evt2_of_a_camera(tmp_path: Path) -> None:
     file = opened(tmp_path, raw("2.0", words, 32, "% geometry 640x480\n", cut=0), "evt2")
     assert rows(file) == [(131, 4, 5, 1), (191, 639, 479, 0), ((1 << 34) + 1, 0, 0, 0)]
     assert len(file.warnings) == 4
+
+
+def test_evt2_whose_upper_bits_go_back_by_less_than_half(tmp_path: Path) -> None:
+    words = [0x8BB80000, 1 << 28 | 5 << 11 | 7, 0x85DC0000, 0x8FFFFFFF, 0x80000000, 6 << 11 | 7]
+    vectors = [word << 32 | 1 for word in words]
+    for content in (raw("2.0", words, 32), raw("2.1", vectors, 64)):
+        assert rows(opened(tmp_path, content, "evt2")) == [(0xBB80000 << 6, 5, 7, 1), (1 << 34, 6, 7, 0)]
+
+
+def test_evt21_before_the_first_time_and_beyond_the_edge(tmp_path: Path) -> None:
+    def pixels(x: int, y: int) -> int:
+        return 1 << 60 | x << 43 | y << 32 | 0x8000_0001
+
+    words = [pixels(32, 7), 8 << 60, pixels(608, 7), pixels(612, 7), pixels(32, 480)]
+    file = opened(tmp_path, raw("2.1", words, 64), "evt2")
+    assert rows(file) == [(0, 608, 7, 1), (0, 639, 7, 1), (0, 612, 7, 1)]
+    assert [text[:27] for text in file.warnings] == ["2 events before the first t", "3 events outside of the 640"]
 
 
 @pytest.mark.parametrize("legacy", [False, True])
@@ -177,6 +195,20 @@ def test_aedat2_of_a_dvs128_and_beyond_the_end_of_its_clock(tmp_path: Path) -> N
         assert file.size == (128, 128)
     with pytest.raises(DataError, match="unknown camera"):
         opened(tmp_path, foreign.aedat2(foreign.dvs128_address(events), events.t, "Cochlea"), "aedat2")
+
+
+def test_aedat2_of_v2e(tmp_path: Path) -> None:
+    events = events_of(np.arange(3000) * 7, (640, 480))
+    file = opened(tmp_path, foreign.aedat2(foreign.dvs640_address(events), events.t), "aedat2")
+    assert_same(Events.concatenate(file.events()), events)
+    assert file.size == (640, 480) and len(file.warnings) == 1
+
+
+@pytest.mark.parametrize("pieces", [1, 7, 400])
+def test_a_clock_of_32_bits_is_followed_from_piece_to_piece(pieces: int) -> None:
+    t, clock = np.cumsum(np.random.default_rng(0).integers(0, 1 << 31, 400)), Unwrapped()
+    read = [clock(part) for part in np.array_split((t & 0xFFFFFFFF).astype(np.uint32), pieces)]
+    np.testing.assert_array_equal(np.concatenate(read), t)
 
 
 def test_nmnist(tmp_path: Path) -> None:
