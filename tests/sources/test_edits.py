@@ -16,6 +16,7 @@ from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.tags import BT709_WEIGHTS
 from vid2ev.sources import footage, open_source
 from vid2ev.sources.framing import crop_box, of_shape
+from vid2ev.sources.with_depth import WithDepth
 
 
 def rising(count: int, shape: tuple[int, int] = (32, 48)) -> list[np.ndarray]:
@@ -289,6 +290,29 @@ def test_colour_is_framed_like_luminance(tmp_path: Path) -> None:
         grey = framed(tmp_path, picture, **options)
         colour = framed(tmp_path, picture, colour="rgb", **options)
         np.testing.assert_allclose(colour @ np.array(BT709_WEIGHTS, np.float32), grey, rtol=1e-5)
+
+
+class NumberedDepth:
+    """Every pixel of every frame at a depth of its own [m]."""
+
+    def at(self, index: int, share: float = 0.0, lights=()) -> np.ndarray:
+        return 1 + 1000 * np.float32(index) + np.arange(lights[0].size, dtype=np.float32).reshape(lights[0].shape)
+
+
+def test_depth_is_that_at_the_centres_of_pixels(tmp_path: Path) -> None:
+    """Not a mean of near and far, at which nothing is."""
+    np.save(tmp_path / "a.npy", np.random.default_rng(0).uniform(0, 3, (3, 20, 30)).astype(np.float32))
+    picture = np.arange(20 * 30).reshape(20, 30)
+    for options, seen in (
+        ({"crop": "12x9+4+5", "size": "4x3"}, picture[5:14, 4:16][1::3, 1::3]),
+        ({"crop": "8x7+1+2"}, picture[2:9, 1:9]),
+        ({"size": "90x60"}, picture.repeat(3, 0).repeat(3, 1)),
+    ):
+        source = open_source(
+            tmp_path / "a.npy", fps=1, seen_through=lambda whole: WithDepth(whole, NumberedDepth(), "a"), **options
+        )
+        for index, frame in enumerate(source.frames(1), 1):
+            np.testing.assert_array_equal(frame.depth, 1 + 1000 * index + seen)
 
 
 def test_a_size_may_be_two_numbers(tmp_path: Path) -> None:
