@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from vid2ev import load_sensor
 from vid2ev.sensors.dvs import Dvs, DvsSpec
+from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.upsample.stillness import still_strips
 
@@ -204,3 +205,21 @@ def test_what_is_said_of_another_array_is_not_believed():
     all_still = np.ones(27, np.bool_)
     assert len(dvs.step(brighter, 2_000_000, Still(light.copy(), all_still))) == 4 * light.size
     assert len(dvs.step(light, 3_000_000, Still(brighter, all_still))) == 0  # of this one it is, wrong as it is here
+
+
+def test_nor_what_is_said_of_a_frame_that_another_has_followed():
+    light, all_still = np.full(SIZE[::-1], 0.5, np.float32), np.ones(27, np.bool_)
+    source = Dvs(load_sensor("ideal"), SIZE)
+    source.steps(np.stack([light, light * 2]), [1_000_000, 2_000_000])
+    follow = {
+        "a step": lambda dvs: dvs.step(light * 2, 2_000_000),
+        "some steps": lambda dvs: dvs.steps(light[None] * 2, [2_000_000]),
+        "frames together": lambda dvs: dvs.see_all([Frame(light * 2, t) for t in (1_500_000, 2_000_000)]),
+        "a cut": lambda dvs: dvs.restart(light * 2, 2_000_000),
+        "a state": lambda dvs: dvs.restore(source.state()),
+    }
+    for name, another in follow.items():
+        dvs = Dvs(load_sensor("ideal"), SIZE)
+        dvs.step(light, 1_000_000)
+        another(dvs)
+        assert len(dvs.step(light, 3_000_000, Still(light, all_still))) == 4 * light.size, name
