@@ -91,6 +91,33 @@ def test_a_state_is_a_copy():
     assert_same(first, feed(dvs, t_ns[6:], light[6:]))
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_sensor_that_takes_up_a_state_forgets_its_own(threads):
+    """Also what it has counted, in all of its threads."""
+    t_ns, light = clip(8)
+    seen, other = (start(SENSORS["fixed rate"], light, seed=5, threads=threads) for _ in range(2))
+    early = feed(seen, t_ns[:4], light[:4])
+    saved = seen.state()
+    feed(other, t_ns, light[::-1] * 3)
+    other.restore(saved)
+    assert other.counts == seen.counts and len(early) > 0
+    assert_same(feed(seen, t_ns[4:], light[4:]), feed(other, t_ns[4:], light[4:]))
+    assert other.counts == seen.counts
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3, 4])
+def test_noise_of_the_photoreceptor_goes_on_where_a_state_is_taken_up(cut):
+    """Whether the intervals before and after resolve it or not."""
+    _, light = clip(6)
+    t_ns = np.cumsum([0, 5_000_000, 7_000, 7_000, 5_000_000, 7_000])
+    whole, first, second = (start(EVERYTHING, light, seed=2) for _ in range(3))
+    early = feed(first, t_ns[:cut], light[:cut])
+    second.restore(first.state())
+    both = [early, feed(second, t_ns[cut:], light[cut:])]
+    assert_same(feed(whole, t_ns, light), Events.concatenate(both))
+    assert all(np.array_equal(value, second.state()[name]) for name, value in whole.state().items())
+
+
 @sensors
 def test_run_is_step(spec):
     t_ns, light = clip()
