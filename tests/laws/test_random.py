@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from against.clips import hold, noisy, per_pixel, play, uneven
 
+from vid2ev.sensors.dvs import Dvs
+
 SHAPE = (96, 128)
 PIXELS = SHAPE[0] * SHAPE[1]
 UP, DOWN = 1, -1
@@ -99,3 +101,11 @@ def test_a_pixel_keeps_its_draws_whatever_the_size_of_its_effects(maps):
     """The same draw at another strength: thresholds scale, no pixel changes places."""
     stronger = time_of(1, UP, mismatch=0.045)
     assert (stronger - 0.2) / 0.045 == pytest.approx((maps["ON mismatch", 0, 0] - 0.2) / 0.03, abs=1e-4)
+
+
+def test_a_hot_pixel_is_not_cold_and_of_the_others_the_share_that_is_said_is():
+    spec = noisy(hot_probability=0.4, cold_probability=0.5)
+    found = Dvs(spec, SHAPE[::-1], seed=3).maps()
+    assert not np.any(found["hot"] & found["cold"])
+    for name, share in (("hot", 0.4), ("cold", 0.5 * (1 - 0.4))):
+        assert found[name].mean() == pytest.approx(share, abs=5 * math.sqrt(share * (1 - share) / PIXELS)), name
