@@ -135,6 +135,24 @@ def test_read_noise_is_in_electrons():
     assert codes.mean() == pytest.approx(400, abs=5 * codes.std() / math.sqrt(codes.size))
 
 
+def test_a_full_well_is_read_with_noise():
+    """Read noise is added to what the well holds, so it goes both ways there, too."""
+    sensor = spec(white_e=10_000, full_well_e=6000, read_noise_e=50.0, slope=2, bits=16)
+    codes = exposures(sensor, 2.0, n=10)
+    want = (50.0 * 65535 / (10_000 * 2)) ** 2 + 1 / 12
+    assert codes.mean() == pytest.approx(0.6 * 65535 / 2, abs=5 * math.sqrt(want / codes.size))
+    assert codes.var() == pytest.approx(want, rel=5 * math.sqrt(2 / codes.size))
+
+
+def test_a_more_sensitive_pixel_has_the_shot_noise_of_its_own_electrons():
+    """Sensitivity is in the mean number: the variance grows as it does, and not as its square."""
+    sensor = spec(shot_noise=True, prnu=0.25, white_e=2000, slope=8, bits=16)
+    codes, gain = exposures(sensor, 0.2, n=40).astype(float), Cis(sensor, SIZE).maps()["gain"]
+    for pixels in (gain < 0.8, abs(gain - 1) < 0.1, gain > 1.2):
+        ratios = codes.var(axis=0, ddof=1)[pixels] / (codes.mean(axis=0)[pixels] * 65535 / (2000 * 8))
+        assert ratios.mean() == pytest.approx(1, abs=5 * math.sqrt(2 / 39 / ratios.size))
+
+
 def test_the_fixed_pattern_is_a_gain_and_an_offset_that_stay():
     """Spatial variance: dsnu^2 in the dark, and prnu^2 signal^2 more in light; the same in all exposures."""
     sensor = spec(prnu=0.02, dsnu=15.0, white_e=65535, slope=1, bits=16)
