@@ -33,6 +33,21 @@ def test_at_rest_every_event_has_the_label_of_its_only_cause(keys, label):
     assert (sent.label == label).all() and sent.label.dtype == np.uint8
 
 
+def test_leak_sends_no_off_event_and_no_second_one_at_once():
+    """Light rises, and falls again, in a millisecond after rests in which the leak has sent events of its own: it may
+    have made most of the way to the first ON event of a pixel, and of no other one of these."""
+    levels = np.repeat([0.3, 1.2, 0.3], 40)
+    t_ns = np.arange(levels.size) * 20_000_000
+    t_ns[[40, 80]] = t_ns[[39, 79]] + 1_000_000
+    light = np.broadcast_to(levels[:, None, None].astype(np.float32), (levels.size, *SHAPE))
+    sent = play(noisy(leak_rate_hz=10, random_phase=True), t_ns, light, labels=True)
+    rise, fall = (sent.select((sent.t * 1000 > t_ns[k - 1]) & (sent.t * 1000 <= t_ns[k])) for k in (40, 80))
+    _, first = np.unique(rise.y * SHAPE[1] + rise.x, return_index=True)
+    assert set(np.delete(rise.label, first)) == {Label.SIGNAL} and (rise.p == 1).all()
+    assert set(fall.label) == {Label.SIGNAL} and (fall.p == 0).all()
+    assert np.count_nonzero(sent.label == Label.LEAK) > 1_000
+
+
 def test_events_of_moving_light_are_signal():
     sent = play(noisy(), *moving(), labels=True)
     assert len(sent) > 10_000
