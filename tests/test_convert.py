@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import av
+import cv2
 import h5py
 import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, read_events
+from vid2ev.conversion import Paused
 from vid2ev.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
 from vid2ev.stream.ahead import ahead
 
@@ -49,6 +51,20 @@ def test_what_does_not_count_changes_no_bit(reference: Path, tmp_path: Path, cha
     if changed.get("preview", True) and "piece" not in changed:
         assert (tmp_path / "out" / "preview.mp4").read_bytes() == (reference / "preview.mp4").read_bytes()
     assert (tmp_path / "out" / "preview.mp4").exists() == changed.get("preview", True)
+
+
+def test_what_is_counted_goes_on_where_a_conversion_was_paused(tmp_path: Path) -> None:
+    """Frames, sub-frames and intervals that asked for more of them, and what the sensor has counted."""
+    texture = cv2.GaussianBlur(np.random.default_rng(0).uniform(0, 1, (48, 100)).astype(np.float32), (0, 0), 2)
+    np.save(tmp_path / "pan.npy", np.stack([texture[:, 3 * k : 3 * k + 64] for k in range(10)]))
+    clip, options = tmp_path / "pan.npy", {"fps": 30, "max_subframes": 2, "piece": 1}
+    whole = convert(clip, tmp_path / "whole", **options)
+    assert whole["counts"]["limited_intervals"] == whole["counts"]["subframes"] == 9
+    asked = iter([False, False, False, True])
+    with pytest.raises(Paused):
+        convert(clip, tmp_path / "paused", pause=lambda: next(asked), **options)
+    paused = convert(clip, tmp_path / "paused", resume=True, **options)
+    assert paused["counts"] == whole["counts"] and paused["warnings"] == whole["warnings"]
 
 
 @pytest.mark.parametrize(
