@@ -15,9 +15,10 @@ from skimage import data
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import strip_count
 from vid2ev.upsample import make_upsampler
-from vid2ev.upsample.flow import FlowUpsampling
+from vid2ev.upsample.flow import FlowUpsampling, Motion, Moving
+from vid2ev.upsample.flow import carried as carried_between
 from vid2ev.upsample.proxies import agreement
-from vid2ev.upsample.subframes import steps_for
+from vid2ev.upsample.subframes import instants, steps_for
 from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
 
 F = np.float32
@@ -164,6 +165,22 @@ def test_the_most_steps_are_kept_to_and_counted() -> None:
     assert not upsampler.between(Frame(before, 0), Frame(before, INTERVAL_NS)).limited
 
 
+def test_what_a_thing_has_just_passed_is_not_said_to_be_still() -> None:
+    """A block falls through rows, each a strip, that are as before once it is gone."""
+    before, after = np.full((2, 64, 256), 0.2, F)
+    before[10:14, 100:120] = after[50:54, 100:120] = 1
+    flow, back = np.zeros((2, 32, 128, 2), F)
+    flow[5:7, 50:60, 1], back[25:27, 50:60, 1] = 20, -20
+    motion = Motion(flow, back, F(0.01) + abs(flow[..., 1] / 20), F(0.01) + abs(back[..., 1] / 20), 40.0, 1.0)
+    last, lit = before, np.zeros(64, bool)
+    for frame in carried_between(Frame(before, 0), Frame(after, 10**6), motion, instants(0, 10**6, 10)):
+        same = (frame.light == last).all(axis=1)
+        assert not np.any(frame.still.strips & ~same)
+        assert frame.still.strips.any()
+        last, lit = frame.light, lit | (frame.light > 0.5).any(axis=1)
+    assert np.count_nonzero(lit) > 30
+
+
 def test_threads_of_opencv_change_nothing() -> None:
     before, after = pan(enlarged(data.camera()), [(0, 0), (5, 2)], (320, 240))
     threads = cv2.getNumThreads()
@@ -246,6 +263,25 @@ def test_flows_that_contradict_each_other_are_unsure() -> None:
     assert agreement(flow, flow).max() < 0.01
     sure = agreement(flow, -flow)
     assert sure[:8, :8].min() > 0.99 and sure[8:].max() == 0 and sure[:, 8:].max() == 0  # (leads outside)
+
+
+@pytest.mark.parametrize("there", [(0.0, 0.0), (1.5, -0.5)])
+@pytest.mark.parametrize("back", [(0.0, 0.0), (-1.5, 0.5), (0.8, 0.0), (0.0, -3.0)])
+def test_flows_agree_by_how_far_one_leads_back(there: tuple[float, float], back: tuple[float, float]) -> None:
+    """exp(-|there + back|^2 / (0.01 (|there|^2 + |back|^2) + 0.5)), also where nothing moves one way."""
+    missed = (there[0] + back[0]) ** 2 + (there[1] + back[1]) ** 2
+    allowed = 0.01 * (there[0] ** 2 + there[1] ** 2 + back[0] ** 2 + back[1] ** 2) + 0.5
+    sure = agreement(*(np.full((9, 9, 2), flow, F) for flow in (there, back)))
+    np.testing.assert_allclose(sure[1:7, :7], np.exp(-missed / allowed), rtol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(64, 96), (25, 47), (31, 75), (75, 31)])
+def test_motion_goes_as_far_in_the_frame_as_on_its_grid(shape: tuple[int, int]) -> None:
+    rows, columns = shape[0] // 2, shape[1] // 2
+    flow, sure = np.full((rows, columns, 2), (1.0, -0.5), F), np.ones((rows, columns), F)
+    x, y, _ = Moving(Motion(flow, -flow, sure, sure, 2.0, 1.0), shape).at(F(0.5))
+    np.testing.assert_allclose(x[6:-6, 6:-6], shape[1] / columns, rtol=1e-4)
+    np.testing.assert_allclose(y[6:-6, 6:-6], -0.5 * shape[0] / rows, rtol=1e-4)
 
 
 # ------------------------------------------------------------------------------------------------------- real clips
