@@ -20,6 +20,14 @@ def test_cuts_keep_every_block_in_one_tile(sizes, seconds):
     assert all(first < last for first, last in pairwise(fresh))
 
 
+@given(st.integers(2, 9), st.integers(0, 3), st.integers(0, 8), st.floats(1, 1e6))
+def test_no_tile_is_empty_where_there_is_hardly_a_block_for_each(count, more, slow, times):
+    cuts = [*range(count), count + more]
+    for _ in range(5):
+        cuts = balanced(cuts, [times if k == slow % count else 1.0 for k in range(count)])
+        assert cuts[0] == 0 and cuts[-1] == count + more and all(a < b for a, b in pairwise(cuts))
+
+
 def test_cuts_settle_where_tiles_take_as_long():
     cost = np.linspace(1, 7, 1000)  # of a block
     cuts = [0, 250, 500, 750, 1000]
