@@ -9,7 +9,8 @@ import pytest
 
 from vid2ev import Dvs, Events, UsageError, convert, load_sensor, read_events
 from vid2ev.outputs import Outputs
-from vid2ev.recording.probe import read_probe
+from vid2ev.recording.probe import HEADER, Probe, merged, read_probe
+from vid2ev.stream.frames import Frame
 
 F = np.float32
 CLIP = "synthetic:moving-edge,size=48x32,fps=200,duration_s=0.3"
@@ -51,6 +52,29 @@ def test_without_effects_the_signal_is_the_log_of_the_light(tmp_path: Path) -> N
     columns = read_probe(tmp_path / "out" / "probe.csv")[PIXEL]
     np.testing.assert_allclose(columns["signal_nat"], np.log(columns["light"] + 1e-3), atol=2e-6)
     assert len(columns["t_us"]) == 61 and np.all(np.diff(columns["t_us"]) == 5000)
+
+
+def test_tables_of_some_pixels_each_make_the_table_of_all(tmp_path: Path) -> None:
+    """Events of one microsecond in the order of their rows and columns, frames in that in which pixels were named."""
+    rng, pixels = np.random.default_rng(0), [(5, 0), (0, 1), (7, 3), (1, 1), (2, 3)]
+    steps = []
+    for k in range(6):
+        order = rng.integers(0, 8 * 4 * 3, 60 if k else 0)
+        t, place = np.sort(order) // 32 + 3 * k - 2, np.sort(order) % 32
+        events = Events(t, (place % 8).astype(np.uint16), (place // 8).astype(np.uint16), (order % 2).astype(np.uint8))
+        steps.append((Frame(rng.uniform(0, 1, (4, 8)).astype(F), 3000 * k), events))
+
+    def table(name: str, some: list[tuple[int, int]]) -> Path:
+        probe = Probe(some, 8)
+        inside = [np.array([10 * x + y for x, y in some], float)] * 4
+        lines = [probe.lines(frame, events, inside) for frame, events in steps]
+        (tmp_path / name).write_bytes(b"".join([HEADER, *lines]))
+        return tmp_path / name
+
+    whole = table("whole.csv", pixels)
+    parts = [table("one.csv", [pixels[0], pixels[3]]), table("other.csv", [pixels[1], pixels[2], pixels[4]])]
+    assert b"".join(merged(parts, pixels)) == whole.read_bytes()
+    assert whole.read_bytes().count(b"ON") > 20
 
 
 def test_leak_lifts_the_signal_above_what_is_filtered() -> None:
