@@ -133,6 +133,13 @@ def test_expectations_follow_the_part(encode) -> None:
     json.dumps(part.describe())
 
 
+def test_a_part_has_no_more_frames_than_the_whole(encode) -> None:
+    path = encode("a.mp4", rising(20), codec="libx264", time_base=Fraction(1, 30))
+    for options in ({"stop": 99}, {"start": 0, "stop": 99}, {"start": 0}):
+        part = open_source(path, **options)
+        assert part.frames_expected == len(list(part.frames())) == 20
+
+
 @pytest.mark.parametrize(("options", "said"), [
     ({"start": 9}, "no frame from 9 s to its end; it goes from 0 s to"),
     ({"stop": -1}, "no frame from its beginning to -1 s"),
