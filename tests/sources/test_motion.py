@@ -141,6 +141,21 @@ def test_a_saccade_visits_its_corners_in_the_time_eyes_take() -> None:
     assert speed.max() == pytest.approx(1.875 * degrees * 10 / (0.021 + 0.0022 * degrees), rel=1e-4)  # 15/8 of the mean
 
 
+@pytest.mark.parametrize("degrees", [0.5, 4.0, -4.0])
+def test_a_larger_saccade_takes_longer_as_that_of_an_eye_does(degrees: float) -> None:
+    saccade, t_s = Saccade(degrees=degrees, px_per_degree=10, duration_s=0.6), np.linspace(0, 0.2, 100_001)
+    x, y, _, _ = saccade.at(t_s)
+    moving = np.hypot(np.diff(x), np.diff(y)) > 1e-12
+    assert moving.sum() * 2e-6 == pytest.approx(0.021 + 0.0022 * abs(degrees) * math.hypot(0.5, 1.0), abs=2e-4)
+
+
+def test_saccades_in_less_time_than_eyes_take_still_end_at_their_corners() -> None:
+    saccade = Saccade(degrees=1, px_per_degree=10, duration_s=0.03)
+    for t_s, corner in ((0.00999999, (0, -5)), (0.01999999, (5, 5)), (0.03, (-5, 5))):
+        pose = saccade.at(np.array([t_s]))
+        np.testing.assert_allclose((pose.x[0], pose.y[0]), corner, atol=1e-9)
+
+
 @pytest.mark.parametrize("motion", ["pan:speed=60", "saccade", "zoom:factor=3", "zoom:factor=0.5", "turn.csv"])
 @pytest.mark.parametrize("size", [None, "40x30", "64", "300x40"])
 def test_no_border_is_seen_and_no_more_is_lost_than_must(tmp_path: Path, motion: str, size: str | None) -> None:
