@@ -69,14 +69,14 @@ def test_a_clip_that_starts_late_keeps_its_times(encode) -> None:
     assert times == [(hours + k) * 1_000_000 for k in (0, 33, 66)]
 
 
-@pytest.mark.parametrize("begin_s", [0, 5, 100_000])
+@pytest.mark.parametrize("begin_s", [0, Fraction(1, 10), 5, 100_000])
 @pytest.mark.parametrize("name", ["a.mp4", "a.mkv", "a.webm", "a.ts"])
 def test_what_a_header_says_counts_from_the_first_frame(encode, name: str, begin_s: int) -> None:
     """Containers write how long a clip lasts, Matroska where it ends."""
     codec = {"a.mkv": "ffv1", "a.webm": "libvpx-vp9"}.get(name, "libx264")
     pictures = [chroma_too(code) for code in range(0, 100, 10)] if name == "a.webm" else flat([*range(0, 100, 10)])
     source = open_source(
-        encode(name, pictures, codec=codec, stamps=[30 * begin_s + k for k in range(10)], options={"bf": "0"})
+        encode(name, pictures, codec=codec, stamps=[int(30 * begin_s) + k for k in range(10)], options={"bf": "0"})
     )
     times = [frame.t_ns for frame in source.frames()]
     if name != "a.ts":  # (whose muxer begins later)
