@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import foreign
@@ -11,9 +12,9 @@ import pytest
 from recordings import all_events, assert_same, dense, events_of, recording_of, written
 
 from vid2ev.errors import DataError
-from vid2ev.formats import describe_events, format_named, open_events, read_events, recognise
+from vid2ev.formats import describe_events, format_named, open_events, prophesee, read_events, recognise
 from vid2ev.formats.event_file import EventFile
-from vid2ev.formats.sequential import Unwrapped
+from vid2ev.formats.sequential import Unwrapped, pieces
 from vid2ev.stream.events import Events
 
 NMNIST = Path(__file__).parents[2] / ".." / "shared" / "data" / "events" / "nmnist_sample.bin"
@@ -69,6 +70,15 @@ def test_evt3_whose_upper_bits_go_back_by_less_than_half_and_whose_rows_are_of_e
     file = opened(tmp_path, raw("3.0", words, 16), "evt3")
     assert sorted(rows(file)) == [(1500 << 12, 3, 7, 0), (3000 << 12, 2, 7, 0)]
     assert any(text.startswith("1 events outside of the 640x480") for text in file.warnings)
+
+
+def test_words_of_evt3_may_come_in_any_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = [0x8002, 0x6FF0, 0x0007, 0x2809, 0x3805, 0x4801, 0x4000, 0x5080, 0x8003, 0x280A, 0x6001, 0x200B, 0x4003]
+    whole = rows(opened(tmp_path, raw("3.0", words, 16), "evt3"))
+    assert whole[4] == (3 << 12, 10, 7, 1) and len(whole) == 8
+    for length in range(1, len(words)):
+        monkeypatch.setattr(prophesee, "pieces", partial(pieces, size=2 * length))
+        assert rows(open_events(tmp_path / "file")) == whole
 
 
 def test_evt2_of_a_camera(tmp_path: Path) -> None:
