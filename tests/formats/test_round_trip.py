@@ -119,3 +119,13 @@ def test_dat_goes_on_in_further_files(tmp_path: Path) -> None:
     file = open_events(path)
     assert_same(Events.concatenate(file.events()), events.select(events.t >> 32 != 4))
     assert len(file.warnings) == 1 and file.warnings[0].startswith("1 further files of the recording are not there")
+
+
+@pytest.mark.parametrize("after_us", [-1, 0, 1])
+@pytest.mark.parametrize("turns", [1, 2])
+def test_dat_ends_at_the_end_of_a_file_and_just_beyond(tmp_path: Path, turns: int, after_us: int) -> None:
+    """The last event of a recording at, and beside, the instant at which another file begins."""
+    kind, last_us = format_named("dat"), (turns << 32) + after_us
+    recording = recording_of(events_of(np.array([0, 5, last_us]), (100, 100)), (100, 100))
+    assert_same(Events.concatenate(read_events(written(kind, recording, tmp_path))), all_events(recording))
+    assert len(list(tmp_path.iterdir())) == (last_us >> 32) + 1
