@@ -74,6 +74,15 @@ def test_an_interval_without_a_microsecond_still_orders_its_events():
     assert min(times) >= 997_000 and max(times) <= 997_003
 
 
+def test_no_event_is_of_the_microsecond_in_which_its_interval_begins():
+    """(t0, t1], also where a crossing is nearer to t0 than to the next microsecond; an event is nowhere twice."""
+    t_ns, levels = np.arange(60) * 10_000, np.where(np.arange(60) % 2, 10.0, 0.01)
+    dvs = start(clean(threshold_on=0.01, threshold_off=0.01, filter="after"), np.empty((1, 1)))
+    for t, level in zip(t_ns.tolist(), levels, strict=True):
+        sent = dvs.step(np.full((1, 1), level, np.float32), t)
+        assert t == 0 or (len(sent) > 500 and sent.t[0] * 1000 > t - 10_000 and sent.t[-1] * 1000 <= t)
+
+
 @orders
 @pytest.mark.parametrize("taus", [(0.0, 0.0), (300.0, 100.0), (2e9, 1e9), (1e12, 1e12)])
 def test_steps_of_an_hour(order, taus):
