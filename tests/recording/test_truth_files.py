@@ -75,6 +75,14 @@ def test_what_is_very_near_is_not_unknown(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_depth(tmp_path / "depth.png"), 0.001)
 
 
+def test_what_is_far_is_not_nothing(tmp_path: Path) -> None:
+    """The farthest code but one is a depth; what would have the last one's is refused."""
+    write_depth(tmp_path / "a.png", np.full((2, 3), 65534.4, np.float32), m_per_code=1.0)
+    assert (read_depth(tmp_path / "a.png") == 65534).all()
+    with pytest.raises(UsageError, match="there are 65535 m"):
+        write_depth(tmp_path / "b.png", np.full((2, 3), 65535, np.float32), m_per_code=1.0)
+
+
 def test_a_folder_has_one_scale(tmp_path: Path) -> None:
     write_depth(tmp_path / "0.png", depth_of())
     write_depth(tmp_path / "1.png", depth_of())
