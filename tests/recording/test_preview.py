@@ -172,6 +172,16 @@ def test_any_size_fits(tmp_path: Path, size: tuple[int, int]) -> None:
     assert picture[-1, -1] > COLOURS[0, 0, 0] + 30
 
 
+@pytest.mark.parametrize("size", [(1280, 720), (720, 1280), (1000, 700)])
+def test_an_event_is_where_it_was_in_a_frame_made_smaller(tmp_path: Path, size: tuple[int, int]) -> None:
+    x, y = size[0] // 2 + 60, size[1] // 3
+    steps = [(frame_at(0, size=size), Events.empty()), (frame_at(10**6, size=size), events_at([500] * 9, x, y))]
+    (*_, picture) = decoded(film(tmp_path / "preview.mp4", steps, size)).values()
+    right, shrunk = picture[:, picture.shape[1] // 2 :], 640 / max(size)
+    down, across = np.unravel_index(np.argmax(right), right.shape)
+    assert abs(across - x * shrunk) <= 1 and abs(down - y * shrunk) <= 1
+
+
 def test_light_beyond_the_display_is_white_or_black(tmp_path: Path) -> None:
     light = np.full(SIZE[::-1], 1e9, np.float32)
     light[:, :16], light[:, 16:32], light[:, 32:48] = -5, np.nan, np.inf
