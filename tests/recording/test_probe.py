@@ -77,6 +77,12 @@ def test_tables_of_some_pixels_each_make_the_table_of_all(tmp_path: Path) -> Non
     assert whole.read_bytes().count(b"ON") > 20
 
 
+@pytest.mark.parametrize(("t_ns", "t_us"), [(1_005, "1.005"), (2_050_000, "2050.000"), (7_120, "7.120"), (0, "0.000")])
+def test_frames_have_their_nanosecond(t_ns: int, t_us: str) -> None:
+    lines = Probe([(1, 0)], 2).lines(Frame(np.zeros((1, 2), F), t_ns), Events.empty(), [np.zeros(1)] * 4)
+    assert lines.decode().split(",")[0] == t_us
+
+
 def test_leak_lifts_the_signal_above_what_is_filtered() -> None:
     dvs = Dvs(load_sensor("ideal", ["leak_rate_hz=1"]), (2, 1))
     light = np.full((1, 2), 0.5, F)
