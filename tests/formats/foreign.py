@@ -15,7 +15,10 @@ def es(events: Events, size: tuple[int, int], kind: int = 1) -> bytes:
     most, now = (127, 0) if kind == 1 else (63, 0)
     for t, x, y, p in zip(events.t.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist(), strict=True):
         passed, now = t - now, t
-        content += (b"\xff" if kind == 1 else b"\xfd") * (passed // most)
+        if kind == 2:  # (up to three at a time)
+            content += b"\xff" * (passed // (3 * most)) + bytes([0xFC + passed % (3 * most) // most])
+        else:
+            content += b"\xff" * (passed // most) + b"\xfe"  # (which says nothing of time)
         content.append((passed % most) << (kind) | p << (kind - 1))
         content += np.array([x, size[1] - 1 - y], "<u2").tobytes()
     return bytes(content)
