@@ -118,7 +118,8 @@ def test_parts_of_other_sources(tmp_path: Path, kind: str) -> None:
     whole = list(open_source(path, fps=10).frames())
     part = open_source(path, fps=10, start=0.25, stop=0.7)
     same(part.frames(), whole[3:8])
-    same(part.frames(2), whole[5:8])
+    for start in (2, 4, 5):
+        same(part.frames(start), whole[3 + start : 8])
     assert part.duration_expected_s == pytest.approx(0.4)
     assert part.rewindable and part.describe()["edits"] == {"start_s": 0.25, "stop_s": 0.7}
 
