@@ -211,6 +211,16 @@ def test_a_path_goes_through_its_rows(tmp_path: Path) -> None:
             np.testing.assert_allclose(np.array(centroid(frame.light)) - (30, 25), np.negative(place), atol=0.4)
 
 
+def test_columns_without_names_are_angle_and_zoom(tmp_path: Path) -> None:
+    rows = "0,1,2,30,1.5\n1,3,4,-20,0.5\n"
+    poses = []
+    for header in ("t,x,y,angle,zoom\n", ""):
+        (tmp_path / "path.csv").write_text(header + rows)
+        poses.append(parse_motion(str(tmp_path / "path.csv")).at(np.array([0.0, 1.0])))
+    assert [column.tolist() for column in poses[0]] == [[1, 3], [2, 4], [30, -20], [1.5, 0.5]]
+    assert [column.tolist() for column in poses[1]] == [column.tolist() for column in poses[0]]
+
+
 def test_a_large_photograph_made_smaller_in_advance_shows_the_same(tmp_path: Path, monkeypatch) -> None:
     from vid2ev.sources import photograph as module
 
