@@ -236,6 +236,17 @@ def test_the_exact_light_has_no_noise_and_no_range():
     assert Cis(CisSpec(), SIZE).step(light, 0) == []
 
 
+@pytest.mark.parametrize("blur", [True, False])
+def test_an_exposure_comes_with_the_frame_at_which_its_last_row_closes(blur: bool) -> None:
+    sensor = EVERYTHING.model_copy(
+        update={"exposure_us": 4000.0, "line_us": 100.0, "frame_rate_hz": 100.0, "blur": blur}
+    )
+    cis, light = Cis(sensor, SIZE), np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32)
+    closed_ns = 4_000_000 + 100_000 * (SIZE[1] - 1)
+    made = [len(cis.step(light, t_ns)) for t_ns in (0, closed_ns - 1, closed_ns, closed_ns + 1)]
+    assert made == [0, 0, 1, 0]
+
+
 def test_the_truth_of_a_recording_samples_without_noise():
     truth = EVERYTHING.sampling(960.0)
     assert (truth.exposure_us, truth.line_us, truth.frame_rate_hz) == (0, 0, 960.0)
