@@ -284,6 +284,30 @@ def test_motion_goes_as_far_in_the_frame_as_on_its_grid(shape: tuple[int, int]) 
     np.testing.assert_allclose(y[6:-6, 6:-6], -0.5 * shape[0] / rows, rtol=1e-4)
 
 
+@pytest.mark.parametrize("time", [0.25, 0.5, 0.75])
+def test_where_both_frames_see_a_thing_the_nearer_one_counts_more(time: float) -> None:
+    """The velocities of both are thrown to where the thing is at the time."""
+    flow, back = np.zeros((2, 40, 60, 2), F)
+    flow[5:13, 20:40, 1], back[25:33, 20:40, 1] = 20, -20
+    sure, other = (F(0.01) + abs(each[..., 1] / 20) for each in (flow, back))
+    _, y, share = Moving(Motion(flow, back, sure, other, 40.0, 1.0), (80, 120)).at(F(time))
+    middle = round(2 * (9 + 20 * time))
+    np.testing.assert_allclose(share[middle - 2 : middle + 2, 50:70], 1 - time, atol=0.02)
+    np.testing.assert_allclose(y[middle - 2 : middle + 2, 50:70], 40, rtol=0.02)
+
+
+def test_motion_that_is_hardly_seen_asks_for_no_steps() -> None:
+    """Of a picture whose lower half has little contrast, and moves far, what moves a little above counts."""
+    near, far = (enlarged(photograph) for photograph in (data.gravel(), data.grass()))
+    frames = []
+    for k in range(2):
+        above, below = pan(near, [(k, 0)])[0], pan(far, [(6 * k, 0)])[0]
+        frames.append(np.where(np.arange(120)[:, None] < 60, above, F(0.5) * np.exp(F(0.15) * (below - below.mean()))))
+    upsampler = FlowUpsampling(threshold=0.15)
+    assert 0.5 < upsampler.motion(*frames).shift_px < 2
+    assert FlowUpsampling(threshold=0.01).motion(*frames).shift_px > 4
+
+
 # ------------------------------------------------------------------------------------------------------- real clips
 
 
