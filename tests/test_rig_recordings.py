@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,28 @@ def test_depth_maps_serve_as_a_plane_does(tmp_path: Path, depth: str) -> None:
     plane, maps_ = columns(tmp_path / "plane" / "right"), columns(tmp_path / "maps" / "right")
     inside = [sum(4 <= x < 56 and 4 <= y < 44 for x, y in zip(*one[1:3], strict=True)) for one in (plane, maps_)]
     assert inside[0] == inside[1] > 1000
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        Source(size=(64, 48), focal_px=(50.0, 50.0), centre_px=(30.0, 20.0)),  # of the video
+        Source(size=(16, 12), focal_px=(25.0, 25.0), centre_px=(9.75, 5.75)),  # of what is left of it
+        Source(fov_deg=2 * math.degrees(math.atan(8 / 25))),
+    ],
+    ids=["whole", "part", "field"],
+)
+def test_a_part_of_a_video_is_as_far_as_the_video_and_seen_through_the_same_lens(
+    tmp_path: Path, source: Source
+) -> None:
+    np.save(tmp_path / "disparity.npy", np.full((48, 64), 50 * 0.1 / 4, np.float32))
+    beside = Rig(source=source, cameras=(Camera(name="right", kind="dvs", translation_mm=(40.0, 0.0, 0.0)),))
+    depth = f"{tmp_path / 'disparity.npy'},baseline_m=0.1"
+    recipe = Recipe.of(CLIP, rig=beside, depth=depth, crop="32x24+10+8", size=(16, 12))
+    assert recipe.rig.source.size == (16, 12) and recipe.rig.source.focal_px == pytest.approx((25, 25))
+    if source.fov_deg is None:
+        assert recipe.rig.source.centre_px == pytest.approx((9.75, 5.75))
+    np.testing.assert_allclose(next(recipe.source.frames()).depth, 4, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

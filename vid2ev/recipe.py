@@ -18,6 +18,7 @@ from vid2ev.recording.manifest import identity, versions
 from vid2ev.requests import names_in
 from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
 from vid2ev.rig.depth import plane_of
+from vid2ev.rig.intrinsics import Framing
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
@@ -25,6 +26,7 @@ from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, scene_of
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
+from vid2ev.sources.framing import framing_of
 from vid2ev.stream.upload import Upload
 from vid2ev.truth import Wanted
 from vid2ev.upsample import Upsampler, make_upsampler
@@ -114,7 +116,7 @@ class Recipe:
             make_upsampler(rest.get("upsample", "flow"))  # (which is refused though it is not needed)
             rest |= {"upsample": "none"}
         scene = scene_of(source)
-        resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None)
+        resolved = asked.resolved(source.size, scene.world.intrinsics if scene else None, framing_of(source))
         mounts = mounts_of(resolved, sensors, seed, alone)
         if scene:
             reference = scene.world.intrinsics.focal_px[0]
@@ -222,11 +224,15 @@ def _rig_of_scene(video: str) -> str | None:
     return rig_of_scene(video.removeprefix(SCENE_PREFIX)) if is_scene(video) else None
 
 
-def _with_depth(text: str, rig: Rig, source: Source) -> Source:
-    """A source with its depth, which may need to know how wide the source sees."""
+def _with_depth(text: str, rig: Rig, source: Source, framing: Framing | None) -> Source:
+    """A source with its depth, which may need to know how wide the source sees: as a rig says it of what is framed."""
     from vid2ev.sources.with_depth import WithDepth, parse_depth
 
-    return WithDepth(source, parse_depth(text, rig.source.intrinsics(source.size)), text)
+    if framing is None or rig.source.size == framing.whole:
+        lens = rig.source.intrinsics(source.size)
+    else:
+        lens = framing.lens_of_whole(rig.source.intrinsics(framing.size))
+    return WithDepth(source, parse_depth(text, lens), text)
 
 
 def plain(facts: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.intrinsics import Framing, Intrinsics
 from vid2ev.rig.lens import pixel_grid, pixels_of, radial_table, rays_of
 
 SIZE = (640, 480)
@@ -98,3 +98,15 @@ def test_any_coefficients_give_pixels_or_nothing(values: list[float], kind: tupl
     rays = rays_of(grid, camera)
     found = ~np.isnan(rays).any(-1)
     np.testing.assert_allclose(pixels_of(rays[found], camera), grid[found], atol=1e-5)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_a_part_of_a_picture_is_the_picture_at_its_places(name: str) -> None:
+    """Parts of 2 x 3 pixels: their middles see what those places of the whole picture see."""
+    whole, framing = lens(name), Framing(SIZE, (100, 60), (200, 150), (100, 50))
+    part = framing.lens_of_part(whole)
+    places = (pixel_grid(part.size) + 0.5) * np.array([2, 3]) + np.array([100, 60]) - 0.5
+    np.testing.assert_allclose(rays_of(pixel_grid(part.size), part), rays_of(places, whole), atol=1e-9)
+    back = framing.lens_of_whole(part)
+    assert back.size == SIZE and back.distortion == whole.distortion
+    np.testing.assert_allclose(back.matrix, whole.matrix, rtol=1e-14, atol=1e-11)

@@ -26,6 +26,7 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sources import open_source
+from vid2ev.sources.framing import framing_of
 from vid2ev.sources.source import Source
 
 SIDE = 346  # px
@@ -155,7 +156,7 @@ def _part_of_video(
     slower = float(options.get("slowdown") or 1)
     interval_s = _interval_s(source)
     lasting_s = source.duration_expected_s or length_s
-    whole = setup.rig.resolved(source.size)
+    whole = setup.rig.resolved(source.size, framing=framing_of(source))
     rig = _smaller_rig(whole, whole.source.scaled_to(smaller(source.size, side)), side).settled()
     origin_s = _origin_s(setup.source, _opening(setup))
     begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from vid2ev.errors import UsageError
-from vid2ev.rig.intrinsics import COUNTS, DistortionModel, Intrinsics
+from vid2ev.rig.intrinsics import COUNTS, DistortionModel, Framing, Intrinsics
 from vid2ev.rig.pose import Pose, rotation_of
 
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12)]  # (what is made of it stays finite)
@@ -86,15 +86,18 @@ class Optics(BaseModel):
 class Source(Optics):
     """The camera that took the video."""
 
-    def intrinsics(self, size: tuple[int, int]) -> Intrinsics:
-        """Of a video of this size, which may be that of `size` made smaller or larger.  Raises UsageError."""
+    def intrinsics(self, size: tuple[int, int], framing: Framing | None = None) -> Intrinsics:
+        """Of a video of this size, which may be that of `size` made smaller or larger, or framed out of pictures of
+        `size`.  Raises UsageError."""
         stated = self.size or size
+        if framing is not None and stated == framing.whole != size:
+            return framing.lens_of_part(self.intrinsics(stated))
         lens = self.lens(stated) or self.model_copy(update={"fov_deg": ASSUMED_FOV_DEG}).lens(stated)
         assert lens is not None
         if abs(stated[0] * size[1] - stated[1] * size[0]) > max(*stated, *size):  # (more than a pixel is rounded off)
             raise UsageError(
                 f"the rig's [source] size {stated[0]}x{stated[1]} is of another shape than the video,"
-                f" {size[0]}x{size[1]}; give size, focal_px and centre_px of the video as it is read"
+                f" {size[0]}x{size[1]}; give size, focal_px and centre_px of the video as it is or as it is read"
             )
         return lens.scaled_to(size) if stated != size else lens
 
@@ -198,10 +201,13 @@ class Rig(BaseModel):
         has_one = any(camera.kind == "cis" for camera in self.cameras)
         return self if has_one else Rig(source=self.source, cameras=(*self.cameras, Camera(name="cis", kind="cis")))
 
-    def resolved(self, source_size: tuple[int, int], known: Intrinsics | None = None) -> ResolvedRig:
-        """The rig around a video of this size, with every number known; or around a camera that is `known`, such as
-        that of a scene, whatever the rig says of it.  Raises UsageError where they do not fit."""
-        source = known or self.source.intrinsics(source_size)
+    def resolved(
+        self, source_size: tuple[int, int], known: Intrinsics | None = None, framing: Framing | None = None
+    ) -> ResolvedRig:
+        """The rig around a video of this size, which may be framed out of larger pictures, with every number known; or
+        around a camera that is `known`, such as that of a scene, whatever the rig says of it.  Raises UsageError where
+        they do not fit."""
+        source = known or self.source.intrinsics(source_size, framing)
         return ResolvedRig(
             source,
             known is None and self.source.assumed,

@@ -13,7 +13,7 @@ Sources: the models of OpenCV 4.x, "Camera calibration and 3D reconstruction" an
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -76,3 +76,29 @@ class Intrinsics(BaseModel):
         centre = (self.centre_px[0] + 0.5) * across - 0.5, (self.centre_px[1] + 0.5) * across - 0.5 + middle
         focal = self.focal_px[0] * across, self.focal_px[1] * across
         return self.model_copy(update={"size": size, "focal_px": focal, "centre_px": centre})
+
+
+class Framing(NamedTuple):
+    """A part of a picture, brought to a size: how its lens comes from that of the whole, and back."""
+
+    whole: tuple[int, int]  # width and height of the picture [px]
+    corner: tuple[float, float]  # upper left one of the part, from that of the picture [px]
+    extent: tuple[float, float]  # width and height of the part [px]
+    size: tuple[int, int]  # what they are brought to [px]
+
+    def lens_of_part(self, lens: Intrinsics) -> Intrinsics:
+        """The lens that the part is seen through, from that of the whole picture."""
+        finer = [size / extent for size, extent in zip(self.size, self.extent, strict=True)]
+        focal = [focal * by for focal, by in zip(lens.focal_px, finer, strict=True)]
+        centre = [
+            (middle + 0.5 - corner) * by - 0.5
+            for middle, corner, by in zip(lens.centre_px, self.corner, finer, strict=True)
+        ]
+        return lens.model_copy(update={"size": self.size, "focal_px": tuple(focal), "centre_px": tuple(centre)})
+
+    def lens_of_whole(self, lens: Intrinsics) -> Intrinsics:
+        """The lens of the whole picture, which is a part of the plane around the part."""
+        finer = [size / extent for size, extent in zip(self.size, self.extent, strict=True)]
+        left, up = (-corner * by for corner, by in zip(self.corner, finer, strict=True))
+        wide, high = (side * by for side, by in zip(self.whole, finer, strict=True))
+        return Framing(self.size, (left, up), (wide, high), self.whole).lens_of_part(lens)

@@ -11,11 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import UsageError
 from vid2ev.sources.source import Source, begins_s
 from vid2ev.stream.frames import Colour
+
+if TYPE_CHECKING:
+    from vid2ev.rig.intrinsics import Framing
 
 __all__ = ["OPTIONS", "Source", "begins_s", "open_source"]
 
@@ -35,7 +38,7 @@ def open_source(
     crop: str | None = None,
     size: str | Sequence[int] | None = None,
     motion: str | None = None,
-    seen_through: Callable[[Source], Source] | None = None,
+    seen_through: Callable[[Source, Framing | None], Source] | None = None,
 ) -> Source:
     """The source behind a path: a folder of images, a TIFF with pages, a .npy or .npz, `synthetic:NAME`, `scene:NAME`
     or a scene file, `-` for standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
@@ -48,7 +51,8 @@ def open_source(
     start, stop  the part to read [s on the source's own clock], both ends included
     slowdown     the footage plays so many times slower than the world went: its times are divided by it
     crop, size   as in `framing.py`, such as "640x480+0+60" and "346x260" or (346, 260)
-    seen_through what else is done to the source before it is cut and framed, such as giving it depth
+    seen_through what else is done to the source before it is cut and framed, such as giving it depth; it is told how it
+                 is going to be framed
     motion       makes a clip of a photograph: "pan", "saccade", "zoom" or a .csv file, as in `motion.py`
 
     Raises UsageError for a path that does not exist and for options that cannot be meant, DataError for content that
@@ -61,7 +65,8 @@ def open_source(
     else:
         source = _in_motion(Path(path), motion, transfer=transfer, fps=fps, colour=colour, crop=crop, size=size)
         crop = size = None
-    source = source if seen_through is None else seen_through(source)
+    if seen_through is not None:
+        source = seen_through(source, _framing(source, crop, size))
     if start is not None or stop is not None:
         from vid2ev.sources.cut import Cut
 
@@ -75,6 +80,14 @@ def open_source(
 
         source = Framed(source, crop, size)
     return source
+
+
+def _framing(source: Source, crop: str | None, size: str | Sequence[int] | None) -> Framing | None:
+    if crop is None and size is None:
+        return None
+    from vid2ev.sources.framing import Framed
+
+    return Framed(source, crop, size).framing
 
 
 def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:

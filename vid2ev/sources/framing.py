@@ -20,6 +20,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.light.resample import Taps, resampled, taps_of
+from vid2ev.rig.intrinsics import Framing
 from vid2ev.sources.edit import Edit
 from vid2ev.stream.frames import Frame
 
@@ -98,6 +99,12 @@ class Framed(Edit):
         """Width and height [px]."""
         return self._size
 
+    @property
+    def framing(self) -> Framing:
+        """The part of the source's pictures that is taken."""
+        x, y, width, height = map(float, self._box)
+        return Framing((self.source.size[0], self.source.size[1]), (x, y), (width, height), self._size)
+
     def edits(self) -> dict[str, Any]:
         """The part taken [px: x, y, width, height], and the size it is brought to."""
         return {"part": [float(side) for side in self._box], "resized": self._taps is not None}
@@ -118,6 +125,11 @@ class Framed(Edit):
         """Depth at the centres of the pixels: a mean of near and far would be where nothing is."""
         rows = _centres(self._box.y, self._box.height, self._size[1])
         return np.ascontiguousarray(depth[rows][:, _centres(self._box.x, self._box.width, self._size[0])])
+
+
+def framing_of(source: Source) -> Framing | None:
+    """How the pictures of a source are framed; None if they are whole."""
+    return source.framing if isinstance(source, Framed) else None
 
 
 def _centres(begin: Fraction, extent: Fraction, outputs: int) -> np.ndarray:
