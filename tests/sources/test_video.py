@@ -386,6 +386,19 @@ def test_interlaced_video_is_remarked_on(encode) -> None:
     assert "interlaced" in open_source(path).warnings[0]
 
 
+@pytest.mark.parametrize(("aspect", "matrix", "size"), [
+    (Fraction(4, 3), (1, 0, 0, 1), "85x48!"),
+    (Fraction(8, 9), (1, 0, 0, 1), "64x54!"),
+    (Fraction(4, 3), (0, 1, -1, 0), "48x85!"),  # (shown upright)
+])  # fmt: skip
+def test_pixels_that_are_not_square_are_remarked_on(encode, aspect: Fraction, matrix, size: str) -> None:
+    pictures, tags = [np.full((48, 64), 90, np.uint8)] * 2, {"codec": "libx264", "options": {"bf": "0"}}
+    path = with_display_matrix(encode("a.mp4", pictures, sample_aspect_ratio=aspect, **tags), matrix)
+    assert f"--size {size} straightens it" in open_source(path).warnings[0]
+    for nearly in (Fraction(1), Fraction(65, 64)):
+        assert not open_source(encode("b.mp4", pictures, sample_aspect_ratio=nearly, **tags)).warnings
+
+
 def write_sound(path: Path) -> None:
     with wave.open(str(path), "wb") as sound:
         sound.setnchannels(1)

@@ -31,6 +31,7 @@ class Footage(Protocol):
     rewindable: bool
     codec: str
     rate: Fraction | None  # nominal, frames per second
+    pixel_shape: Fraction  # width of a stored pixel by its height, 1 if nobody says
     planned: int  # frames by the header, 0 if it does not say
     end_s: Fraction | None  # by the header, on the clock of the pictures
     first: Any  # the first picture
@@ -50,6 +51,7 @@ class VideoFile:
         self.name = str(path)
         with self._opened() as (container, stream):
             self.rate = stream.average_rate or stream.guessed_rate
+            self.pixel_shape = stream.sample_aspect_ratio or Fraction(1)
             self.planned: int = stream.frames
             self.codec: str = stream.codec_context.name
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
@@ -103,6 +105,7 @@ class LiveStream:
         self.name, self.kind = name, kind
         stream = video_stream(container, name)
         self.rate = stream.average_rate or stream.guessed_rate
+        self.pixel_shape = stream.sample_aspect_ratio or Fraction(1)
         self.codec: str = stream.codec_context.name
         self._remarks: list[str] = []
         self._coming: Iterator[Any] | None = _decoded(container, stream, 0, self._remarks)

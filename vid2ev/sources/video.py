@@ -33,10 +33,11 @@ class Video:
     fps       if given, frame k is at k / fps and the file's times do not count
     colour    "luminance" or "rgb"
 
-    Display rotation and mirroring of the file are applied.  Frames whose time is not after the frame before are
-    dropped, and frames without a time are placed by the frame rate; both are counted in `warnings`, and so is what is
-    missing of a truncated file.  A camera's clock starts at its first frame.  Raises DataError if the codes of the
-    footage have no known meaning, UsageError for a transfer or fps that cannot be meant.
+    Display rotation and mirroring of the file are applied; pixels that are not square are taken for square, and
+    `warnings` says so.  Frames whose time is not after the frame before are dropped, and frames without a time are
+    placed by the frame rate; both are counted in `warnings`, and so is what is missing of a truncated file.  A camera's
+    clock starts at its first frame.  Raises DataError if the codes of the footage have no known meaning, UsageError for
+    a transfer or fps that cannot be meant.
     """
 
     dense = False
@@ -64,6 +65,7 @@ class Video:
         self.size = self._coded_size if not self._orientation[0] else self._coded_size[::-1]
         if first.interlaced_frame:
             self.warnings.append("interlaced video: both fields of a frame are taken for one instant")
+        self.warnings += self._not_square()
         self._zero_s = stamp_of(first) or Fraction(0) if footage.kind == "camera" else Fraction(0)
         self._about = self._describe(first)
         self._light(first)  # (what cannot be read is refused now, not in the middle of a conversion)
@@ -118,6 +120,18 @@ class Video:
         if seen_s >= footage.end_s:
             return []
         return [f"truncated: the file ends at {float(stamp):.3f} s of the {float(footage.end_s):.3f} s it announces"]
+
+    def _not_square(self) -> list[str]:
+        """A remark if pixels are shown wider or narrower than they are high, by more than is rounded off a picture."""
+        shape = self._footage.pixel_shape
+        shape = 1 / shape if self._orientation[0] else shape
+        square = round(self.size[0] * max(shape, 1)), round(self.size[1] * max(1 / shape, 1))
+        if abs(square[0] - self.size[0]) <= 1 and abs(square[1] - self.size[1]) <= 1:
+            return []
+        return [
+            f"pixels of the video are {shape.numerator}:{shape.denominator} wide to high and are taken for square:"
+            f" its picture is out of shape; --size {square[0]}x{square[1]}! straightens it"
+        ]
 
     def _estimate(self) -> int | None:
         """The number of frames, from duration and rate."""
