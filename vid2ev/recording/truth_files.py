@@ -5,7 +5,7 @@
     poses      instants, positions, quaternions                  text                      `pose_text`
     mask       bool [H, W]: 255 where it holds, else 0           .png of 8 bits
     pixel map  float32 [H, W, 2], column and row in the other    .npz, array pixels
-               camera; NaN: not seen there
+               camera; NaN: not known, or behind it
 
 The suffix says how it is kept.  Each file is there as a whole or not at all.
 """
