@@ -195,6 +195,8 @@ def test_what_cannot_be_meant_is_one_sentence() -> None:
     refused(2, "is no rendered scene", "room", "-o", "taken", "--overwrite", *QUICK)
     Path("bad.toml").write_text("[scene]\nduration = 2\n")
     refused(2, "did you mean duration_s?", "bad.toml")
+    Path("rig.toml").write_text("[[camera]]\nname = 'left'\nkind = 'dvs'\n")
+    refused(2, "rig.toml is a rig file, not a scene; use it with", "rig.toml", "--size", "16x12")
 
 
 def test_a_dry_run_prints_the_scene_and_does_nothing() -> None:

@@ -109,11 +109,6 @@ def is_rig_file(path: Path) -> bool:
     )
 
 
-def names_cameras(path: Path) -> bool:
-    """Whether a TOML file has tables [[camera]], as a rig's has and a scene's has not.  Raises as `read_text` does."""
-    return re.search(r"^\s*\[\[camera\]\]", read_text(path), re.MULTILINE) is not None
-
-
 def _tables(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:

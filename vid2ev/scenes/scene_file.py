@@ -153,6 +153,8 @@ def read_scene(name_or_path: str | Path, settings: Sequence[str] = ()) -> SceneF
         raise DataError(f"scene {path} cannot be read (it is not UTF-8 text); give a TOML file") from error
     except ValueError as error:
         raise DataError(f"scene {path} is not valid TOML: {error}; correct that line") from error
+    if isinstance(tables.get("camera"), list):  # (of a scene it is one table)
+        raise UsageError(f"{path} is a rig file, not a scene; use it with vid2ev convert VIDEO --rig {path}")
     for text in settings:
         tables = changed(tables, text, name)
     asked = (_parsed(text.partition("=")[2].strip()) for text in settings)

@@ -161,11 +161,8 @@ def _synthetic(text: str, transfer: str, fps: float | Fraction | None, colour: C
 
 
 def _scene(text: str, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
-    from vid2ev.rig.rig_file import names_cameras
     from vid2ev.scenes.source import open_scene
 
-    if Path(text).is_file() and names_cameras(Path(text)):
-        raise UsageError(f"{text} is a rig file, not a scene; use it with vid2ev convert VIDEO --rig {text}")
     if transfer not in ("auto", "linear"):
         raise UsageError(f"{text}: transfer '{transfer}' for light that is linear already; leave it out")
     return open_scene(text, fps=fps, colour=colour)
