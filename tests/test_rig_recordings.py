@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vid2ev import Events, UsageError, convert, read_events
+from vid2ev import DataError, Events, UsageError, convert, read_events
 from vid2ev.recipe import Recipe
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.camera import Camera, Rig, Source
@@ -150,6 +150,11 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any]
     with pytest.raises(UsageError, match=message):
         convert(CLIP, tmp_path / "out", **(OPTIONS | changed))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_rig_without_a_name_is_not_taken_for_none(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="give a rig file"):
+        convert(CLIP, tmp_path / "out", rig="", **OPTIONS)
 
 
 def test_truth_lies_beside_what_each_camera_sends(tmp_path: Path) -> None:

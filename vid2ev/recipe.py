@@ -101,7 +101,7 @@ class Recipe:
         if rest.get("bayer"):
             rest["bayer"] = check_pattern(rest["bayer"].upper())
         refuse_recordings(Path(video), rest.get("transfer", "auto"))
-        rig = rig or _rig_of_scene(str(video))
+        rig = _rig_of_scene(str(video)) if rig is None else rig
         asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
         asked = asked.with_frames() if frame_camera else asked
         alone = rig is None and len(asked.cameras) == 1

@@ -146,6 +146,7 @@ def test_what_is_unknown() -> None:
 @pytest.mark.parametrize(
     "text, options, message",
     [
+        ("", {}, "depth '': expected a map"),
         ("plane:0", {}, "plane:0"),
         ("plane:-2", {}, "plane:-2"),
         ("plane:nan", {}, "plane:nan"),

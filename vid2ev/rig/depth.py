@@ -119,6 +119,8 @@ def open_depth(
     """
     given = DepthScale(kind or ("disparity" if baseline_m is not None else "depth"), scale, shift, focal_px, baseline_m)
     meaning = replace(given, focal_px=focal_px or source.focal_px[0])
+    if not str(text):  # (which a folder of depth would be: this one)
+        raise UsageError("depth '': expected a map or a folder of maps, plane:METRES or model:NAME")
     name, _, rest = str(text).partition(":")
     if name == "plane":
         return PlaneDepth(_distance_m(rest), source.size)
