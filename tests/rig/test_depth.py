@@ -143,6 +143,13 @@ def test_what_is_unknown() -> None:
     np.testing.assert_array_equal(np.isnan(inverse), [False, False, True, True, False, False])
 
 
+@pytest.mark.parametrize("depth", [0.0, -2.0, np.nan])
+def test_a_map_of_nothing_that_is_known_is_refused(tmp_path: Path, depth: float) -> None:
+    np.save(tmp_path / "d.npy", np.full_like(VALUES, depth, np.float32))
+    with pytest.raises(DataError, match="none of its depth is known"):
+        open_depth(tmp_path / "d.npy", SOURCE)
+
+
 @pytest.mark.parametrize(
     "text, options, message",
     [

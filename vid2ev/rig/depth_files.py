@@ -57,7 +57,11 @@ class DepthFiles:
             self._stack = values if values.ndim == 3 else None
         self.count = len(self._files) if self._stack is None else len(self._stack)
         self._kept: dict[int, np.ndarray] = {}
-        self._read(0)
+        if not (self._read(0) > 0).any() and self.count == 1:
+            raise DataError(
+                f"{path}: none of its depth is known, all of it is 0, less than that or NaN; correct the map, or the"
+                " scale, shift and kind that are given"
+            )
 
     def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
         """The map of frame `index`, or after `share` of the interval to the next."""
