@@ -152,6 +152,26 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any]
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("camera", "blind"),
+    [
+        ({"translation_mm": (15.0, 0.0, 0.0)}, False),
+        ({"translation_mm": (0.0, 0.0, 2500.0)}, True),  # beyond the plane
+        ({"translation_mm": (15.0, 0.0, 0.0), "rotation_deg": (0.0, 120.0, 0.0)}, True),
+        ({"rotation_deg": (0.0, 59.0, 0.0)}, False),  # a column or two
+        ({"rotation_deg": (0.0, 61.0, 0.0)}, True),
+    ],
+)
+def test_a_camera_that_sees_nothing_of_the_video_says_so(tmp_path: Path, camera: dict[str, Any], blind: bool) -> None:
+    depth = "plane:2" if "translation_mm" in camera else None
+    made = convert(CLIP, tmp_path / "out", rig=rig(size=(256, 192), **camera), depth=depth, preview=False, **OPTIONS)
+    said = {
+        name: any("sees nothing of the video" in text for text in each["warnings"])
+        for name, each in made["results"].items()
+    }
+    assert said == {"left": False, "right": blind, "aps": False}
+
+
 def test_a_rig_without_a_name_is_not_taken_for_none(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="give a rig file"):
         convert(CLIP, tmp_path / "out", rig="", **OPTIONS)

@@ -22,6 +22,7 @@ from vid2ev.recording.preview import rate_for
 from vid2ev.rig.rig_file import write_rig
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.tiles import WHOLE, Part
+from vid2ev.sight import sees_nothing
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -233,8 +234,18 @@ class Recorder:
             "duration_us": duration_us,
             "counts": counts | track.counts(),
             "cuts_us": done.cuts_us,
-            "warnings": done.warnings + _remarks(done) + track.remarks(),
+            "warnings": done.warnings + _remarks(done) + self._unseen(number) + track.remarks(),
         }
+
+    def _unseen(self, number: int) -> list[str]:
+        """A remark on a camera that sees nothing of the video: its light is made up."""
+        recipe, mount = self.recipe, self.recipe.mounts[number]
+        if recipe.source.dense or not sees_nothing(recipe.rig.source, mount, recipe.plane_m):
+            return []
+        return [
+            f"camera {mount.name} sees nothing of the video, all of its light is made up; correct its rotation and"
+            " translation_mm, or --depth"
+        ]
 
 
 def _remarks(done: Progress) -> list[str]:

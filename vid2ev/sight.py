@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -10,7 +11,8 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
-from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.homography import places_on_plane
+from vid2ev.rig.intrinsics import Framing, Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.views import View, Views, is_same
 from vid2ev.scenes.reel import Reel
@@ -19,6 +21,8 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import Source
 from vid2ev.sources.cut import Cut
 from vid2ev.stream.frames import Frame
+
+GLANCE_PX = 64  # along a side: most cameras see much, and so many of their places say so
 
 
 class Sight:
@@ -55,6 +59,17 @@ class Sight:
             light = frame.light if coloured else frame.luminance
             seen |= dict(zip(places, views.see(light, frame.depth), strict=True))
         return [seen[k] for k in range(len(self._mounts))]
+
+
+def sees_nothing(source: Intrinsics, mount: Mount, plane_m: float | None) -> bool:
+    """Whether no pixel of a camera sees anything of a video, as far as that is known without maps of depth."""
+    camera, pose = mount.view
+    if is_same(source, camera, pose) or (plane_m is None and pose.translation_m.any()):
+        return False
+    few = min(camera.size[0], GLANCE_PX), min(camera.size[1], GLANCE_PX)
+    glance = Framing(camera.size, (0, 0), camera.size, few).lens_of_part(camera)
+    far_m = math.inf if plane_m is None else plane_m
+    return not any(places_on_plane(source, lens, pose, far_m).seen.any() for lens in (glance, camera))
 
 
 def scene_of(source: Source) -> SceneSource | None:
