@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vid2ev import Dvs, DvsSpec
+from vid2ev import Dvs, DvsSpec, Events
 
 THRESHOLD, LEAK_NAT_PER_S = 0.05, 50.0  # 1000 Hz
 DURATION_S, TAU_S = 0.03, 0.005
@@ -55,3 +55,27 @@ def test_a_leak_that_falling_light_overtakes(order, tau_s, log_curve):
     assert len(expected) >= 4 and {p for _, p in expected} == {0, 1}
     assert sent.p.tolist() == [p for _, p in expected]
     np.testing.assert_allclose(sent.t, 1e6 * t_s[[i for i, _ in expected]], atol=1.0)
+
+
+@pytest.mark.parametrize("follower_us", [0.0, 200.0])
+def test_a_dip_that_the_leak_makes_up_for_before_the_next_frame(follower_us):
+    """Light that was falling rises: the signal falls on for a while, and the leak has lifted it beyond where it was by
+    the next frame.  The same light in fifty steps has the same events."""
+    rng, pixels = np.random.default_rng(0), 500
+    nats = np.cumsum([np.zeros(pixels), -rng.uniform(0.3, 1.2, pixels), rng.uniform(0, 0.4, pixels)], axis=0)
+    spec = DvsSpec(
+        threshold_on=0.2, threshold_off=0.2, mismatch=0, crossing_noise=0, refractory_us=0, filter="after",
+        random_phase=False, photoreceptor_tau_us=1000, follower_tau_us=follower_us, leak_rate_hz=250.0, dark_level=1e-9,
+    )  # fmt: skip
+    sent = []
+    for steps in (1, 50):
+        sensor, events = Dvs(spec, (pixels, 1)), []
+        for place in np.linspace(0, 2, 2 * steps + 1):
+            k = min(int(place), 1)
+            log = nats[k] + (place - k) * (nats[k + 1] - nats[k])
+            events.append(sensor.step(np.exp(log)[None].astype(np.float32), round(place * 5_000_000)))
+        both = Events.concatenate(events)
+        sent.append(both.select(np.lexsort((both.t, both.x))))
+    coarse, fine = sent
+    assert len(coarse) > 800 and np.array_equal(coarse.x, fine.x) and np.array_equal(coarse.p, fine.p)
+    assert np.abs(coarse.t - fine.t).max() <= 2
