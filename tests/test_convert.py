@@ -130,11 +130,12 @@ def test_a_recording_counts_from_its_first_frame(tmp_path: Path) -> None:
 
 
 def test_event_frames_later_than_the_last_frame_are_kept(tmp_path: Path) -> None:
-    overrides = ["frame_rate_hz=7"]  # event frames at 143 ms, 286 ms, 429 ms
-    manifest = convert(CLIP, tmp_path / "out", "ideal", overrides, upsample="none")
+    clip, overrides = CLIP.replace("64x48", "96x8"), ["frame_rate_hz=6"]  # 167 and 333 ms; light ends at 300
+    manifest = convert(clip, tmp_path / "out", "ideal", overrides, upsample="none")
     events = Events.concatenate(read_events(tmp_path / "out"))
-    assert set(events.t) <= {0, 142_857, 285_714, 428_571} and len(events) == manifest["counts"]["events"] > 0
-    convert(CLIP, tmp_path / "pieces", "ideal", overrides, upsample="none", piece=1)
+    assert set(events.t) == {0, 166_667, 333_333} and len(events) == manifest["counts"]["events"]
+    assert manifest["duration_us"] == 333_333
+    convert(clip, tmp_path / "pieces", "ideal", overrides, upsample="none", piece=1)
     assert (tmp_path / "out" / "events.h5").read_bytes() == (tmp_path / "pieces" / "events.h5").read_bytes()
 
 
