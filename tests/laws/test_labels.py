@@ -23,6 +23,7 @@ def moving() -> tuple[np.ndarray, np.ndarray]:
     [
         ({"leak_rate_hz": 10}, Label.LEAK),
         ({"leak_rate_hz": 10, "random_phase": True}, Label.LEAK),
+        ({"leak_rate_hz": 10, "timing": "linear"}, Label.LEAK),
         ({"shot_rate_hz": 10}, Label.SHOT),
         ({"hot_probability": 0.2, "hot_rate_hz": 100}, Label.HOT),
     ],
