@@ -223,3 +223,22 @@ def test_nor_what_is_said_of_a_frame_that_another_has_followed():
         dvs.step(light, 1_000_000)
         another(dvs)
         assert len(dvs.step(light, 3_000_000, Still(light, all_still))) == 4 * light.size, name
+
+
+def test_a_sensor_that_slept_owes_nothing_to_a_state_that_it_takes_up():
+    spec = clean(photoreceptor_tau_us=2000, follower_tau_us=500)
+    dark = np.random.default_rng(0).uniform(0.1, 1, SIZE[::-1]).astype(np.float32)
+    steps = [(dark, 0), (dark * 1.05, 100_000), (dark, 200_000)]
+    slept, other = Dvs(spec, SIZE), Dvs(spec, SIZE)
+    for light, t_ns in steps:
+        slept.step(light, t_ns)
+        other.step(light, t_ns)
+    saved = other.state()
+    for k in range(12):
+        slept.step(dark, 300_000 + 50_000 * k)
+    assert slept.slept[0] > 0
+    slept.restore(saved)
+    for k in range(3):
+        ours, theirs = (dvs.step(dark, 300_000 + 100_000 * k) for dvs in (slept, other))
+        assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.x, theirs.x)
+    assert_same_state(slept, other)
