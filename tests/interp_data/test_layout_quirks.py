@@ -233,10 +233,32 @@ def test_a_damaged_file_costs_its_own_stretch_and_is_named(tmp_path: Path) -> No
     found = windows(sequence, 1)
     # (it may have begun before the picture at its begin, and ended after the one at its end)
     np.testing.assert_array_equal(found.first, [0, 4])
-    assert found.unusable == {"a file of events cannot be read": 3}
+    assert found.unusable == {"a file of events is missing or cannot be read": 3}
     same(sequence.events(STEP_US, 2 * STEP_US), gaps[0])
     with pytest.raises(DataError, match="cannot be read"):
         sequence.events(3 * STEP_US, 4 * STEP_US)
+
+
+@pytest.mark.parametrize("layout", ["hsergb", "bsergb"])
+def test_a_missing_file_costs_its_own_stretch_and_is_named(tmp_path: Path, layout: str) -> None:
+    gaps = written(tmp_path / "seq", layout, 8)
+    files = sorted((tmp_path / "seq" / LAYOUTS[layout].events).iterdir())
+    files[3].unlink()
+    sequence = open_sequence(tmp_path / "seq")
+    assert sequence.remarks == [f"1 event files are missing before {files[4].name}"]
+    found = windows(sequence, 1)
+    np.testing.assert_array_equal(found.first, [0, 1, 5, 6])
+    assert found.unusable == {"a file of events is missing or cannot be read": 3}
+    same(sequence.events(STEP_US, 2 * STEP_US), gaps[0])
+
+
+def test_numbers_that_are_left_out_where_no_events_are_mean_nothing(tmp_path: Path) -> None:
+    gaps = written(tmp_path / "seq", images=8)
+    for k, path in reversed([*enumerate(sorted((tmp_path / "seq" / "events_aligned").iterdir()), 1)]):
+        path.rename(path.with_name(f"{5 * k:06d}.npz"))
+    sequence = open_sequence(tmp_path / "seq")
+    assert sequence.remarks == [] and len(windows(sequence, 1).first) == 7
+    same(sequence.events(STEP_US, 2 * STEP_US), gaps[0])
 
 
 @pytest.mark.parametrize("columns", [{"x": 3, "y": 3, "t": 2, "p": 3}, {"x": 2, "y": 2, "p": 2}])

@@ -85,7 +85,7 @@ class Ergb:
 
     @property
     def unknown_us(self) -> list[tuple[int, int]]:
-        """What files that cannot be read may have held."""
+        """What files that are missing or cannot be read may have held."""
         return self._parts.unknown_us
 
     def frame(self, k: int) -> np.ndarray:

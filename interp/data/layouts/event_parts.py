@@ -8,7 +8,8 @@ Neither release can be taken by its word, so nothing is believed that can be see
   the picture have wrapped around to near 65536.  If a sequence has any that lie 2 pictures beyond the last pixel, all
   are times 32.
 * p is 0 and 1, false and true, or -1 and 1.  Files may be empty, hold one instant, or be out of order.
-* A file that cannot be read is named; what it should have held is a stretch of unknown events.
+* A file that cannot be read is named; what it should have held is a stretch of unknown events.  So is that of files
+  whose numbers are left out, where events are left out there, too.
 
 Sources: the READMEs and loaders of rpg_timelens and timelens-pp, and what their users report in those projects' issues.
 """
@@ -28,6 +29,7 @@ SCALE = 32.0
 WRAP = 65536
 COLUMNS = ("t", "timestamp"), ("x",), ("y",), ("p", "polarity")  # what the two layouts call them
 BEYOND = 2  # pictures
+LEAST_MISSING = 0.5  # of the time of a file, for which there are no events where one is missing
 
 
 class EventParts:
@@ -35,8 +37,8 @@ class EventParts:
 
     size      width and height of the picture that they are on [px]
     first_us, last_us   times of the first and the last event; 0 without events
-    unknown_us  stretches of which events are not known, as their file cannot be read
-    remarks   files that cannot be read, and empty ones by their number
+    unknown_us  stretches of which events are not known, as their file is missing or cannot be read
+    remarks   files that are missing or cannot be read, and empty ones by their number
     """
 
     def __init__(self, folder: Path, size: tuple[int, int]):
@@ -47,7 +49,8 @@ class EventParts:
         self._count = np.zeros(len(self.paths), np.int64)
         self._damaged = np.zeros(len(self.paths), bool)
         self._scaled = self._survey()
-        self.unknown_us = [self._unknown(int(k)) for k in np.flatnonzero(self._damaged)]
+        self.unknown_us = [self._unknown(int(k), int(k) + 1) for k in np.flatnonzero(self._damaged)]
+        self.unknown_us += self._missing()
         used = self._count > 0
         self.first_us = int(self._spans[used, 0].min()) if used.any() else 0
         self.last_us = int(self._spans[used, 1].max()) if used.any() else 0
@@ -59,7 +62,8 @@ class EventParts:
         for since_us, until_us in self.unknown_us:
             if since_us < stop_us and until_us > start_us:
                 raise DataError(
-                    f"{self.folder}: events from {start_us} to {stop_us} us are in a file that cannot be read"
+                    f"{self.folder}: events from {start_us} to {stop_us} us are in a file that is missing or cannot be"
+                    " read"
                 )
         near = np.flatnonzero((self._count > 0) & (self._spans[:, 0] <= stop_us) & (self._spans[:, 1] > start_us))
         parts = [self._placed(int(k)) for k in near]
@@ -99,9 +103,22 @@ class EventParts:
         wrapped = values > SCALE * (side - 1) + SCALE  # (right of the picture; or left of it, wrapped around)
         return (np.where(wrapped, values - WRAP, values) / SCALE).astype(np.float32)
 
-    def _unknown(self, k: int) -> tuple[int, int]:
-        """When a damaged file may have held events: after those of files before it, before those of files after."""
-        before, after = self._spans[:k][self._count[:k] > 0], self._spans[k + 1 :][self._count[k + 1 :] > 0]
+    def _missing(self) -> list[tuple[int, int]]:
+        """When files that are missing by their numbers may have held events: where there are none for long."""
+        found, used = list[tuple[int, int]](), self._spans[self._count > 0]
+        typical_us = float(np.median(np.diff(used, axis=1))) if len(used) else 0.0
+        for k in range(1, len(self.paths)):
+            missing = int(self.paths[k].stem) - int(self.paths[k - 1].stem) - 1
+            since_us, until_us = self._unknown(k, k)
+            if missing > 0 and until_us - since_us > LEAST_MISSING * typical_us:
+                found.append((since_us, until_us))
+                self.remarks.append(f"{missing} event files are missing before {self.paths[k].name}")
+        return found
+
+    def _unknown(self, stop: int, start: int) -> tuple[int, int]:
+        """When files between those before `stop` and those from `start` on may have held events: after the last event
+        of the first, before the first of the others."""
+        before, after = self._spans[:stop][self._count[:stop] > 0], self._spans[start:][self._count[start:] > 0]
         return int(before[-1, 1]) if len(before) else -(2**62), int(after[0, 0]) if len(after) else 2**62
 
 

@@ -57,7 +57,7 @@ class Sequence(Protocol):
 
     @property
     def unknown_us(self) -> list[tuple[int, int]]:
-        """Stretches of that time of which events are not known, as their file cannot be read."""
+        """Stretches of that time of which events are not known, as their file is missing or cannot be read."""
 
     def frame(self, k: int) -> np.ndarray:
         """Frame k, sRGB codes uint8 [H, W, 3].  Raises DataError."""
@@ -101,7 +101,7 @@ def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0, e
         elif part[0] < since:
             reason = "the events begin after the first frame"
         elif any(from_us < part[-1] and until_us > part[0] for from_us, until_us in sequence.unknown_us):
-            reason = "a file of events cannot be read"
+            reason = "a file of events is missing or cannot be read"
         else:
             good.append(k)
             continue
