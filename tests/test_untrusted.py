@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import pickle
 import struct
 import zipfile
@@ -22,8 +23,9 @@ from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
 from vid2ev.commands.batch import sources_in
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.formats import open_events
+from vid2ev.formats import open_events, recognise
 from vid2ev.light.picture_files import read_picture
+from vid2ev.light.recognise import head_of
 from vid2ev.recording.exposures import read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.recording.pose_text import read_poses
@@ -39,7 +41,7 @@ from vid2ev.sources import open_source
 from vid2ev.sources.motion import parse_motion
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.toml_text import parsed_toml
-from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes
+from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes, read_arrays
 
 MEGABYTE = 1 << 20
 
@@ -181,6 +183,16 @@ def test_a_png_takes_no_room_for_what_it_has_not(tmp_path: Path) -> None:
         for reads in (read_picture, read_codes, read_mask):
             with pytest.raises(DataError, match="cut short"):
                 reads(place)
+
+
+@pytest.mark.parametrize("read", [head_of, read_arrays, recognise])
+def test_a_pipe_is_said_to_be_one_and_not_waited_for(read: Callable[[Path], object], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    pipe = os.open(tmp_path / "pipe", os.O_RDWR)
+    os.write(pipe, bytes(1 << 15))  # (so that whoever reads it all the same does not wait either)
+    with pytest.raises(DataError, match="pipe: a pipe, expected a file"):
+        read(tmp_path / "pipe")
+    os.close(pipe)
 
 
 def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:

@@ -52,6 +52,12 @@ def limit_for(count: int) -> str:
     return f"{LARGEST}={min(-(-count >> 20), 10**DIGITS - 1)} in the environment"
 
 
+def check_file(path: Path) -> None:
+    """Raise DataError for a pipe: whoever opens it waits for somebody to write, and what is read of it is gone."""
+    if path.is_fifo():
+        raise DataError(f"{path}: a pipe, expected a file; write to a file what comes out of it, and give that")
+
+
 def read_text(path: Path) -> str:
     """A text in UTF-8, without the mark that Windows puts before it.
 
@@ -119,6 +125,7 @@ def read_array(file: BinaryIO, path: Path | str) -> np.ndarray:
 
 def read_arrays(path: Path, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
     """The arrays of a .npz file, or those of them with these names.  Raises as `read_array`."""
+    check_file(path)
     with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
         members = {name.removesuffix(".npy"): name for name in archive.namelist() if name.endswith(".npy")}
         wanted = members if names is None else {name: members[name] for name in names if name in members}

@@ -261,6 +261,14 @@ def test_numbers_that_are_left_out_where_no_events_are_mean_nothing(tmp_path: Pa
     same(sequence.events(STEP_US, 2 * STEP_US), gaps[0])
 
 
+def test_a_pipe_in_place_of_times_is_none(tmp_path: Path) -> None:
+    written(tmp_path / "seq")
+    (tmp_path / "seq" / "images_corrected" / "timestamp.txt").unlink()
+    os.mkfifo(tmp_path / "seq" / "images_corrected" / "timestamp.txt")
+    with pytest.raises(DataError, match=r"no timestamp\.txt"):
+        open_sequence(tmp_path / "seq")
+
+
 @pytest.mark.parametrize("columns", [{"x": 3, "y": 3, "t": 2, "p": 3}, {"x": 2, "y": 2, "p": 2}])
 def test_columns_that_cannot_be_are_named(tmp_path: Path, columns: dict[str, int]) -> None:
     written(tmp_path / "seq")

@@ -19,7 +19,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
 from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
-from vid2ev.untrusted import limit_for, most_bytes
+from vid2ev.untrusted import check_file, limit_for, most_bytes
 
 __all__ = [
     "FORMATS",
@@ -189,6 +189,7 @@ def recognise(path: str | Path) -> Format | None:
     """The format of a file, by its content; None if that is no event file.  Raises UsageError if it is not there,
     DataError if it cannot be read."""
     path = Path(path)
+    check_file(path)
     try:
         with open(path, "rb") as file:
             head = file.read(HEAD)

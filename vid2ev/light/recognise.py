@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 from vid2ev.errors import DataError
+from vid2ev.untrusted import check_file
 
 Kind = Literal["picture", "array", "arrays", "video"]
 
@@ -57,6 +58,7 @@ def recognise(path: Path) -> Kind:
 
 def head_of(path: Path) -> bytes:
     """The first bytes of a file.  Raises DataError."""
+    check_file(path)
     try:
         with open(path, "rb") as file:
             return file.read(HEAD)

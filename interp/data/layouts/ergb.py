@@ -127,7 +127,7 @@ class Ergb:
 
     def _stamps(self, folder: Path) -> list[int | None]:
         """The times [us] of the pictures; None of lines that say something else, which are counted."""
-        path = next((folder / name for name in STAMPS if (folder / name).exists()), None)
+        path = next((folder / name for name in STAMPS if (folder / name).is_file()), None)
         if path is None:
             raise DataError(f"{folder}: no {STAMPS[0]}; expected the times of its pictures, one to a line")
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
