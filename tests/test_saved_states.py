@@ -118,12 +118,14 @@ def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path
 
 def test_less_than_nothing_cannot_have_been_evaluated(tmp_path: Path) -> None:
     with Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False) as kept:
-        for about in ({"groups": -3, "missing": {"linear": 0}}, {"groups": 3, "missing": {"linear": -1}}):
+        unfit: dict[str, dict[str, list[str]]] = {"linear": {}}
+        for groups, missing in ((-3, 0), (3, -1)):
+            about = {"groups": groups, "missing": {"linear": missing}, "unfit": unfit}
             kept.finish("film", about)
             with pytest.raises(DataError, match="below zero"):
                 kept.about("film")
-        kept.finish("film", {"groups": 3, "missing": {"linear": 0}})
-        assert kept.about("film") == {"groups": 3, "missing": {"linear": 0}}
+        kept.finish("film", {"groups": 3, "missing": {"linear": 0}, "unfit": unfit})
+        assert kept.about("film") == {"groups": 3, "missing": {"linear": 0}, "unfit": unfit}
 
 
 def test_a_folder_that_is_being_removed_says_to_the_last_whose_it_is(

@@ -71,6 +71,8 @@ class KeptRows:
         with as_stated(path):
             if min(operator.index(count) for count in (found["groups"], *dict(found["missing"]).values())) < 0:
                 raise ValueError("a count below zero")
+            if dict(found["unfit"]).keys() != dict(found["missing"]).keys():
+                raise ValueError("not the same methods throughout")
         return found
 
     def finish(self, sequence: str, about: Mapping[str, Any]) -> None:

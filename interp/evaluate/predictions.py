@@ -37,7 +37,8 @@ SUFFIX = ".png"
 class Predictions:
     """The pictures of a method.
 
-    within   the folder of the method in that of a sequence; None for that one itself
+    within     the folder of the method in that of a sequence; None for that one itself
+    unpaired   why nobody can tell which frames those of a sequence are of
     """
 
     name: str
@@ -45,28 +46,33 @@ class Predictions:
     within: str | None
     identity: dict[str, Any]
     files: Mapping[int, Path] = field(default_factory=dict)  # by the number of the frame
-    sequential = False
+    unpaired: str = ""
+    unfit: dict[str, list[str]] = field(default_factory=dict)
+    sequential = True  # (looked at again after a kill, so that what cannot be used is known)
 
     def begin(self, footage: Footage) -> Self:
         """See `interp.evaluate.rebuilders.Rebuilder`."""
         folder = self.folder / footage.name
         files = pictures_in(folder / self.within if self.within else folder)
-        return replace(self, files=by_frame(files, footage.frames, footage.multiple))
+        try:
+            return replace(self, files=by_frame(files, footage.frames, footage.multiple), unpaired="", unfit={})
+        except DataError as error:
+            return replace(self, files={}, unpaired=str(error), unfit={})
 
     def frames(self, group: Group) -> Sequence[np.ndarray | None]:
-        """See `interp.evaluate.rebuilders.Rebuilder`.  Raises DataError for a picture of another size."""
-        return [self._read(group.first + position, group.truth.shape[1:]) for position in group.positions]
+        """See `interp.evaluate.rebuilders.Rebuilder`."""
+        return [self._picture(group.first + position, group.truth.shape[1:]) for position in group.positions]
 
-    def _read(self, frame: int, shape: tuple[int, ...]) -> np.ndarray | None:
-        import cv2
-
+    def _picture(self, frame: int, shape: tuple[int, ...]) -> np.ndarray | None:
+        if self.unpaired:
+            self.unfit.setdefault(self.unpaired, []).append(f"frame {frame}")
         if frame not in self.files:
             return None
-        picture = next(iter(decoded(self.files[frame], cv2.IMREAD_COLOR)), None)
-        if picture is None or picture.shape != shape:
-            size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
-            raise DataError(f"{self.files[frame]}: {size}, expected a picture of {shape[1]}x{shape[0]}")
-        return picture[..., ::-1]
+        try:
+            return _read(self.files[frame], shape)
+        except DataError as error:
+            self.unfit.setdefault(str(error), []).append(self.files[frame].name)
+            return None
 
 
 def predictions_in(folder: str | Path) -> list[Predictions]:
@@ -115,3 +121,17 @@ def pictures_in(folder: Path) -> list[Path]:
     """
     found = (path for path in folder.iterdir() if not path.name.startswith(".")) if folder.is_dir() else ()
     return sorted((path for path in found if path.suffix.lower() == SUFFIX), key=lambda path: natural(path.name))
+
+
+def _read(path: Path, shape: tuple[int, ...]) -> np.ndarray:
+    """A picture of a shape.  Raises DataError, which does not name it, for what is none."""
+    import cv2
+
+    try:
+        picture = next(iter(decoded(path, cv2.IMREAD_COLOR)), None)
+    except DataError as error:
+        raise DataError(str(error).removeprefix(f"{path}: ")) from error
+    if picture is None or picture.shape != shape:
+        size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
+        raise DataError(f"{size}, expected a picture of {shape[1]}x{shape[0]}")
+    return picture[..., ::-1]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -20,6 +21,8 @@ from interp.methods.of_networks import of_weights
 from interp.pretrained import OF_RUN
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
+
+NOTHING: Mapping[str, Sequence[str]] = MappingProxyType({})
 
 
 class Rebuilder(Protocol):
@@ -37,6 +40,10 @@ class Rebuilder(Protocol):
     def sequential(self) -> bool:
         """Whether groups must come in their order, and none may be left out."""
 
+    @property
+    def unfit(self) -> Mapping[str, Sequence[str]]:
+        """Why frames of the sequence that are there cannot be scored: reason, and which they are."""
+
     def begin(self, footage: Footage) -> Self:
         """The same for a sequence."""
 
@@ -53,6 +60,7 @@ class OfMethod:
     method: Method
     protocol: protocols.Protocol
     device: str = "cpu"
+    unfit = NOTHING
 
     @property
     def sequential(self) -> bool:

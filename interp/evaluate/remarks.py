@@ -11,9 +11,14 @@ NAMED = 3  # sequences that are named where many have the same to be said of the
 def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
     """What was not scored: reason and number."""
     found: dict[str, int] = {}
-    for of in summary["sequences"].values():
+    for name, of in summary["sequences"].items():
         counts = {f"gaps: {reason}": count for reason, count in of["not_scored"].items()}
         counts |= {f"frames that {method} lacks": count for method, count in of["missing"].items() if count}
+        for method, reasons in of["unfit"].items():
+            counts |= {
+                f"frames of {method} in {name}: {reason} ({_several(which)})": len(which)
+                for reason, which in reasons.items()
+            }
         for reason, count in counts.items():
             found[reason] = found.get(reason, 0) + count
     return found

@@ -22,6 +22,7 @@ from interp.evaluate.kept import Kept, KeptRows
 from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import Rebuilder, methods_of
+from interp.evaluate.remarks import left_out
 from interp.evaluate.report.of_evaluation import write_pages
 from interp.evaluate.row import Row
 from interp.evaluate.rows import ROWS, write_rows
@@ -118,8 +119,8 @@ def evaluate(
 
 def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
     """Why nothing of a sequence was scored."""
-    if about["not_scored"]:
-        return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in about["not_scored"].items())
+    if reasons := left_out({"sequences": {name: about}}):
+        return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in reasons.items())
     return f"{name}: {about['frames']} frames, expected {protocol.multiple + 1} or more; give a smaller --skip"
 
 
@@ -179,12 +180,19 @@ def _scored(
                 _score_group(each.name, group, running, found, kept, worst)
             facts = each.about()
             whole = facts["groups"] * frames
-            missing = {method.name: whole - sum(map(len, found[method.name].values())) for method in unfinished}
-            about = facts | {"missing": (about["missing"] if about else {}) | missing}
+            unfit = {method.name: dict(method.unfit) for method in running}
+            missing = {
+                name: whole - sum(map(len, [*found[name].values(), *reasons.values()]))
+                for name, reasons in unfit.items()
+            }
+            lacking = {"missing": missing, "unfit": unfit}
+            about = facts | {key: (about[key] if about else {}) | of for key, of in lacking.items()}
             kept.finish(each.name, about)
         assert about is not None
         done += each.expected
-        known[each.name] = about | {"missing": {method.name: about["missing"][method.name] for method in methods}}
+        known[each.name] = about | {
+            key: {method.name: about[key][method.name] for method in methods} for key in ("missing", "unfit")
+        }
         rows += [row for method in methods for group in sorted(found[method.name]) for row in found[method.name][group]]
     if report:
         report(total, total, "")

@@ -19,6 +19,7 @@ from interp.evaluate.films import Film
 from interp.evaluate.predictions import by_frame, predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
+from interp.evaluate.remarks import left_out
 from interp.evaluate.run import evaluate
 from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
@@ -298,7 +299,7 @@ def test_what_cannot_be_scored_is_said(tmp_path: Path) -> None:
     assert any("dropped 1 of 4 frames" in remark for remark in known["remarks"])
 
 
-def test_missing_predictions_are_counted_and_those_of_another_size_refused(tmp_path: Path) -> None:
+def test_predictions_that_are_missing_or_cannot_be_used_are_named_and_counted(tmp_path: Path) -> None:
     truth = pictures(13)
     for name in ("a", "b"):
         write_hsergb(tmp_path / "data" / name, truth)
@@ -307,10 +308,29 @@ def test_missing_predictions_are_counted_and_those_of_another_size_refused(tmp_p
     found = evaluate([str(tmp_path / "data")], tmp_path / "report", **options)
     assert {name: of["missing"]["theirs"] for name, of in found.summary["sequences"].items()} == {"a": 4, "b": 9}
     assert len(found.rows) == 5
+    for name in ("a", "b"):
+        write_predictions(tmp_path / "odd" / name, truth)
+    for k in (2, 3):
+        write_codes(tmp_path / "odd" / "a" / f"frame{k}.png", truth[k, :12])
+    (tmp_path / "odd" / "a" / "frame5.png").write_bytes(b"torn")
+    (tmp_path / "odd" / "b" / "readme.png").write_bytes(b"")  # (so that nobody can tell which frame each is of)
+    options["predictions"] = [tmp_path / "odd"]
+    found = evaluate([str(tmp_path / "data")], tmp_path / "other", **options)
+    of = found.summary["sequences"]
+    assert of["a"]["unfit"]["odd"] == {
+        "40x12 pixels, expected a picture of 40x24": ["frame2.png", "frame3.png"],
+        "no picture, expected a picture of 40x24": ["frame5.png"],
+    }
+    assert [len(which) for which in of["b"]["unfit"]["odd"].values()] == [9]
+    assert of["a"]["missing"] == of["b"]["missing"] == {"odd": 0} and len(found.rows) == 9 - 3
+    said = left_out(found.summary)
+    assert said["frames of odd in a: 40x12 pixels, expected a picture of 40x24 (frame2.png, frame3.png)"] == 2
+    assert sum(said.values()) == 3 + 9
+    assert "frame5.png" in (tmp_path / "other" / "report.md").read_text()
     write_predictions(tmp_path / "wrong" / "a", truth[:, :12])
     options["predictions"] = [tmp_path / "wrong"]
-    with pytest.raises(DataError, match=r"40x12 pixels, expected a picture of 40x24"):
-        evaluate([str(tmp_path / "data")], tmp_path / "other", **options)
+    with pytest.raises(DataError, match=r"no frame could be scored: a: 9 x frames of wrong in a: 40x12 pixels"):
+        evaluate([str(tmp_path / "data")], tmp_path / "third", **options)
     with pytest.raises(UsageError, match="no predictions in it"):
         predictions_in(tmp_path / "data" / "a" / "events_aligned")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import torch
-from footage_made import pictures, write_film, write_hsergb
+from footage_made import pictures, write_film, write_hsergb, write_predictions
 
 from interp.evaluate import run
 from interp.evaluate.protocol import Protocol
@@ -20,6 +20,7 @@ from vid2ev import DataError, UsageError
 from vid2ev.cluster.task import Task
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
+from vid2ev.recording.exposures import write_codes
 
 pytestmark = pytest.mark.long
 
@@ -33,11 +34,16 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_hsergb(folder / "data" / name, pictures(14, seed))
     write_film(folder / "film.npz", pictures(14))
     save(folder / "firenet.safetensors", "firenet", make("firenet", "tiny"))
+    write_predictions(folder / "theirs" / "a", pictures(14, 5))
+    write_codes(folder / "theirs" / "a" / "frame1.png", pictures(1)[0, :12])  # of the first group
     return folder
 
 
 def options(data: Path) -> dict[str, Any]:
-    return {"baselines": BASELINES, "protocol": Protocol(3, 3), "networks": [data / "firenet.safetensors"]}
+    networks, predictions = [data / "firenet.safetensors"], [data / "theirs"]
+    return {
+        "baselines": BASELINES, "protocol": Protocol(3, 3), "networks": networks, "predictions": predictions,
+    }  # fmt: skip
 
 
 def datasets(data: Path) -> list[str]:
@@ -77,7 +83,7 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
     monkeypatch.setattr(run, "rows_of", lambda *asked: rebuilt.append(asked[1]) or rows_of(*asked))
     evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
     assert contents(tmp_path / "report") == whole
-    assert len(rebuilt) == 3 * (9 - stop)  # nothing is scored twice
+    assert len(rebuilt) == 4 * (9 - stop)  # nothing is scored twice
 
 
 def test_workers_change_no_byte(data: Path, whole: dict[str, bytes], tmp_path: Path) -> None:
