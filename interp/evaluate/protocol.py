@@ -19,13 +19,16 @@ Sources: S. Tulyakov et al., "Time Lens", CVPR 2021, and rpg_event_based_frame_i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import torch
 
 from vid2ev.errors import UsageError
+from vid2ev.sensors.limits import is_whole
 
+Times = Literal["frames", "even"]
+Rounding = Literal["round", "truncate"]
 LEAST_STEPS = 32  # sub-intervals that events of a gap are counted in
 
 
@@ -38,17 +41,20 @@ class Protocol:
                scored at whose place a frame was
     times      "frames": the frames' own times; "even": between those of the key frames
     rounding   of codes to 8 bits: "round" to the nearest, or "truncate"
-    Raises UsageError where no rebuilt frame would be scored.
+    Raises UsageError for what is none of these, and where no rebuilt frame would be scored.
     """
 
     skip: int = 7
     insert: int = 7
-    times: Literal["frames", "even"] = "frames"
-    rounding: Literal["round", "truncate"] = "round"
+    times: Times = "frames"
+    rounding: Rounding = "round"
 
     def __post_init__(self) -> None:
-        if self.skip < 1 or self.insert < 1:
-            raise UsageError(f"skip {self.skip}, insert {self.insert}: expected at least 1 of each")
+        if not (is_whole(self.skip, 1) and is_whole(self.insert, 1)):
+            raise UsageError(f"skip {self.skip!r}, insert {self.insert!r}: expected at least 1 of each")
+        for name, value, known in (("times", self.times, Times), ("rounding", self.rounding, Rounding)):
+            if value not in get_args(known):
+                raise UsageError(f"{name} {value!r}: expected {' or '.join(get_args(known))}")
         if not self.positions:
             raise UsageError(
                 f"insert {self.insert} with skip {self.skip}: none of the frames made is where one was skipped; insert"

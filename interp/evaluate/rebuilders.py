@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -87,7 +88,9 @@ def methods_of(
     Raises UsageError for a name that is none and a device that is not there, DataError for a file that holds no network
     which rebuilds frames.
     """
-    if torch.device(device).type == "cuda" and not torch.cuda.is_available():
+    if not re.fullmatch(r"cpu|cuda(:\d+)?", device):
+        raise UsageError(f"device '{device}': expected cpu or cuda")
+    if device != "cpu" and not torch.cuda.is_available():
         raise UsageError(f"device '{device}': torch sees no GPU here; expected cpu, or a torch that sees one")
     for name in baselines:
         if name not in METHODS:

@@ -38,6 +38,7 @@ from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.manifest import versions
+from vid2ev.sensors.limits import is_whole
 
 SUMMARY = "summary.json"
 ALONE = Workers()
@@ -53,7 +54,7 @@ class Evaluation:
 
 
 def evaluate(
-    datasets: Sequence[str],
+    datasets: Sequence[str | Path],
     folder: str | Path,
     *,
     networks: Sequence[str | Path] = (),
@@ -85,12 +86,17 @@ def evaluate(
     Raises UsageError for what cannot be meant, DataError for what cannot be read or written, or where nothing is
     scored.
     """
+    for several in (datasets, networks, baselines, predictions):
+        if isinstance(several, str | Path):
+            raise UsageError(f"{several}: expected a list, also of one; give ['{several}']")
+    if limit is not None and not is_whole(limit, 1):
+        raise UsageError(f"limit {limit!r}: expected a whole number of at least 1; leave it out for all gaps")
     folder, protocol = Path(folder), protocol or Protocol()
     simulated = simulated or Simulated.of("clean")
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
     methods += [made for place in predictions for made in predictions_in(place)]
     _check(methods)
-    found = footage_of(datasets, protocol, simulated, limit)
+    found = footage_of([*map(str, datasets)], protocol, simulated, limit)
     job = {
         "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit, "device": device,
         "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},

@@ -102,3 +102,25 @@ def test_what_cannot_be_scored_is_refused() -> None:
         Protocol(7, 4)
     with pytest.raises(UsageError, match="at least 1"):
         Protocol(0, 1)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"skip": 0}, {"skip": 7.5}, {"insert": "7"}, {"times": "evenly"}, {"rounding": "floor"}]
+)
+def test_settings_that_are_none_are_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(UsageError, match=f"{next(iter(settings))} .*: expected"):
+        Protocol(**settings)
+
+
+def test_what_is_asked_for_is_a_list_and_a_limit_a_number(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "seq", pictures(9))
+    for name in ("networks", "baselines", "predictions"):
+        with pytest.raises(UsageError, match="linear: expected a list"):
+            evaluate([str(tmp_path / "seq")], tmp_path / "report", **{name: "linear"})
+    for alone in (tmp_path / "seq", str(tmp_path / "seq")):
+        with pytest.raises(UsageError, match="seq: expected a list"):
+            evaluate(alone, tmp_path / "report")  # type: ignore[arg-type]
+    for limit in (0, -1, 1.5):
+        with pytest.raises(UsageError, match=rf"limit {limit}: expected a whole number"):
+            evaluate([tmp_path / "seq"], tmp_path / "report", baselines=["linear"], limit=limit)  # type: ignore[arg-type]
+    assert len(evaluate([tmp_path / "seq"], tmp_path / "report", baselines=["linear"], limit=1).rows) == 7

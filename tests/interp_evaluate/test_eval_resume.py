@@ -139,6 +139,8 @@ def test_names_and_folders_that_are_taken_are_refused(
         evaluate(datasets(data), tmp_path / "report", baselines=())
     with pytest.raises(UsageError, match="did you mean bridge"):
         evaluate(datasets(data), tmp_path / "report", baselines=["brigde"])
+    with pytest.raises(UsageError, match="device 'gpu': expected cpu or cuda"):
+        evaluate(datasets(data), tmp_path / "report", device="gpu")
     with pytest.raises(UsageError, match="torch sees no GPU"), monkeypatch.context() as patch:
         patch.setattr(torch.cuda, "is_available", lambda: False)
         evaluate(datasets(data), tmp_path / "report", device="cuda")
