@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import torch
 
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
 from interp.representation.event_counts import EventCounts, before_and_after
+from vid2ev.errors import UsageError
 
 DARK = 1e-3
 DARKEST, BRIGHTEST = math.log(DARK) - 0.6, 0.1  # of logs of light [nat]; real edges span 3 to 5
@@ -91,7 +92,11 @@ def bridge(
 
     method   bridge; both: weights 1 - t and t; nearest: integration from the nearer frame alone
     around   codes [B, N, C, H, W] to take the colours from; those of the two frames unless given
+    Raises UsageError for a transfer or a method that is none of these.
     """
+    for name, value, known in (("transfer", transfer, Transfer), ("method", method, Method)):
+        if value not in get_args(known):
+            raise UsageError(f"{name} {value!r}: expected one of {', '.join(get_args(known))}")
     lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
     found = integrated(luminance(lights[0]), luminance(lights[1]), events, times)
     if around is None:

@@ -26,6 +26,7 @@ from interp.warp import warp
 from vid2ev.errors import UsageError
 
 Times = torch.Tensor | Sequence[float]
+FLOATS = (torch.float32, torch.float16, torch.bfloat16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,7 @@ class FrameFed(nn.Module):
         frame_0, frame_1   [B, C, H, W] codes, 0 ... 1
         times              [N] or [B, N], 0 ... 1 from the first frame to the second
         events             between the frames; those of a sensor of another size are laid over the frames edge on edge
-        Raises UsageError for shapes and times that cannot be meant.
+        Raises UsageError for types, shapes and times that cannot be meant.
         """
         return self.at(self.prepare(frame_0, frame_1, events), times)
 
@@ -108,8 +109,11 @@ class FrameFed(nn.Module):
 
     def at(self, pair: Pair, times: Times) -> Interpolated:
         """Images of a pair at N times; see `forward`."""
-        asked = torch.as_tensor(times, dtype=torch.float32, device=pair.frame_0.device)
-        if asked.ndim not in (1, 2) or (asked.ndim == 2 and len(asked) != len(pair.frame_0)):
+        try:
+            asked = torch.as_tensor(times, dtype=torch.float32, device=pair.frame_0.device)
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"times {times!r}: expected numbers, 0 ... 1") from error
+        if asked.ndim not in (1, 2) or not asked.numel() or (asked.ndim == 2 and len(asked) != len(pair.frame_0)):
             raise UsageError(
                 f"times of shape {list(asked.shape)}: expected [N], or [B, N] for {len(pair.frame_0)} pairs"
             )
@@ -135,6 +139,12 @@ class FrameFed(nn.Module):
         return Pair(first, second, laid, seen, (height, width), grey)
 
     def _check(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None) -> None:
+        for frame in (frame_0, frame_1):
+            if not isinstance(frame, torch.Tensor) or frame.dtype not in FLOATS:
+                kind = frame.dtype if isinstance(frame, torch.Tensor) else type(frame).__name__
+                raise UsageError(f"frames of {kind}: expected tensors of codes, 0 ... 1, in float32 or 16 bits")
+        if events is not None and not isinstance(events, EventCounts):
+            raise UsageError(f"events of type {type(events).__name__}: expected EventCounts, as of `count_events`")
         if frame_0.ndim != 4 or frame_0.shape != frame_1.shape or frame_0.shape[1] not in (1, self.spec.colours):
             shapes, wanted = f"{list(frame_0.shape)} and {list(frame_1.shape)}", self.spec.colours
             remedy = " or 1" if wanted > 1 else "; average their colours"

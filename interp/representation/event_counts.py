@@ -24,6 +24,7 @@ from torch.nn import functional as F
 from interp.precision import in_full_precision
 from interp.representation.bins import bin_weights
 from vid2ev.errors import UsageError
+from vid2ev.sensors.limits import is_whole
 
 if TYPE_CHECKING:
     from vid2ev import Events
@@ -130,7 +131,7 @@ def count_events(
     contrast   nats that an OFF and an ON event stand for
     Raises UsageError for events outside of the sensor and for less than one sub-interval.
     """
-    if steps < 1:
+    if not is_whole(steps, 1):
         raise UsageError(f"{steps} sub-intervals between frames: expected at least 1; choose for example 32")
     width, height = size
     t = np.asarray(events.t).astype(np.int64)

@@ -13,6 +13,7 @@ from interp.candidates.bridge import bridge, coloured, integrated, ratios_of
 from interp.candidates.contrast import with_fitted_contrast
 from interp.light import luminance, to_codes, to_light
 from interp.representation.event_counts import EventCounts
+from vid2ev import UsageError
 from vid2ev.light.transfer import parse_transfer
 
 STEPS = 8
@@ -59,6 +60,14 @@ def test_nothing_happens_and_the_frames_stay(transfer: str, colours: int) -> Non
     frame[..., 1] = 1.7  # brighter than white
     found = bridge(frame, frame, EventCounts.none(2, (9, 11)), torch.tensor([[0.0, 0.3, 1.0]] * 2), transfer)  # type: ignore[arg-type]
     torch.testing.assert_close(found, frame[:, None].expand_as(found), rtol=1e-5, atol=2e-5)  # exp(log) in float32
+
+
+def test_a_curve_and_a_method_that_are_none_are_refused() -> None:
+    given = (torch.zeros(1, 3, 4, 4), torch.zeros(1, 3, 4, 4), EventCounts.none(1, (4, 4)), torch.tensor([[0.5]]))
+    with pytest.raises(UsageError, match="transfer 'gamma': expected one of srgb, linear"):
+        bridge(*given, transfer="gamma")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="method 'best': expected one of bridge, both, nearest"):
+        bridge(*given, method="best")  # type: ignore[arg-type]
 
 
 def test_without_events_light_fades_in_logs() -> None:

@@ -110,8 +110,9 @@ def test_events_outside_of_the_sensor_and_no_sub_intervals_are_refused() -> None
     some = events(np.arange(START + 1, START + 50), SIZE)
     with pytest.raises(UsageError, match="outside of the 3x4 sensor"):
         count_events(some, (3, 4), START, STOP)
-    with pytest.raises(UsageError, match="at least 1"):
-        count_events(some, SIZE, START, STOP, 0)
+    for steps in (0, 2.5):
+        with pytest.raises(UsageError, match="at least 1"):
+            count_events(some, SIZE, START, STOP, steps)  # type: ignore[arg-type]
 
 
 def test_changes_of_windows_in_a_row_add_up() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 from pairs import FRAME_FED, counts, frames
@@ -11,7 +12,7 @@ from interp.networks import make
 from interp.networks.event_input import first_last_and_target
 from interp.networks.frame_fed import FrameFed
 from interp.representation.event_counts import EventCounts
-from vid2ev import UsageError
+from vid2ev import Events, UsageError
 
 TIMES = [0.25, 0.5, 0.9]
 FROM_CANDIDATES = ("rrin_events_light", "rrin_events_guided")
@@ -250,7 +251,14 @@ def test_images_are_not_clipped() -> None:
         ({"times": [1.5]}, "outside of 0 ... 1"),
         ({"times": [float("nan")]}, "outside of 0 ... 1"),
         ({"times": torch.zeros(3, 2)}, "for 1 pairs"),
+        ({"times": []}, r"times of shape \[0\]"),
+        ({"times": "half"}, "times 'half': expected numbers"),
+        ({"frame_0": np.zeros((1, 3, 8, 8), np.float32)}, "frames of ndarray: expected tensors"),
+        ({"frame_1": [[0.5]]}, "frames of list: expected tensors"),
+        ({"frame_1": torch.zeros(1, 3, 8, 8, dtype=torch.uint8)}, "frames of torch.uint8: expected tensors"),
+        ({"frame_1": torch.zeros(1, 3, 8, 8, dtype=torch.float64)}, "frames of torch.float64: expected tensors"),
         ({"events": EventCounts.none(2, (8, 8))}, "stack one for each"),
+        ({"events": Events.empty()}, "events of type Events: expected EventCounts"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(change: dict, sentence: str) -> None:
