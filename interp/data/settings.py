@@ -46,7 +46,9 @@ class ClipSettings(BaseModel):
         default=1.0, gt=0, allow_inf_nan=False, description="how many times slower than the world the videos play"
     )
     scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), min_length=1, description="of the scenes")
-    textures: tuple[str, ...] = Field(default=TRAINED_ON, description="photographs: bundled ones by name, or files")
+    textures: tuple[str, ...] = Field(
+        default=TRAINED_ON, min_length=1, description="photographs: bundled ones by name, or files"
+    )
     environments: tuple[str, ...] = Field(default=(), description="HDR pictures of all that is around, for scenes")
     motion: tuple[tuple[float, float, float], ...] = Field(
         default=((0.6, 4, 24), (0.2, 0.5, 4), (0.2, 24, 60)),
