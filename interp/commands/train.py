@@ -81,6 +81,7 @@ def train(
     A run is a folder with weights.safetensors, curves, pictures, and all that it takes to go on: interrupted or killed
     at any moment, or carried to another machine, it continues with --resume, on a CPU to the very same weights.
     """
+    from interp.data.samples import check_fits
     from interp.data.usable import unusable
     from interp.train.machines import Machines, check_installed
     from interp.train.starts import parsed
@@ -92,6 +93,7 @@ def train(
     check_installed()
     machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
     machines.check_batch(job.recipe.batch)
+    check_fits(job.clips, job.samples.size)
     for reason in unusable(job.clips, job.validation.videos):
         if machines.first:
             click.echo(f"note: not used: {reason}", err=True)
