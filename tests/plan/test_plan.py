@@ -193,3 +193,13 @@ def test_laws_of_the_bounds() -> None:
     for mean in (3.0, 40.0):
         draws = np.random.default_rng(1).poisson(mean, 100_000)
         assert np.mean(draws > at_most(mean)) < 1e-3 and np.mean(draws < at_least(mean)) < 1e-3
+
+
+def test_both_poles_give_way_to_the_delay_of_both() -> None:
+    """Also where the bound of both is the less, as their delay is nearer to a whole microsecond."""
+    frames = [Frame(np.full((16, 16), 0.05 * 1.1**k, np.float32), k * 1_000_000) for k in range(30)]
+    spec = DvsSpec(**QUIET, refractory_us=0, photoreceptor_tau_us=41.7, follower_tau_us=172.3)
+    plan = plan_of(scene_of(spec, (16, 16), frames), spec, 1.0)
+    distances = {row.effect: row.omission.distance for row in plan.rows}
+    assert distances["photoreceptor"] < distances["follower"]
+    assert plan.gone == ("photoreceptor", "follower") and plan.spec.delay_us == 214

@@ -243,6 +243,8 @@ def _within(omissions: dict[str, Omission], tolerance: float) -> list[str]:
     able = [name for name in omissions if _costs(name) and name not in ASKED_FOR]
     sure = {name: omissions[name].distance or 0.0 for name in able if omissions[name].sure}
     for name in sorted(sure, key=lambda name: (sure[name], name != "follower")):
+        if name in gone:  # (with the first pole, whose delay is that of both)
+            continue
         asked = [*gone, name]
         if name == "photoreceptor" and "follower" in omissions and "follower" not in gone:
             asked = [*gone, "follower", name]
