@@ -91,7 +91,7 @@ def test_a_conversion_that_goes_on_keeps_its_setting(clip: str) -> None:
 
 @pytest.mark.parametrize(
     ("budget", "said"),
-    [("vR=x", "such as vR=0.05"), ("lsb=1", "lsb cannot be measured here"), ("time=0", "allow more")],
+    [("vR=x", "such as vR=0.05"), ("lsb=1", "lsb cannot be measured here"), ("time=0", "no setting takes no time")],
 )
 def test_a_budget_that_cannot_be_is_refused_before_anything_is_written(clip: str, budget: str, said: str) -> None:
     done = call(convert, clip, *COMMON, "-o", "out", "--budget", budget)

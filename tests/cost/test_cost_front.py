@@ -123,3 +123,10 @@ def test_frames_alone_are_judged_by_their_own_error() -> None:
     assert recommended(rows, Budget.parse("lsb=1")) is rows[1]
     assert recommended(rows, Budget.parse("time=9")) is rows[1]
     assert math.isfinite(rows[0].time)
+
+
+@pytest.mark.parametrize(("budget", "kinds"), [("lsb=1", ["dvs"]), ("vR=0.1", ["cis"]), ("time=9x,us=3", ["cis"])])
+def test_errors_of_cameras_that_are_not_there_are_refused_at_once(budget: str, kinds: list[str]) -> None:
+    with pytest.raises(UsageError, match="cannot be measured here"):
+        Budget.parse(budget).check(kinds)
+    Budget.parse(budget).check(["cis", "dvs"])

@@ -14,7 +14,7 @@ machine's noise makes of them, the most accurate; where time is the only limit, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -62,7 +62,15 @@ class Budget:
                     f" us=50 or time=10x{nearest(name, LIMITS)}"
                 )
             limits[name] = _number(part.strip(), number.removesuffix("x") if name == "time" else number)
+            if name == "time" and limits[name] == 0:
+                raise UsageError(f"budget '{part.strip()}': no setting takes no time; expected more, such as time=10x")
         return cls(text, tuple(limits.items()))
+
+    def check(self, kinds: Collection[str]) -> None:
+        """Raise UsageError for errors of cameras of another kind than these, dvs or cis."""
+        for name, _ in self.limits:
+            if name != "time" and ("cis" if name == "lsb" else "dvs") not in kinds:
+                raise UsageError(f"budget '{self.text}': {name} cannot be measured here; leave it out")
 
     def only_time(self) -> bool:
         """Whether it says nothing of errors."""

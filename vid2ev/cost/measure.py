@@ -117,6 +117,8 @@ def measured(
     threads = threads or usable_cores()
     options = {"tolerance": TOLERANCE, "video": video} | options
     asked = Recipe.of(**_of_recipe(options))
+    if limits is not None:
+        limits.check({mount.kind for mount in asked.mounts})
     if not asked.source.rewindable:
         raise UsageError(f"{video} passes once and cannot be converted many times over; give a file")
     options |= dict(zip(("start", "stop"), stretch := stretch_of(asked, options, duration_s, frames), strict=True))
