@@ -203,3 +203,12 @@ def test_both_poles_give_way_to_the_delay_of_both() -> None:
     distances = {row.effect: row.omission.distance for row in plan.rows}
     assert distances["photoreceptor"] < distances["follower"]
     assert plan.gone == ("photoreceptor", "follower") and plan.spec.delay_us == 214
+
+
+@pytest.mark.parametrize("effect", ["cold", "delay"])
+def test_where_nothing_moves_events_of_the_leak_are_later_or_missing_all_the_same(effect: str) -> None:
+    frames = [Frame(np.full((48, 64), 0.3, np.float32), k * 20_000_000) for k in range(60)]
+    spec = DvsSpec(**QUIET, **NO_POLES, refractory_us=0, leak_rate_hz=3.0, cold_probability=0.1, delay_us=500)
+    said = EFFECTS[effect].omission(scene_of(spec, (64, 48), frames), spec)
+    left = sent(without(spec, effect, said), (64, 48), frames)
+    assert 0 < distance(sent(spec, (64, 48), frames), left, (64, 48)) <= said.distance

@@ -57,6 +57,10 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
 
 def omission_of_cold(scene: Scene, spec: Any) -> Omission:
     """The cold pixels."""
-    share = min(surely(scene, spec.cold_probability), 1.0)
-    distance = 0.0 if scene.still else share / (2.0 - share) * scene.bunched
+    share, noisy = surely(scene, spec.cold_probability), spec.leak_rate_hz > 0 or spec.shot_rate_hz > 0
+    if noisy:
+        share = max(share, at_most(spec.cold_probability * scene.pixels) / scene.pixels)
+    share = min(share, 1.0)
+    bunched = max(scene.bunched, 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S)
+    distance = 0.0 if scene.still and not noisy else share / (2.0 - share) * bunched
     return Omission(distance, "99.9 % bound", f"{spec.cold_probability:.3g} of the events", "silent pixels")
