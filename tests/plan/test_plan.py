@@ -195,6 +195,63 @@ def test_laws_of_the_bounds() -> None:
         assert np.mean(draws > at_most(mean)) < 1e-3 and np.mean(draws < at_least(mean)) < 1e-3
 
 
+def trembling(reach_nat: float, frames: int = 300) -> list[Frame]:
+    """Light of all pixels that falls and rises, again and again, so far [nat]."""
+    level = reach_nat * np.abs((0.03 * np.arange(frames) + 0.5) % 1 * 2 - 1)
+    return [Frame(np.full((48, 64), 0.2 * np.exp(-each), np.float32), k * 1_000_000) for k, each in enumerate(level)]
+
+
+@pytest.mark.parametrize("effect", ["follower", "photoreceptor", "mismatch", "crossing_noise"])
+def test_light_that_trembles_below_the_mean_threshold_moves_pixels_of_lower_ones(effect: str) -> None:
+    size, spec, frames = (64, 48), DvsSpec(), trembling(0.12)
+    seen = scene_of(spec, size, frames)
+    said = EFFECTS[effect].omission(seen, spec)
+    full, left = sent(spec, size, frames), sent(without(spec, effect, said), size, frames)
+    assert len(full) > 50 and 0 < distance(full, left, size) <= said.distance
+
+
+def test_of_hardly_any_events_of_thresholds_that_differ_nothing_is_sure() -> None:
+    spec = DvsSpec()
+    plan = plan_of(scene_of(spec, (64, 48), trembling(0.01)), spec, 1.0)
+    assert plan.gone in ((), ("refractory",)) and "estimate" in {row.omission.kind for row in plan.rows}
+
+
+@pytest.mark.parametrize("share", [0.6, 3.0])
+def test_pixels_of_low_thresholds_send_more_densely(share: float) -> None:
+    """What is spread as far as thresholds may be: mismatch, and pixels that are silent."""
+    spec = clean(filter="after", random_phase=True, mismatch=0.1 * share, cold_probability=0.2, threshold_on=0.1)
+    spec = spec.model_copy(update={"threshold_off": 0.1})
+    phase = np.linspace(0, 6, 64)[None] + np.zeros((48, 1))
+    lights = [0.2 * np.exp(1.5 * np.sin(0.03 * k + phase)).astype(np.float32) for k in range(300)]
+    size, frames = (64, 48), [Frame(light, k * 1_000_000) for k, light in enumerate(lights)]
+    for effect in ("mismatch", "cold"):
+        said = EFFECTS[effect].omission(scene_of(spec, size, frames), spec)
+        left = sent(without(spec, effect, said), size, frames)
+        assert distance(sent(spec, size, frames), left, size) <= said.distance
+
+
+@pytest.mark.parametrize("effect", ["cold", "delay", "refractory"])
+def test_events_of_a_frame_that_come_at_once_are_dense(effect: str) -> None:
+    more = {"cold": {"cold_probability": 0.2}, "delay": {"delay_us": 300.0}, "refractory": {"refractory_us": 100.0}}
+    spec = clean(filter="after", random_phase=True, timing="frame", threshold_on=0.1, threshold_off=0.1, **more[effect])
+    bright = np.exp(1.2 * np.random.default_rng(0).random((48, 64)))
+    lights = [(0.1 * (bright if k % 2 else 1 + 0 * bright)).astype(np.float32) for k in range(20)]
+    size, frames = (64, 48), [Frame(light, k * 33_000_000) for k, light in enumerate(lights)]
+    said = EFFECTS[effect].omission(scene_of(spec, size, frames), spec)
+    left = sent(without(spec, effect, said), size, frames)
+    assert 0 < distance(sent(spec, size, frames), left, size) <= said.distance
+
+
+@pytest.mark.parametrize("curve", ["toe", "v2e"])
+def test_curves_with_a_knee_are_as_steep_as_they_are(curve: str) -> None:
+    """Light that is straight between frames: the slope is that of the curve in the darker of the two."""
+    for dark, bright in ((0.01, 0.012), (0.078, 0.0784), (0.08, 0.09), (0.5, 0.6)):
+        frames = [Frame(np.full((4, 4), light, np.float32), k * 1_000_000) for k, light in enumerate((dark, bright))]
+        slope = scene_of(clean(log_curve=curve), (4, 4), frames).slope_max[0]
+        per_nat = {"toe": 20 / 255, "v2e": 20 / 255 / math.log(20)}[curve] if dark < 20 / 255 else dark
+        assert slope == pytest.approx((bright - dark) / 1e-3 / per_nat, rel=1e-4)
+
+
 def test_both_poles_give_way_to_the_delay_of_both() -> None:
     """Also where the bound of both is the less, as their delay is nearer to a whole microsecond."""
     frames = [Frame(np.full((16, 16), 0.05 * 1.1**k, np.float32), k * 1_000_000) for k in range(30)]

@@ -15,7 +15,7 @@ from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.kernels.sink import put, room
 from vid2ev.physics.crossing_noise import noisy_thresholds
-from vid2ev.physics.mismatch import FLOOR
+from vid2ev.physics.thresholds import FLOOR
 
 SIGNAL, SHOT, LEAK, HOT = range(4)
 

@@ -39,7 +39,7 @@ from vid2ev.kernels.play import (
     WAY,
     follow,
 )
-from vid2ev.physics.log_curve import log_level_32
+from vid2ev.physics.log_curve import light_per_nat_32, log_level_32
 
 F = np.float32
 LEAST, MOST, STEEPEST = range(3)  # of a block; the rest are sums of `play`
@@ -50,7 +50,8 @@ ROUNDED = F(2.7182818)
 class Pace(NamedTuple):
     """Numbers of an interval.
 
-    half         of the threshold [nat]
+    halves       float32 [BLOCK], half of the threshold of each pixel of a block [nat]
+    half         of the threshold that all sums are taken in [nat]
     before_log   light is straight between frames, else its level; bends are relative to the light near them: that from
                  a delay of the poles before the bend to four delays after it
     dt_s         how long it is, before_s the one before it
@@ -60,8 +61,10 @@ class Pace(NamedTuple):
     smooth_s     time constant that slopes are smoothed with
     decays       float32 [STEPS + 1], what is left of a smoothed slope at each step of the interval
     tau_s        of the distance
+    at_once      whether all events of an interval come at its end
     """
 
+    halves: np.ndarray
     half: float
     before_log: bool
     dt_s: float
@@ -75,6 +78,7 @@ class Pace(NamedTuple):
     smooth_s: float
     decays: np.ndarray
     tau_s: float
+    at_once: bool
 
 
 class Seen(NamedTuple):
@@ -97,7 +101,7 @@ class Seen(NamedTuple):
 
 
 @compiled
-def settle_measure(light, shade, curve, half, found):
+def settle_measure(light, shade, curve, halves, found):
     """Begin with a frame of light [float32, n]: the play of every pixel is pushed from below."""
     state, tiles = found.state, found.tiles
     for i in range(light.size):
@@ -106,11 +110,12 @@ def settle_measure(light, shade, curve, half, found):
         tile[LEAST], tile[MOST] = min(tile[LEAST], seen), max(tile[MOST], seen)
         level = log_level_32(seen, curve)
         at = (i // BLOCK) * PLANES * PITCH + i % BLOCK
-        state[at + LIGHT * PITCH], state[at + LEVEL * PITCH], state[at + PLAY * PITCH] = seen, level, level - F(half)
+        state[at + LIGHT * PITCH], state[at + LEVEL * PITCH] = seen, level
+        state[at + PLAY * PITCH] = level - halves[i % BLOCK]
         for plane in (SLOPE, WAY, BENDS, SMOOTH):
             state[at + plane * PITCH] = F(0.0)
     if len(found.bare):
-        settle_bare(light, curve, half, state, found.bare[0].state)
+        settle_bare(light, curve, halves, state, found.bare[0].state)
     found.calm[:] = CALM
     found.owed[:, :, 0], found.owed[:, :, 1] = F(0.0), F(1.0)
 
@@ -134,29 +139,29 @@ def measure_blocks(first, last, light, told, shade, curve, num, found, work):
         while stop < n:
             start, stop = next_run(stop, n, calm)
             if stop > start:
-                part = look(own[start:], scratch[start:], flagged[start:], stop - start, curve, num)
+                part = look(own[start:], scratch[start:], flagged[start:], num.halves[start:], stop - start, curve, num)
                 tile[LEAST], tile[MOST] = min(tile[LEAST], part[0]), max(tile[MOST], part[1])
                 tile[STEEPEST] = max(tile[STEEPEST], part[2])
         count = hits_of(flagged, hits)
         if count > 0:
-            follow(count, hits, curve.floor, num, own, scratch, lanes, tile, found.spread[k])
+            follow(count, hits, curve, num, own, scratch, lanes, tile, found.spread[k])
         if len(found.bare):
             beside(k, lit, curve, num, own, work, calm, found.bare[0])
 
 
 @compiled
-def look(own, scratch, flagged, n, curve, num):
+def look(own, scratch, flagged, halves, n, curve, num):
     """What each of n pixels has, into state and scratch, and which ones are pushed or were; returns least and most
     light and the greatest slope."""
     least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
-    before_log, rate, half, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.half), F(num.decays[STEPS])
+    before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.decays[STEPS])
     tau2, longest_back, longest_ahead = F(num.tau2_s), F(num.before_s), F(num.dt_s)
     slow, keep = F(num.tau1_s), left_of(longest_ahead, max(F(num.tau1_s), tau2))
     for i in range(n):
         seen, old, slope0 = scratch[SEEN + i], own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
         level, level0 = log_level_32(seen, curve), own[LEVEL * PITCH + i]
         risen, dimmer = seen - old, min(seen, old)
-        speed = abs(risen) * rate / (dimmer + F(curve.floor))
+        speed = abs(risen) * rate / light_per_nat_32(dimmer, curve)
         slope = risen * rate
         if not before_log:
             slope = (level - level0) * rate
@@ -166,10 +171,10 @@ def look(own, scratch, flagged, n, curve, num):
             keep = left_of(longest_ahead, max(slow, tau2))
         back, ahead = min(slow + tau2, longest_back), min(F(4.0) * (slow + tau2), longest_ahead)
         near = max(min(old, min(old - slope0 * back, old + slope * ahead)), F(0.0))
-        per = F(1.0) / (near + F(curve.floor)) if before_log else F(1.0)
+        per = F(1.0) / light_per_nat_32(near, curve) if before_log else F(1.0)
         bend, bends = abs(slope - slope0) * per, own[BENDS * PITCH + i]
         turned = min(bend, ROUNDED * np.sqrt(abs(slope * slope0)) * per)
-        smooth, play = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i]
+        smooth, play, half = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i], halves[i]
         own[LIGHT * PITCH + i], own[SLOPE * PITCH + i], own[BENDS * PITCH + i] = seen, slope, (bends + bend) * keep
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
         own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend

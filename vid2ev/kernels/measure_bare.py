@@ -45,7 +45,7 @@ class Bare(NamedTuple):
 
 
 @compiled
-def settle_bare(light, curve, half, state, bare):
+def settle_bare(light, curve, halves, state, bare):
     """Begin with a frame of light [float32, n], when the shaded light has."""
     for i in range(light.size):
         own = state[(i // BLOCK) * PLANES * PITCH :]
@@ -53,7 +53,7 @@ def settle_bare(light, curve, half, state, bare):
         level = own[LEVEL * PITCH + k]
         bare[at + BARE * PITCH] = log_level_32(arriving(light[i]), curve)
         bare[at + OFFSET * PITCH] = bare[at + BARE * PITCH] - level
-        bare[at + BARE_PLAY * PITCH] = bare[at + BARE * PITCH] - F(half)
+        bare[at + BARE_PLAY * PITCH] = bare[at + BARE * PITCH] - halves[k]
         bare[at + SHADED_PLAY * PITCH] = own[PLAY * PITCH + k]
         bare[at + BARE_WAY * PITCH] = bare[at + SHADED_WAY * PITCH] = F(0.0)
 
@@ -71,23 +71,22 @@ def beside(k, light, curve, num, own, work, calm, bare):
     while stop < light.size:
         start, stop = next_run(stop, light.size, calm)
         if stop > start:
-            bare_levels(light[start:stop], curve, num, other[start:], scratch[start:], flagged[start:])
+            bare_levels(light[start:stop], curve, num.halves[start:], other[start:], scratch[start:], flagged[start:])
     count = hits_of(flagged, hits)
     for j in range(count):
         i = np.uintp(hits[j])
         lanes[GONE + j] = max(abs(own[LEVEL * PITCH + i] - scratch[BEFORE + i]), F(1e-30))
     for j in range(count):
-        lanes[LOST + j] = apart(lanes[GONE + j], num)
+        lanes[LOST + j] = apart(lanes[GONE + j], num.halves[np.uintp(hits[j])], num)
     if count > 0:
         compare(count, hits, num, own, other, scratch, lanes, bare.tiles[k], bare.spread[k])
 
 
 @compiled
-def bare_levels(light, curve, num, other, scratch, flagged):
+def bare_levels(light, curve, halves, other, scratch, flagged):
     """The bare levels of pixels, those before them into scratch, and flags for those that are pushed or were."""
-    half = F(num.half)
     for i in range(light.size):
-        level, play = log_level_32(arriving(light[i]), curve), other[BARE_PLAY * PITCH + i]
+        level, play, half = log_level_32(arriving(light[i]), curve), other[BARE_PLAY * PITCH + i], halves[i]
         scratch[BARE_BEFORE + i], other[BARE * PITCH + i] = other[BARE * PITCH + i], level
         pushed = (level - half > play) | (level + half < play) | (other[BARE_WAY * PITCH + i] != F(0.0))
         flagged[i] = np.uint8(flagged[i] | np.uint8(pushed))
@@ -97,9 +96,11 @@ def bare_levels(light, curve, num, other, scratch, flagged):
 def compare(count, hits, num, own, other, scratch, lanes, tile, spread):
     """The two signals of the pixels in `hits`, of each of which one is pushed or was, from where they were before to
     where the shaded one is in `own`."""
-    half, frozen, travelled, apart_s = F(num.half), 0.0, 0.0, 0.0
+    frozen = travelled = apart_s = 0.0
     for j in range(count):
         i = np.uintp(hits[j])
+        half = num.halves[i]
+        weight = F(num.half) / half
         level, play, offset = other[BARE * PITCH + i], other[BARE_PLAY * PITCH + i], other[OFFSET * PITCH + i]
         pushed, way = F(level - half > play) - F(level + half < play), own[WAY * PITCH + i]
         way0, shaded_way0 = other[BARE_WAY * PITCH + i], other[SHADED_WAY * PITCH + i]
@@ -107,7 +108,7 @@ def compare(count, hits, num, own, other, scratch, lanes, tile, spread):
         apart0 = abs(shaded_play0 - (play - offset))
         turns = F((way0 != F(0.0)) & (pushed != way0)) + F((shaded_way0 != F(0.0)) & (way != shaded_way0))
         if turns != F(0.0):
-            here = turns * levels(apart0 + other[STIRRED * PITCH + i], half)
+            here = weight * turns * levels(apart0 + other[STIRRED * PITCH + i], half)
             frozen += here
             other[AT_TURNS * PITCH + i] += here
         other[BARE_WAY * PITCH + i], other[SHADED_WAY * PITCH + i] = pushed, way
@@ -125,9 +126,9 @@ def compare(count, hits, num, own, other, scratch, lanes, tile, spread):
         )
         share = min(max(moved / max(abs(level - level0), F(1e-30)), shaded_moved / lanes[GONE + j]), F(1.0))
         far = max(apart0, max(abs(off0), abs(off))) + other[STIRRED * PITCH + i]
-        apart_s += share * levels(far, half)
-        travelled += moved
-        note(spread, 0, other[AT_TURNS * PITCH + i], shaded_moved * lanes[LOST + j])
+        apart_s += weight * share * levels(far, half)
+        travelled += weight * moved
+        note(spread, 0, other[AT_TURNS * PITCH + i], weight * shaded_moved * lanes[LOST + j])
         if pushed != F(0.0):
             other[BARE_PLAY * PITCH + i] = level - pushed * half
         other[SHADED_PLAY * PITCH + i] = shaded_play

@@ -1,7 +1,8 @@
 """The play of pixels that are pushed or were until now (`vid2ev.stream.scene`), and the sums that are taken of it.
 
 Those of a block go to lanes: first what takes numbers alone, for all of them in vector code, then the sums, pixel after
-pixel in their order.
+pixel in their order.  What a pixel adds to a sum weighs as many mean thresholds as its own is part of: its travel is
+that of its events at the mean threshold.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernel_intrinsics import bits_32
 from vid2ev.kernels.layout import PITCH
 from vid2ev.physics.elementary import expm1_32
+from vid2ev.physics.log_curve import light_per_nat_32
 
 F = np.float32
 # Planes of the state of a block, in units of PITCH; the last two are of memories that jump to the signal.
@@ -23,8 +25,8 @@ SEEN, BEFORE, SMOOTHED, BENT, IF_TURNED, FELT, STEEPER, BARE_BEFORE = (k * PITCH
 SCRATCH = 8 * PITCH
 # Planes of the lanes: what is taken from a pixel, and what is found for it.
 AT_LEVEL, AT_PLAY, FROM, AT_SLOPE, AT_SMOOTH, AT_LIGHT = (k * PITCH for k in range(6))
-PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(6, 14))
-LANES = 14 * PITCH
+AT_HALF, PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(6, 15))
+LANES = 15 * PITCH
 TRAVELLED, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(3, 9)  # sums of a block, after its extremes
 FIGURES = 9
 # How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
@@ -37,15 +39,15 @@ PER_MS2 = F(1e-6)  # of 1/s^2, so that sums are within the quarters
 
 
 @inner
-def follow(count, hits, floor, num, own, scratch, lanes, tile, spread):
+def follow(count, hits, curve, num, own, scratch, lanes, tile, spread):
     """The play of the pixels in `hits`, from the levels in scratch to those in `own`; sums into tile and spread."""
-    gather(count, hits, own, scratch, lanes)
-    push(count, floor, num, lanes)
-    add_up(count, hits, floor, num, own, scratch, lanes, tile, spread)
+    gather(count, hits, num, own, scratch, lanes)
+    push(count, curve, num, lanes)
+    add_up(count, hits, curve, num, own, scratch, lanes, tile, spread)
 
 
 @compiled
-def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
+def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     """Move the plays of the pixels in `hits`, one after the other, and take their sums.
 
     A pixel that begins to be pushed brings the bends that it still feels; one that was counts each of its own, and
@@ -53,22 +55,23 @@ def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
     """
     # (sums in numbers of their own: an entry of an array would go through memory each time)
     travelled = pushed_s = turns = bends = turn_bends = dense = 0.0
-    half, dt = F(num.half), num.dt_s
+    mean, dt = F(num.half), num.dt_s
     for k in range(count):
-        i, pushed = np.uintp(hits[k]), lanes[k + PUSHED]
+        i, pushed, half = np.uintp(hits[k]), lanes[k + PUSHED], lanes[k + AT_HALF]
+        weight = mean / half
         way = own[WAY * PITCH + i]
-        bend = scratch[FELT + i] if way == F(0.0) else scratch[BENT + i]
+        bend = weight * (scratch[FELT + i] if way == F(0.0) else scratch[BENT + i])
         bends += bend
         if len(num.tracks):
             own[STIRS * PITCH + i] += PER_MS2 * bend * scratch[STEEPER + i] / (half + half)
         if way != F(0.0) and pushed != way:
-            turned = scratch[IF_TURNED + i]
-            turns += 1.0
+            turned = weight * scratch[IF_TURNED + i]
+            turns += weight
             turn_bends += turned
-            own[TURNS * PITCH + i] += F(1.0)
+            own[TURNS * PITCH + i] += weight
             own[TURNED_BENDS * PITCH + i] += turned
             if len(num.tracks):
-                note(spread, BY_STIRS_AT_TURNS, own[STIRS * PITCH + i], half + half)
+                note(spread, BY_STIRS_AT_TURNS, own[STIRS * PITCH + i], mean + mean)
                 own[STIRS_AT_TURNS * PITCH + i] += own[STIRS * PITCH + i]
         own[WAY * PITCH + i] = pushed
         if pushed == F(0.0):
@@ -85,7 +88,7 @@ def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
             note(spread, BY_STIRS, F(own[STIRS * PITCH + i] * here_s / max(moved, F(1e-30))), moved)
             note(spread, BY_STIRS_BEFORE, own[STIRS_AT_TURNS * PITCH + i], lost)
         if gone > F(SMALL_NAT):
-            dense += pace(i, moved, gone, floor, num, own, spread, scratch)
+            dense += weight * pace(i, moved, gone, curve, num, own, spread, scratch)
             continue
         note(spread, BY_SLOPE, lanes[STEEP + k], moved)
         note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
@@ -99,57 +102,61 @@ def add_up(count, hits, floor, num, own, scratch, lanes, tile, spread):
 
 
 @inner
-def gather(count, hits, own, scratch, lanes):
+def gather(count, hits, num, own, scratch, lanes):
     """What is known of the pixels in `hits` into lanes."""
     for k in range(count):
         i = hits[k]
+        lanes[AT_HALF + k] = num.halves[i]
         lanes[AT_LEVEL + k], lanes[AT_PLAY + k] = own[LEVEL * PITCH + i], own[PLAY * PITCH + i]
         lanes[FROM + k], lanes[AT_SMOOTH + k] = scratch[BEFORE + i], scratch[SMOOTHED + i]
         lanes[AT_SLOPE + k], lanes[AT_LIGHT + k] = own[SLOPE * PITCH + i], own[LIGHT * PITCH + i]
 
 
 @inner
-def push(count, floor, num, lanes):
+def push(count, curve, num, lanes):
     """How far and which way each is pushed, and what follows from that if it is not far."""
-    half, dt, tau, smooth_s = F(num.half), F(num.dt_s), F(num.tau_s), F(num.smooth_s)
-    before_log, black, blind = num.before_log, F(floor), F(num.blind_s / (num.dt_s * 2.0 * num.half))
+    dt, tau, smooth_s, mean = F(num.dt_s), F(num.tau_s), F(num.smooth_s), F(num.half)
+    before_log, blind = num.before_log, F(num.blind_s / (num.dt_s * 2.0 * num.half))
     whole, first, kept = F(1.0 + 2.0 * num.tau_s / num.dt_s), num.decays[0], num.decays[STEPS]
     for k in range(count):
-        level, play = lanes[AT_LEVEL + k], lanes[AT_PLAY + k]
+        level, play, half = lanes[AT_LEVEL + k], lanes[AT_PLAY + k], lanes[AT_HALF + k]
+        weight = mean / half
         pushed = F(level - half > play) - F(level + half < play)
         gone = abs(level - lanes[FROM + k])
         moved = abs(level - pushed * half - play) if pushed != F(0.0) else F(0.0)
         share = min(moved / max(gone, F(1e-30)), F(1.0))
         if len(num.tracks):
-            sent = F(1.0) / (F(1.0) + gone * blind)  # (events are theta + the blind time's way apart)
+            sent = F(1.0) / (F(1.0) + gone * blind * weight)  # (events are theta + the blind time's way apart)
             moved, share = moved * sent, share * sent
+        moved, share = moved * weight, share * weight
         lanes[PUSHED + k], lanes[MOVED + k], lanes[GONE + k] = pushed, moved, gone
-        lanes[SHARE + k], lanes[LOST + k] = share, moved * apart(gone, num)
+        lanes[SHARE + k], lanes[LOST + k] = share, moved * apart(gone, half, num)
         slope, light1 = lanes[AT_SLOPE + k], lanes[AT_LIGHT + k]
         smooth0 = slope + (lanes[AT_SMOOTH + k] - slope) * first
         smooth1, light0 = slope + (smooth0 - slope) * kept, light1
         near0 = near1 = F(1.0)
         if before_log:
             light0 = light1 - slope * dt
-            near0, near1 = (
-                max(light0 - smooth_s * smooth0, F(0.0)) + black,
-                max(light1 - smooth_s * smooth1, F(0.0)) + black,
-            )
+            near0 = light_per_nat_32(max(light0 - smooth_s * smooth0, F(0.0)), curve)
+            near1 = light_per_nat_32(max(light1 - smooth_s * smooth1, F(0.0)), curve)
         steep = max(abs(smooth0) / near0, abs(smooth1) / near1)
         lanes[STEEP + k], lanes[DIMMEST + k] = steep, max(min(light0, light1), F(0.0))
-        lanes[BUNCHED + k] = min(F(2.0) * tau * steep, gone * whole)
+        within, bare = gone * whole, abs(slope)
+        if before_log:
+            bare = bare / light_per_nat_32(lanes[DIMMEST + k], curve)
+        lanes[BUNCHED + k] = weight * (within if num.at_once else min(F(2.0) * tau * max(steep, bare), within))
 
 
 @inner
-def apart(gone, num):
+def apart(gone, half, num):
     """What two events that should be one cost at most, if between them there is a share of the gap from event to event
     and the rest to the next: 1 - exp(-gap / (2 tau)), at the least slope of an interval that goes so many nats."""
     slope = max(-expm1_32(-gone) / F(num.dt_s), F(1e-12))
-    return -expm1_32(F(-0.5 / num.tau_s) * (F(2.0 * num.half) / slope + F(num.blind_s)))
+    return -expm1_32(F(-0.5 / num.tau_s) * ((half + half) / slope + F(num.blind_s)))
 
 
 @inner
-def pace(i, moved, gone, floor, num, own, spread, scratch):
+def pace(i, moved, gone, curve, num, own, spread, scratch):
     """Spread a travel over the slopes of the smoothed signal in the interval, each as much as it goes at them."""
     slope, smooth0 = own[SLOPE * PITCH + i], scratch[SMOOTHED + i]
     old, width = own[LIGHT * PITCH + i] - slope * F(num.dt_s), F(num.dt_s) / F(STEPS)
@@ -159,16 +166,20 @@ def pace(i, moved, gone, floor, num, own, spread, scratch):
         for step in range(STEPS + 1):
             smooth = slope + (smooth0 - slope) * num.decays[step]
             light = old + slope * width * F(step) if num.before_log else own[LIGHT * PITCH + i]
-            near = max(light - F(num.smooth_s) * smooth, F(0.0)) + F(floor) if num.before_log else F(1.0)
+            dim = max(light - F(num.smooth_s) * smooth, F(0.0))
+            near = light_per_nat_32(dim, curve) if num.before_log else F(1.0)
             here = abs(smooth) / near
             if step > 0 and turn == 0:
                 whole += before + here
             elif step > 0:
                 part, steep = moved * (before + here) / whole, max(before, here)
+                bare = abs(slope) / (
+                    light_per_nat_32(max(min(light, light0), F(0.0)), curve) if num.before_log else F(1.0)
+                )
                 note(spread, BY_SLOPE, steep, part)
                 note(spread, BY_LIGHT, max(min(light, light0), F(0.0)), part)
                 within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
-                dense += part * min(F(2.0 * num.tau_s) * steep, within)
+                dense += part * (within if num.at_once else min(F(2.0 * num.tau_s) * max(steep, bare), within))
             before, light0 = here, light
     return dense
 

@@ -15,7 +15,7 @@ from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value
 from vid2ev.kernels.layout import HIGH, LAG1, LANE_COUNT, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW1, turns_at
-from vid2ev.physics.mismatch import FLOOR
+from vid2ev.physics.thresholds import FLOOR
 
 
 @inner

@@ -104,7 +104,7 @@ class EventFrames:
 def omission(scene: Scene, spec: Any) -> Omission:
     """The readout's clock."""
     why = "all times are those of the readout; never left out"
-    return omitted(scene, spec, math.inf, f"at most {latest_us(spec):.3g} us", why)
+    return omitted(scene, spec, math.inf, f"at most {latest_us(spec):.3g} us", why, lag_s=1e-6 * latest_us(spec))
 
 
 def latest_us(spec: Any) -> float:

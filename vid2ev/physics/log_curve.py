@@ -80,6 +80,13 @@ def log_slope(light, curve):
 
 
 @compiled
+def light_per_nat_32(light, curve):
+    """The light >= 0 that a change by a share of a nat is that share of (float32): 1 / slope of `log_level`, which is
+    nowhere greater than in the dark."""
+    return F(curve.floor) if light < F(curve.knee) else light + F(curve.dark)
+
+
+@compiled
 def log_level_32(light, curve):
     """`log_level` in float32, for the scan."""
     knee = F(curve.knee)

@@ -23,9 +23,9 @@ from pydantic import BaseModel, Field
 from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
+from vid2ev.physics.thresholds import FLOOR
 from vid2ev.stream.scene import Omission, Scene
 
-FLOOR = 0.1  # smallest threshold, as a share of the mean
 CHUNK = 1024  # pixels drawn for at a time
 
 

@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.physics.slopes import slopes_of
+from vid2ev.physics.thresholds import soon, spread_of
 from vid2ev.stream.bounds import at_least, at_most, off_by, surely, unlike
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 
@@ -56,7 +58,7 @@ def crowding(spec: Any, scene: Scene) -> float:
     Shot noise sets levels a threshold from the signal, and so does a memory that jumps to the signal as it comes to
     rest: of the pixels that these may reach, levels are spread as those of pixels in step are.
     """
-    spread = math.hypot(spec.mismatch, spec.crossing_noise)
+    spread = spread_of(spec)
     if spread == 0.0:
         return 1.0 if spec.random_phase else math.inf
     in_step = max(min(spec.threshold_on, spec.threshold_off) / (spread * math.sqrt(2.0 * math.pi)), 1.0)
@@ -93,14 +95,34 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def light_events(scene: Scene, spec: Any) -> float:
-    """How many events of light there are at least, on average: what the poles round off at turns is missing;
-    of pixels in step, up to one for each time that they are pushed."""
+    """How many events of light there are at least, on average."""
+    crossings = scene.travel_at_least / scene.threshold - _missing(scene, spec)
+    return max(crossings, 0.0) * (1.0 - unsent(scene, spec))
+
+
+def unsent(scene: Scene, spec: Any) -> float:
+    """The share of the crossings of light, at most, of which nothing is sent, as an event has just been: within the
+    refractory period, or in the same event frame."""
+    blind_us = spec.refractory_us if spec.refractory == "quantised" else 0.0
+    blind_s = 1e-6 * max(blind_us, 1e6 / spec.frame_rate_hz if spec.frame_rate_hz > 0 else 0.0)
+    if blind_s == 0.0 or scene.still:
+        return 0.0
+    if spec.timing == "frame":
+        return 1.0
+    leaked, (travel, _) = spec.leak_rate_hz * spec.threshold_on * blind_s, scene.by_slope
+    slopes, seen = slopes_of(scene, spec), np.flatnonzero(travel)
+    chances = [soon(slopes[k] * blind_s + leaked, spec)[0] for k in seen]
+    return min(float(np.dot(chances, travel[seen])) / float(travel.sum()), 1.0)
+
+
+def _missing(scene: Scene, spec: Any) -> float:
+    """How many events the poles round off at turns; of pixels in step, up to one for each time that they are pushed."""
     _, slowest_us = taus_of(scene, spec)
     reach_s = 0.5e-6 * np.hypot(slowest_us, spec.follower_tau_us)
     missing = 2.0 * float(np.dot(reach_s, scene.bend_at_turns)) / scene.threshold
     if not spec.random_phase:
         missing += float(scene.turns.sum()) + scene.moving
-    return max(scene.events - missing, 0.0)
+    return missing
 
 
 def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
@@ -141,7 +163,7 @@ def omitted(
     Where memories jump to the signal, it is an estimate (`kind_of`), unless it is how dense events are that counts.
     """
     kind: Kind = "99.9 % bound"
-    spread = math.hypot(spec.mismatch, spec.crossing_noise)
+    spread = spread_of(spec)
     if scene.still and not spec.leak_rate_hz:
         return Omission(0.0, "99.9 % bound", figure, why, replace)
     noise, most = noise_events(scene, spec)
@@ -153,7 +175,9 @@ def omitted(
     distance = max(unlike(scene, lag_s), 1.0) * share
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
-        near = mean * light / max(light_events(scene, spec) + noise, 1e-9)
+        sent = 1.0 - unsent(scene, spec)
+        near = mean + (1.0 - sent) * unlike(scene, lag_s)
+        near *= light / max(sent * max(scene.events - _missing(scene, spec), 0.0) + noise, 1e-9)
         distance, kind = (near, kind_of(spec)) if near < distance else (distance, kind)
     return Omission(surely(scene, distance / share) * share, kind, figure, why, replace)
 

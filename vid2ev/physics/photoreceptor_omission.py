@@ -24,36 +24,12 @@ import numpy as np
 
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import echoes, late_noise, omitted, tau_at, taus_of, tracks
+from vid2ev.physics.slopes import slopes_at
 from vid2ev.stream.bounds import delayed, later
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 
 FOLLOWER_OFF: dict[str, Any] = {"follower_tau_us": 0.0}
 BOTH_OFF: dict[str, Any] = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0, "bandwidth": "constant"}
-
-
-def steepest(scene: Scene, spec: Any) -> np.ndarray:
-    """Bound on the slope of the comparator's input [tiles, nat/s].
-
-    A filtered signal's slope is a mean of its input's (and before the log both are means by one weight).  A pole that
-    is faster in the light may follow a change in the dark with the speed of the light.
-    """
-    if spec.bandwidth != "light" or spec.photoreceptor_tau_us == 0:
-        return scene.slope_max
-    dark = min(spec.bandwidth_dark, spec.dark_level) if spec.log_curve == "offset" else spec.bandwidth_dark
-    return scene.slope_max * (scene.light_max + spec.bandwidth_dark) / (scene.light_min + dark)
-
-
-def slopes_of(scene: Scene, spec: Any) -> np.ndarray:
-    """Bound on the slope of the comparator's input in each quarter of an octave of `Scene.by_slope` [nat/s]."""
-    faster = float((steepest(scene, spec) / np.maximum(scene.slope_max, 1e-30)).max())
-    return slopes_at(scene) * max(faster, 1.0)
-
-
-def slopes_at(scene: Scene) -> np.ndarray:
-    """The greatest slope in each quarter of an octave of `Scene.by_slope` [nat/s]."""
-    slopes = np.minimum(QUARTER_EDGES[1:], float(scene.slope_max.max()))
-    slopes[-1] = float(scene.slope_max.max())
-    return slopes
 
 
 def omission_of_follower(scene: Scene, spec: Any) -> Omission:

@@ -21,9 +21,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.crossing_noise import chances_below
 from vid2ev.physics.omission import crowding, light_events, noise_events, omitted
-from vid2ev.physics.photoreceptor_omission import slopes_of, steepest
+from vid2ev.physics.slopes import slopes_of, steepest
+from vid2ev.physics.thresholds import soon
 from vid2ev.stream.bounds import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
@@ -47,6 +47,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
     if spec.refractory == "track":
         return omitted(scene, spec, math.inf, figure, "the memory jumps to the signal when the period ends")
+    if spec.timing == "frame":
+        return omitted(scene, spec, math.inf, figure, "all events of a frame come at once")
     if spec.photoreceptor_noise > 0:
         return omitted(scene, spec, math.inf, figure, "events of noise may come at any time")
     leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
@@ -54,11 +56,11 @@ def omission(scene: Scene, spec: Any) -> Omission:
     swallowed, cost = 0.0, 0.0  # travel [nat], and what it costs in units of an event that is missing
     for slope, travel in zip(slopes_of(scene, spec), scene.by_slope[0], strict=True):
         if travel > 0.0:
-            chance, chance_again = _swallowed(slope * spec.refractory_us * 1e-6 + leaked, spec)
+            chance, chance_again = soon(slope * spec.refractory_us * 1e-6 + leaked, spec)
             swallowed += chance * travel
             cost += chance * travel * (1.0 + min(2.0 * DISTANCE_TAU_S * slope / scene.threshold, most) * chance_again)
     noise = _swallowed_with_noise(scene, spec)
-    if swallowed == 0.0 and noise == 0.0:
+    if noise == 0.0 and soon(way + leaked, spec)[0] == 0.0:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
     total = float(scene.travel.sum())
     why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
@@ -84,12 +86,3 @@ def _swallowed_with_noise(scene: Scene, spec: Any) -> float:
     leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
     pairs = 2.0 * (light + leaked) * rate_hz + squared * scene.pixels * scene.seconds
     return blind_s * pairs
-
-
-def _swallowed(way_nat: float, spec: Any) -> tuple[float, float]:
-    """Bound on the chance that a crossing comes within the period, in which the signal goes so far, and on that of
-    another in its pixel."""
-    ways = (chances_below(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
-    chances = max(ways, key=lambda each: float(each.sum()))
-    once = float(chances.mean())
-    return once, float((chances**2).mean()) / once if once > 0.0 else 0.0

@@ -17,6 +17,7 @@ from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import tracks
 from vid2ev.physics.shading import shading_map
+from vid2ev.physics.thresholds import spread_thresholds
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.frames import Frame
@@ -40,6 +41,7 @@ class Measure:
         self.spec, self.size = spec, (width, height)
         self._curve = curve_of(spec.log_curve, spec.dark_level)
         self._half = 0.5 * min(spec.threshold_on, spec.threshold_off)
+        self._halves = (0.5 * spread_thresholds(2 * self._half, spec, BLOCK)).astype(np.float32)
         self._shade = shading_map(spec.shading, width, height).ravel() if spec.shading else np.empty(0, np.float32)
         blocks = -(-width * height // BLOCK)
         self._found = Seen(
@@ -71,7 +73,7 @@ class Measure:
             raise UsageError(f"frame time {frame.t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames")
         light = np.ascontiguousarray(frame.light, np.float32).reshape(-1)
         if self._t_ns is None or frame.cut:
-            settle_measure(light, self._shade, self._curve, self._half, self._found)
+            settle_measure(light, self._shade, self._curve, self._halves, self._found)
             self._dt_s = math.inf
         else:
             self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
@@ -91,6 +93,7 @@ class Measure:
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
+            travel_at_least=self._at_least(travel),
             by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
             **dict(zip(SPREAD, _spread(self._found.spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
@@ -103,6 +106,7 @@ class Measure:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
         steps = np.arange(STEPS + 1) * (dt_s / STEPS)
         pace = Pace(
+            halves=self._halves,
             half=self._half,
             before_log=self.spec.filter == "before",
             dt_s=dt_s,
@@ -116,6 +120,7 @@ class Measure:
             smooth_s=smooth_s,
             decays=np.exp(-steps / smooth_s).astype(np.float32) if smooth_s else np.zeros(STEPS + 1, np.float32),
             tau_s=DISTANCE_TAU_S,
+            at_once=self.spec.timing == "frame",
         )
         self._cut.each_blocks(
             lambda k, first, last: measure_blocks(
@@ -123,6 +128,13 @@ class Measure:
             )
         )
         self._dt_s = dt_s
+
+    def _at_least(self, travel: np.ndarray) -> float:
+        """The travel [nat] that is there at least: where pixels keep a threshold until it is crossed, trembling light
+        leaves them at greater ones than are drawn, so those of the greater half stand for all."""
+        if self.spec.crossing_noise == 0:
+            return float(travel.sum())
+        return 2.0 * float(travel[:, :BLOCK][:, self._halves >= np.float32(self._half)].sum())
 
     def _plane(self, plane: int) -> np.ndarray:
         """A plane of the state [tiles, PITCH]; beyond the pixels there is nothing."""

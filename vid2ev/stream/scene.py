@@ -19,7 +19,10 @@ time A and turn C times, and signals that differ by e,
     distance <= (1 + min(1, 2 e/theta)) (e A / tau + e C) / (n theta)
 
 Where thresholds differ from pixel to pixel or crossing to crossing, two recordings of a pixel that disagree at a turn
-go on with other levels: each event after it is up to theta / |dy/dt| early or late (`echo`).
+go on with other levels: each event after it is up to theta / |dy/dt| early or late (`echo`).  A signal that stays
+within theta moves the pixels whose thresholds are lower, and these send the more, and more densely.  So each pixel is
+measured with a threshold of its own, spread as the sensor's are, of 2048 that stand for all, and what it adds to a sum
+weighs theta / its own: all sums are those of events, times the mean theta.
 
 **Memories that jump to the signal** a blind time R after each event (`refractory = "track"`) follow each other by
 t -> t':  y(t') = y(t + R) +- theta.  Events are theta + R |dy/dt| of the signal apart, so travel is counted as that
@@ -94,10 +97,11 @@ class Scene:
     """What a sensor sees of a clip: extremes and sums over all pixels, by tiles of 2048 pixels in row-major order.
 
     pixels, frames, seconds   how much was measured; seconds without the intervals before cuts
-    threshold                 that events are counted with [nat]
+    threshold                 that events are counted with [nat]: the lesser mean
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
     travel                    [tiles] sum |dp| [nat]: events expected, times the threshold
+    travel_at_least           of all tiles, whatever the noise at crossings does [nat]
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
@@ -127,6 +131,7 @@ class Scene:
     light_max: np.ndarray
     slope_max: np.ndarray
     travel: np.ndarray
+    travel_at_least: float
     pushed_s: np.ndarray
     turns: np.ndarray
     bend: np.ndarray
