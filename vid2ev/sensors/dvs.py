@@ -112,7 +112,7 @@ class Dvs:
         flat, table = self._light(light)
         sent = self._pixels.walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of([still], [self._seen]))
         self._seen = light
-        return self._in_order(sent, 0, t_ns)
+        return self._in_order(sent, [t_ns])[0]
 
     def steps(self, light: np.ndarray, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames].
@@ -288,8 +288,7 @@ class Dvs:
         if self._t_ns is None and t_ns:
             yield Events.empty(self.labels)  # (of the frame in which it settles)
         for sent, times in self._through(light, clip, t_ns):
-            for k, t in enumerate(times):
-                yield self._in_order(sent, k, t)
+            yield from self._in_order(sent, times)
 
     def _through(self, light: np.ndarray, clip: int, t_ns: list[int]) -> Iterator[tuple[Sent, list[int]]]:
         """What is sent in the frames of a clip of light [frames, clips, height, width], some at a time; their times."""
@@ -313,11 +312,11 @@ class Dvs:
         told = told_of([frame.still for frame in frames], [self._seen, *lights[:-1]])
         sent = self._pixels.walk(flat, 0, 1, table, self._steps_to(t_ns), told)
         self._seen = lights[-1]
-        return [self._in_order(sent, k, t) for k, t in enumerate(t_ns)]
+        return self._in_order(sent, t_ns)
 
-    def _in_order(self, sent: Sent, frame: int, t_ns: int) -> Events:
-        """The events of a frame of those that went through the walk together."""
-        return self._readout.push(sent.ordered(frame, self._pixels.tiles.each), t_ns)
+    def _in_order(self, sent: Sent, t_ns: Sequence[int]) -> list[Events]:
+        """The events of each of the frames that went through the walk together."""
+        return [self._readout.push(*each) for each in zip(sent.ordered(self._pixels.tiles.each), t_ns, strict=True)]
 
 
 def _goes_on(kind: np.dtype, frame: Frame) -> bool:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vid2ev.kernels.layout import Interval
 from vid2ev.kernels.order import order_keys, unpack, unpack_frames
 from vid2ev.stream.events import Events
+
+Each = Callable[[Callable[[int], None]], Any]
 
 WORTH_THREADS = 1 << 15  # events that take longer to put in order than threads take to wake
 
@@ -37,16 +38,37 @@ class Sent:
     width: int
     labels: bool
 
-    def ordered(self, frame: int, each: Callable) -> Events:
-        """The events of a frame; `each` does a work for all numbers of parts, at the same time."""
+    def ordered(self, each: Each) -> list[Events]:
+        """The events of each frame; `each` does a work for all numbers of parts, at the same time: frame beside frame,
+        or, where there are too few for that, each frame by all."""
+        count, frames = len(self.parts), len(self.intervals)
+        counts = sum(np.diff(part.ends.ravel(), prepend=0).reshape(part.ends.shape).sum(axis=0) for part in self.parts)
+        if frames < count or np.sum(counts) <= WORTH_THREADS:
+            keys = np.empty(int(np.max(counts)), np.uint64)
+            return [self._ordered(k, keys, each if counts[k] > WORTH_THREADS else self._alone) for k in range(frames)]
+        made, waiting = [Events.empty()] * frames, iter(range(frames))
+
+        def some(_: int) -> None:
+            keys = np.empty(int(np.max(counts)), np.uint64)
+            for k in waiting:  # (of all: each takes one that none has taken)
+                made[k] = self._ordered(k, keys, self._alone)
+
+        each(some)
+        return made
+
+    def _alone(self, work: Callable[[int], None]) -> None:
+        """`each`, one after the other."""
+        for k in range(len(self.parts)):
+            work(k)
+
+    def _ordered(self, frame: int, keys: np.ndarray, work: Each) -> Events:
+        """The events of a frame, for which there is room in `keys`."""
         runs = [part.runs(frame) for part in self.parts]
         ends = np.cumsum([0, *(int((stops - begins).sum()) for begins, stops in runs)])
         n, count, interval = int(ends[-1]), len(runs), self.intervals[frame]
         if n == 0:
             return Events.empty(self.labels)
-        keys = self._keys[:n]
         t, x, y, p, label = self._room(n)
-        work = each if n > WORTH_THREADS else lambda part: [part(k) for k in range(count)]
         work(lambda k: order_keys(self.parts[k].keys, *runs[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
         work(lambda k: unpack(keys, ends, k, count, self.width, interval.first_us, t, x, y, p, label))
         return Events(t, x, y, p, label if self.labels else None)
@@ -59,12 +81,6 @@ class Sent:
             since_us = np.tile(first_us, len(ends))
             unpack_frames(keys[: len(t)], ends.ravel(), since_us, self.width, t, x, y, p, label)
             yield Events(t, x, y, p, label if self.labels else None)
-
-    @cached_property
-    def _keys(self) -> np.ndarray:
-        """Room for those of any frame."""
-        counts = sum(np.diff(part.ends.ravel(), prepend=0).reshape(part.ends.shape).sum(axis=0) for part in self.parts)
-        return np.empty(int(np.max(counts)), np.uint64)
 
     def _room(self, n: int) -> tuple[np.ndarray, ...]:
         u16, u8 = np.uint16, np.uint8
