@@ -14,6 +14,7 @@ from vid2ev import load_sensor
 from vid2ev.kernels.layout import BLOCK
 from vid2ev.sensors.dvs import AT_ONCE_PX, MOST, Dvs
 from vid2ev.sensors.pixels import GROUP
+from vid2ev.sensors.sent import WORTH_THREADS
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.upsample.stillness import still_strips
@@ -92,3 +93,20 @@ def test_codes_and_light_do_not_go_together():
     dvs = Dvs(SENSORS["ideal"], (3, 2), transfer="linear")
     sent = dvs.see_all([Frame(codes, 0), Frame(light, 1000), Frame(codes, 2000), Frame(codes * 0 + 255, 3000)])
     assert [len(events) > 0 for events in sent] == [False, False, False, True]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_more_or_fewer_frames_at_a_time_than_threads(count: int) -> None:
+    """So many events that the threads put them in order together, or a frame each."""
+    rng, t_ns = np.random.default_rng(count), [3_000_000 * k for k in range(count + 1)]
+    light = np.exp(rng.normal(0, 1, (count + 1, *SIZE[::-1]))).astype(np.float32)
+    light[count // 2] = light[count // 2 - 1]  # (nothing happens there)
+    sensors = [Dvs(SENSORS["ideal"], SIZE, threads=threads, labels=True) for threads in (1, 2, 5)]
+    for dvs in sensors:
+        dvs.step(light[0], t_ns[0])
+    alone, *others = (dvs.steps(light[1:], t_ns[1:]) for dvs in sensors)
+    assert count == 1 or sum(map(len, alone)) > 2 * WORTH_THREADS
+    for other in others:
+        for one, two in zip(alone, other, strict=True):
+            for name in ("t", "x", "y", "p", "label"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
