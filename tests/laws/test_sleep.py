@@ -170,6 +170,18 @@ def test_light_may_come_in_one_buffer_that_changes():
     assert dvs.slept == (27 + 27 + 27 + 26, 4 * 27)
 
 
+def test_a_leak_that_goes_into_the_memories_wakes_who_sleeps():
+    """2 nat a second for two seconds: strips fall asleep again and again, and the leak begins anew four times or so."""
+    light = np.full(SIZE[::-1], 0.5, np.float32)
+    spec = clean(threshold_on=0.2, leak_rate_hz=10, random_phase=False)
+    skips, walks = (Dvs(spec, SIZE, skip=skip) for skip in (True, False))
+    for k in range(200):
+        ours, theirs = skips.step(light, k * 10_000_000), walks.step(light, k * 10_000_000)
+        assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.x, theirs.x)
+    assert skips.slept[0] > 0
+    assert_same_state(skips, walks)
+
+
 def test_light_of_another_type_is_other_light():
     light = np.full(SIZE[::-1], 0.5, np.float32)
     skips, walks = (Dvs(load_sensor("ideal"), SIZE, skip=skip, transfer="linear") for skip in (True, False))
