@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from against.clips import clean, feed, hold, noisy, per_pixel, play, start, uneven
 
+from vid2ev.physics.log_curve import curve_of
 from vid2ev.stream import Events
 
 pytestmark = pytest.mark.long
@@ -67,6 +68,17 @@ def test_leak_over_hours_does_not_drift():
     times = sent.t[sent.x == 0]
     assert len(times) == 1800
     assert np.abs(times - np.arange(1, 1801) * 10_000_000).max() <= 1 + 2e-6 / (0.1 * 0.2 * 1e-6)
+
+
+@pytest.mark.parametrize("log_curve", ["toe", "v2e"])
+def test_leak_adds_to_what_the_comparator_sees_below_the_knee(log_curve):
+    """The light rises along a line, and so do the level of a linear curve and the leak: a threshold every 20 ms."""
+    curve = curve_of(log_curve, 1e-3)
+    spec = noisy(threshold_on=0.2, leak_rate_hz=40, log_curve=log_curve)
+    dvs, slope = start(spec, np.empty((1, 1))), 0.2 * 10 / curve.slope  # 10 thresholds a second
+    sent = [dvs.step(np.full((1, 1), 0.001 + slope * 0.03 * k), 30_000_000 * k) for k in range(10)]
+    t_us = np.concatenate([events.t for events in sent])
+    np.testing.assert_allclose(t_us, 20_000 * np.arange(1, 14), atol=2)
 
 
 # Shot noise
