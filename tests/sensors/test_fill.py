@@ -106,6 +106,17 @@ def test_a_batch_fills_a_grid_of_each_clip() -> None:
         assert not grid.take().any()
 
 
+def test_many_blocks_of_pixels_are_filled_with_the_events_of_each_frame() -> None:
+    size = (160, 128)  # ten blocks: more than go through all frames together
+    light = np.exp(np.cumsum(np.random.default_rng(0).normal(0, 0.2, (5, *size[::-1])), axis=0)).astype(np.float32)
+    t_ns = 3_000_000 * np.arange(1, 6)
+    straight, through = (NetCounts(size, t_ns // 1000) for _ in range(2))
+    Dvs(DvsSpec(), size).fill(straight, light, t_ns)
+    for events in Dvs(DvsSpec(), size).steps(light, t_ns):
+        through.add(events)
+    np.testing.assert_array_equal(straight.take(), through.take())
+
+
 def test_counts_stay_at_the_end_of_their_type() -> None:
     spec = load_sensor("ideal", ["threshold_on=0.01", "threshold_off=0.01"])
     for factor, end in ((1e4, 127), (1e-4, -128)):
