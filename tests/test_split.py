@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -18,8 +19,11 @@ from vid2ev.cluster.task import Task
 from vid2ev.commands import main
 from vid2ev.conversion import Paused
 from vid2ev.formats import read_events
+from vid2ev.parts import Replayed
+from vid2ev.sensors.spec import DvsSpec
 from vid2ev.split import convert_split
 from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
 
 pytestmark = pytest.mark.long
 
@@ -70,6 +74,21 @@ def test_parts_together_have_the_bytes_of_the_whole(
     again = convert_split(clip, tmp_path / "made", kind, 3, here, resume=True, **options)
     again.pop("run")
     assert again == whole
+
+
+def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(tmp_path: Path) -> None:
+    """Frames have the events of (t0, t1], of all parts in the order of the pixels; and so has who goes on between."""
+    texts = ["t,x,y,p\n10,0,0,1\n20,3,0,1\n20,3,1,0\n21,0,0,1\n", "t,x,y,p\n20,5,0,1\n30,5,0,0\n"]
+    parts = [tmp_path / "0.csv", tmp_path / "1.csv"]
+    for part, text in zip(parts, texts, strict=True):
+        part.write_text(text)
+    mount: Any = SimpleNamespace(size=(8, 2), sensor=SimpleNamespace(spec=DvsSpec()))
+    frames = [Frame(np.empty((2, 8)), t_us * 1000) for t_us in (10, 20, 25, 30)]
+    first, second = Replayed(mount, parts, False), Replayed(mount, parts, False)
+    sent = [(events.t.tolist(), events.x.tolist()) for events in first.see_all(frames[:2])]
+    second.restore(first.state())
+    sent += [(events.t.tolist(), events.x.tolist()) for events in second.see_all(frames[2:])]
+    assert sent == [([10], [0]), ([20, 20, 20], [3, 5, 3]), ([21], [0]), ([30], [5])]
 
 
 @pytest.mark.parametrize("rounding", ["nearest", "causal"])
