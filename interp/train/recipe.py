@@ -22,7 +22,7 @@ class Recipe(BaseModel):
     time_s: float = Field(
         3300.0, gt=0, description="how long training may take [s]; 55 minutes, so that an hour is kept"
     )
-    batch: int = Field(8, ge=1, description="samples per step, of all processes together")
+    batch: int = Field(8, ge=1, le=65536, description="samples per step, of all processes together")
     rate: float = Field(1.5e-3, gt=0, description="highest learning rate")
     warm_up: int = Field(200, ge=0, description="steps until it is reached")
     rate_end: float = Field(0.01, ge=0, le=1, description="rate of the last step, as a share of the highest")

@@ -79,6 +79,8 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--cpu", "--set", "batch=3"], "batches of 3 cannot be shared out evenly among 2 processes"),
         (["--dry-run", "--set", "betas=[2,3]"], "setting betas.0 = 2 is impossible: it must be less than 1"),
         (["--dry-run", "--set", "clips.size=[1,1]"], "setting clips.size.0 = 1 is impossible"),
+        (["--dry-run", "--set", "clips.size=[100000,128]"], "setting clips.size.0 = 100000 is impossible"),
+        (["--dry-run", "--set", "batch=1000000000"], "setting batch = 1000000000 is impossible: it must be less"),
         (["--dry-run", "--set", "samples.size=1000"], "samples of 1000 pixels from clips of 128x128: expected smaller"),
         (["--dry-run", "--set", 'clips.scene_names=["rom"]'], "scene 'rom'"),
         (["--dry-run", "--set", 'clips.textures=["cofee"]'], "texture 'cofee' (did you mean coffee?): no picture"),
