@@ -317,7 +317,7 @@ def test_depth_is_that_at_the_centres_of_pixels(tmp_path: Path) -> None:
         ({"size": "90x60"}, picture.repeat(3, 0).repeat(3, 1)),
     ):
         source = open_source(
-            tmp_path / "a.npy", fps=1, seen_through=lambda whole: WithDepth(whole, NumberedDepth(), "a"), **options
+            tmp_path / "a.npy", fps=1, seen_through=lambda whole, _: WithDepth(whole, NumberedDepth(), "a"), **options
         )
         for index, frame in enumerate(source.frames(1), 1):
             np.testing.assert_array_equal(frame.depth, 1 + 1000 * index + seen)
