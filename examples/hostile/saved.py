@@ -160,7 +160,7 @@ def _begun_evaluation(folder: Path) -> list[Path]:
     with Kept(folder / "eval", {"limit": 3}, {"linear": {"a": 1}}, resume=False) as kept:
         for group in range(3):
             kept.add("film", "linear", group, [row, row])
-        kept.finish("film", {"groups": 3, "missing": {"linear": 0}})
+        kept.finish("film", {"groups": 3, "missing": {"linear": 0}, "unfit": {"linear": {}}})
     return _files(folder / "eval")
 
 

@@ -109,7 +109,7 @@ class Pixels:
     def _wait_for_walk(self, elsewhere: Elsewhere, intervals: list[Interval]) -> None:
         """Until it is compiled; meanwhile what puts events in order is, by one event of no meaning."""
         event = Keys(np.zeros(1, np.uint64), np.ones((1, 1), np.int64))
-        Sent([event], intervals, self.size[0], self._labels).ordered(self.tiles.each)
+        Sent([event], intervals[:1], self.size[0], self._labels).ordered(self.tiles.each)
         elsewhere.wait()
 
     def state(self) -> dict[str, np.ndarray]:
