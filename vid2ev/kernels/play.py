@@ -115,9 +115,9 @@ def gather(count, hits, num, own, scratch, lanes):
 @inner
 def push(count, curve, num, lanes):
     """How far and which way each is pushed, and what follows from that if it is not far."""
-    dt, tau, smooth_s, mean = F(num.dt_s), F(num.tau_s), F(num.smooth_s), F(num.half)
+    dt, smooth_s, mean = F(num.dt_s), F(num.smooth_s), F(num.half)
     before_log, blind = num.before_log, F(num.blind_s / (num.dt_s * 2.0 * num.half))
-    whole, first, kept = F(1.0 + 2.0 * num.tau_s / num.dt_s), num.decays[0], num.decays[STEPS]
+    first, kept = num.decays[0], num.decays[STEPS]
     for k in range(count):
         level, play, half = lanes[AT_LEVEL + k], lanes[AT_PLAY + k], lanes[AT_HALF + k]
         weight = mean / half
@@ -141,10 +141,18 @@ def push(count, curve, num, lanes):
             near1 = light_per_nat_32(max(light1 - smooth_s * smooth1, F(0.0)), curve)
         steep = max(abs(smooth0) / near0, abs(smooth1) / near1)
         lanes[STEEP + k], lanes[DIMMEST + k] = steep, max(min(light0, light1), F(0.0))
-        within, bare = gone * whole, abs(slope)
-        if before_log:
-            bare = bare / light_per_nat_32(lanes[DIMMEST + k], curve)
-        lanes[BUNCHED + k] = weight * (within if num.at_once else min(F(2.0) * tau * max(steep, bare), within))
+        lanes[BUNCHED + k] = weight * bunched(gone, steep, slope, lanes[DIMMEST + k], curve, num)
+
+
+@inner
+def bunched(gone, steep, slope, dimmest, curve, num):
+    """How far a signal goes within tau of an event at most [nat]: as the smoothed or the bare light does, the steeper
+    one, and no farther than it goes in the interval and those beside it."""
+    within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
+    if num.at_once:
+        return within
+    bare = abs(slope) / light_per_nat_32(dimmest, curve) if num.before_log else abs(slope)
+    return min(F(2.0 * num.tau_s) * max(steep, bare), within)
 
 
 @inner
@@ -173,13 +181,10 @@ def pace(i, moved, gone, curve, num, own, spread, scratch):
                 whole += before + here
             elif step > 0:
                 part, steep = moved * (before + here) / whole, max(before, here)
-                bare = abs(slope) / (
-                    light_per_nat_32(max(min(light, light0), F(0.0)), curve) if num.before_log else F(1.0)
-                )
+                dimmest = max(min(light, light0), F(0.0))
                 note(spread, BY_SLOPE, steep, part)
-                note(spread, BY_LIGHT, max(min(light, light0), F(0.0)), part)
-                within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
-                dense += part * (within if num.at_once else min(F(2.0 * num.tau_s) * max(steep, bare), within))
+                note(spread, BY_LIGHT, dimmest, part)
+                dense += part * bunched(gone, steep, slope, dimmest, curve, num)
             before, light0 = here, light
     return dense
 

@@ -43,13 +43,14 @@ class Sent:
         or, where there are too few for that, each frame by all."""
         count, frames = len(self.parts), len(self.intervals)
         counts = sum(np.diff(part.ends.ravel(), prepend=0).reshape(part.ends.shape).sum(axis=0) for part in self.parts)
+        most = int(np.max(counts))
         if frames < count or np.sum(counts) <= WORTH_THREADS:
-            keys = np.empty(int(np.max(counts)), np.uint64)
+            keys = np.empty(most, np.uint64)
             return [self._ordered(k, keys, each if counts[k] > WORTH_THREADS else self._alone) for k in range(frames)]
         made, waiting = [Events.empty()] * frames, iter(range(frames))
 
         def some(_: int) -> None:
-            keys = np.empty(int(np.max(counts)), np.uint64)
+            keys = np.empty(most, np.uint64)
             for k in waiting:  # (of all: each takes one that none has taken)
                 made[k] = self._ordered(k, keys, self._alone)
 
