@@ -90,6 +90,14 @@ def test_a_tiff_with_pages_is_a_clip(tmp_path: Path) -> None:
     assert source.duration_expected_s == 0.007
 
 
+def test_tags_of_a_tiff_that_nobody_knows_are_not_spoken_of(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """As cameras and microscopes write them; OpenCV would say so of each tag of each file."""
+    tifffile.imwrite(tmp_path / "clip.tif", codes((3, 8, 8)), photometric="minisblack", extratags=[(65000, "H", 1, 7)])
+    source = open_source(tmp_path / "clip.tif", fps=25)
+    assert len(list(source.frames())) == 3
+    assert capfd.readouterr().err == ""
+
+
 def test_pages_of_other_kinds_are_refused(tmp_path: Path) -> None:
     for second, said in ((np.zeros((6, 8), np.int32), "type int32"), (np.zeros((6, 9), np.uint8), "9x6 pixels")):
         with tifffile.TiffWriter(tmp_path / "a.tif") as writer:

@@ -9,6 +9,8 @@ Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +36,10 @@ def pages_of(path: Path) -> int:
     """How many pictures the file holds: the pages of a TIFF, otherwise one."""
     import cv2
 
-    return max(1, cv2.imcount(str(path))) if head_of(path).startswith(TIFF) else 1
+    if not head_of(path).startswith(TIFF):
+        return 1
+    with _silent_decoders():
+        return max(1, cv2.imcount(str(path)))
 
 
 def read_picture(path: Path, page: int = 0) -> Picture:
@@ -76,19 +81,30 @@ def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.nd
     head = head_of(path)
     if head.startswith(PNG):
         check_png(path)
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # (what is wrong is said by who asks)
     try:
-        if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
-            return list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
-        one = cv2.imread(str(path), flags)
-        return [] if one is None else [one]
+        with _silent_decoders():
+            if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
+                return list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
+            one = cv2.imread(str(path), flags)
+            return [] if one is None else [one]
     except cv2.error as error:
         if "MAX_IMAGE" not in str(error):
             return []
         raise DataError(
             f"{path}: has more pixels than are allowed; if that is meant, set {LARGEST} in the environment"
         ) from error
+
+
+@contextmanager
+def _silent_decoders() -> Iterator[None]:
+    """OpenCV says nothing meanwhile, as of each tag of a TIFF that it does not know: what is wrong is said by who
+    asks."""
+    import cv2
+
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
     finally:
         cv2.utils.logging.setLogLevel(level)
 
