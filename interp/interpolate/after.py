@@ -18,7 +18,6 @@ from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
 from interp.networks.hdr import Hdr, HdrState
-from interp.representation.carried import over
 from interp.weights import load
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import sha256
@@ -47,12 +46,10 @@ class After:
     @torch.inference_mode()
     def frames(self, work: Work) -> Iterator[Filled]:
         """The frames of a stretch, processed."""
-        events, since = None, torch.zeros(1, device=self.device)
+        events, since = work.events, torch.zeros(1, device=self.device)
         for frame in work.frames:
             light = to_light(torch.from_numpy(np.ascontiguousarray(np.moveaxis(frame.codes, -1, 0))), "srgb")
             light = light[None].to(self.device)
-            if work.events is not None and events is None:
-                events = over(work.events, (light.shape[2], light.shape[3]))
             share = torch.full((1,), float(frame.instant.share), device=self.device)
             window = self._window(events, since, share, light)
             if frame.shot != self._shot:

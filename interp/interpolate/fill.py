@@ -24,6 +24,7 @@ from interp.interpolate.stretches import CUT, UNRELATED, Stretch
 from interp.interpolate.take import Key, Take
 from interp.interpolate.tiling import Tiling, between
 from interp.methods import Gap, Method
+from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts, count_events
 
 FEWEST, MOST = 32, 128  # sub-intervals in which events are counted
@@ -57,7 +58,7 @@ class Work:
     """The frames of a stretch, in order of time, to be taken once.
 
     remark   why the method was not asked; empty if it was
-    events   what the events of the stretch say, where anybody asks for them and they are known
+    events   what the events of the stretch say, laid over the frames, where anybody asks for them and they are known
     """
 
     frames: Iterator[Filled]
@@ -88,14 +89,17 @@ class Fill:
         shot = self.shot
         self.shot += stretch.between == CUT
         asked = any(instant.share or not stretch.first.known for instant in stretch.instants)
-        if stretch.between == CUT or (stretch.between == UNRELATED and not self.method.needs_events):
-            return Work(self._held(stretch, shot), stretch.between * asked)
-        if stretch.second is None or not (asked or self.events):
-            return Work(self._held(stretch, shot))
+        held = stretch.between == CUT or (stretch.between == UNRELATED and not self.method.needs_events)
+        remark = stretch.between * (held and asked)
+        if stretch.second is None or stretch.between == CUT or not (self.events or (asked and not held)):
+            return Work(self._held(stretch, shot), remark)
         gap = self._gap(stretch, stretch.second)
+        events = _laid(gap) if self.events else None
+        if held:
+            return Work(self._held(stretch, shot), remark, events)
         if asked and self.method.needs_events and gap.events is None:
             return Work(self._made(stretch, gap, self.fallback, shot), NO_EVENTS)
-        return Work(self._made(stretch, gap, self.method, shot), events=gap.events)
+        return Work(self._made(stretch, gap, self.method, shot), events=events)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What the method has to remember of the stretches so far."""
@@ -140,6 +144,12 @@ class Fill:
             return None
         counts = count_events(events, size, first.t_us, second.t_us, steps_for(self.parts)).to(self.device)
         return calibrated(frames, counts, self.take.contrast, self.take.apart)
+
+
+def _laid(gap: Gap) -> EventCounts | None:
+    """The events of a gap, laid over its frames."""
+    height, width = gap.frame_0.shape[-2:]
+    return None if gap.events is None else over(gap.events, (height, width))
 
 
 def steps_for(parts: int | None) -> int:

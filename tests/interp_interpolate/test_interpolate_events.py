@@ -14,10 +14,13 @@ from small_takes import SIZE, STEP_US, images, moving
 
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.take import Options, open_take
-from interp.interpolate.whole import interpolate
+from interp.interpolate.whole import frames, interpolate
 from interp.methods.gap import Gap
 from interp.methods.one_frame import OneFrame
+from interp.networks import make
+from interp.networks.hdr import Hdr
 from interp.representation.event_counts import EventCounts
+from interp.weights import save
 from vid2ev import Events, convert, read_events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import format_named
@@ -115,6 +118,33 @@ def test_events_in_a_file_of_their_own_are_those_of_a_recording(tmp_path: Path) 
             np.testing.assert_array_equal(one, moving(4)[k // 3])
     part = interpolate(both, tmp_path / "part", multiple=1, options=Options(start_s=0.03, stop_s=0.07))
     assert part["key_frames"] == 2 and part["start_us"] == STEP_US
+
+
+@pytest.mark.parametrize("related", [True, False])
+@pytest.mark.parametrize("grid", [{"multiple": "1/2"}, {"multiple": "2/3"}, {"multiple": 2}, {"fps": "10.0001"}])
+def test_hdr_is_told_of_all_events_between_frames(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grid: dict[str, Any], related: bool
+) -> None:
+    """However few frames are made, and where they are held because pictures have nothing in common."""
+    shown = moving(7) if related else list(np.random.default_rng(0).integers(0, 256, (7, *SIZE[::-1], 3), np.uint8))
+    source, events = images(tmp_path / "in", shown), drawn(us=6 * STEP_US)
+    path = written(tmp_path / "a.npz", events)
+    told, forward = [], Hdr.forward
+
+    def heard(network: Hdr, frame: torch.Tensor, second: torch.Tensor, state: Any = None) -> Any:
+        told.append(second.double().sum((0, 1)))
+        return forward(network, frame, second, state)
+
+    monkeypatch.setattr(Hdr, "forward", heard)
+    save(tmp_path / "hdr.safetensors", "hdr", make("hdr"))
+    given = {"method": "flow", "hdr": tmp_path / "hdr.safetensors"}
+    options = Options(events=path, contrast=(0.15, 0.3))
+    times = [frame.instant.t_us for frame in frames(source, **given, **grid, options=options)]
+    wanted = np.zeros(SIZE[::-1])
+    inside = (events.t > times[0]) & (events.t <= times[-1])
+    np.add.at(wanted, (events.y[inside], events.x[inside]), np.where(events.p[inside], 0.3, -0.15) / 0.45)
+    assert times[-1] > 5 * STEP_US
+    np.testing.assert_allclose(torch.stack(told).sum(0), wanted, atol=1e-5)
 
 
 def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tmp_path: Path) -> None:
