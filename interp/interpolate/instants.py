@@ -22,6 +22,7 @@ Number = str | float | Fraction
 SAME_US = 1
 FASTEST_HZ = 100_000
 MOST = 10_000
+FINEST = 1001  # denominators of rates
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +152,11 @@ def parse_number(text: Number, option: str) -> Fraction:
         return Fraction(str(text).strip())
     except (ValueError, ZeroDivisionError):
         raise UsageError(f"{option} {text}: expected a number, such as 32, 2.5 or 30000/1001") from None
+
+
+def rate_of(exact: Fraction) -> Fraction:
+    """A mean rate [Hz] as a person would say it: in so many frames a second, or in seconds a frame."""
+    return exact.limit_denominator(FINEST) if exact >= 1 else 1 / (1 / exact).limit_denominator(FINEST)
 
 
 def _rounded(t_us: Fraction) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from interp.interpolate.event_cursor import EventCursor
+from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
 from interp.interpolate.take import Key, Options
 from vid2ev import Events
@@ -96,7 +97,7 @@ class OfEventFile:
         self.channels = 1 if first.pixels.ndim == 2 else 3
         self.event_size, self.contrast = self._cursor.size, options.contrast
         span_us = self._last_us - self._first_us
-        self.rate = Fraction(10**6 * self.gaps_expected, span_us).limit_denominator(1001) if span_us else Fraction(30)
+        self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
 
     @property
     def remarks(self) -> list[str]:

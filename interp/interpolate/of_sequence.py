@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from interp.data.layouts import open_sequence
+from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
 
-FINEST = 1001  # denominators of rates
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
 
@@ -41,11 +41,13 @@ class OfSequence:
         self._numbers = self._part(options)
         if self.apart:
             self.remarks.append("its cameras stand apart: events are brought to where the frames saw the same change")
-        self.rate = rate_of(sequence.times_us[self._numbers])
+        times_us = sequence.times_us[self._numbers]
+        span_us = int(times_us[-1] - times_us[0])
+        self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
         self.channels = 1 if getattr(sequence, "grey", False) else 3
 
     @property
-    def gaps_expected(self) -> int | None:
+    def gaps_expected(self) -> int:
         """Known."""
         return len(self._numbers) - 1
 
@@ -92,9 +94,3 @@ class OfSequence:
 
     def _identity(self) -> dict[str, Any]:
         return {"identity": identity(self.folder)}
-
-
-def rate_of(times_us: np.ndarray) -> Fraction:
-    """Frames per second, on average; those of a single frame are anything."""
-    span_us = int(times_us[-1] - times_us[0])
-    return Fraction(10**6 * (len(times_us) - 1), span_us).limit_denominator(FINEST) if span_us else Fraction(30)

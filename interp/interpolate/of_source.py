@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 
-FINEST = 1001  # denominators of rates
 BRIGHT = ("pq", "hlg", "log100", "log316", "linear")  # curves of more light than a film of 8 bits holds
 
 
@@ -86,7 +86,7 @@ class OfSource:
 
     def _mean_rate(self) -> Fraction:
         gaps, span_s = self.gaps_expected, self._source.duration_expected_s
-        return Fraction(gaps / span_s).limit_denominator(FINEST) if gaps and span_s else Fraction(30)
+        return rate_of(Fraction(gaps / span_s)) if gaps and span_s else Fraction(30)
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """None."""

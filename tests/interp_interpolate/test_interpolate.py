@@ -197,6 +197,16 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tmp_path: Path) -> None:
+    hour_us = 3600 * 10**6
+    source = images(tmp_path / "in", moving(3), step_us=hour_us)
+    told = interpolate(source, tmp_path / "out", multiple=4, method="linear")
+    assert told["frames"] == 9 and times_of(tmp_path / "out") == [k * hour_us // 4 for k in range(9)]
+    film = interpolate(source, tmp_path / "out.mp4", multiple=4, method="linear")
+    assert Fraction(film["film_rate"]) == Fraction(4, 3600)
+    assert interpolate(recording(tmp_path / "r", moving(3), step_us=hour_us), tmp_path / "rec")["frames"] == 17
+
+
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     images(tmp_path / "a", moving(3))
