@@ -8,6 +8,7 @@ exr    float32, linear light, white at 1.0 and no upper end; needs the package O
 from __future__ import annotations
 
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,8 @@ from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import write_codes
 
 TABLE = 65535  # entries of the table of a curve, less one
+SLOWEST_HZ = Fraction(1, 10**5)  # of films
+FINEST, TERMS = 10**6, 2**31 - 1  # denominators of their rates, and both terms, at the most
 
 
 class Pictures:
@@ -80,7 +83,7 @@ def checked_play(play: Number | None) -> Fraction | None:
     rate = parse_number(play, "--play")
     if not 0 < rate <= 1000:
         raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
-    return rate
+    return of_film(rate)
 
 
 def film_rate(take: Take, grid: Grid, play: Number | None) -> Fraction:
@@ -88,9 +91,15 @@ def film_rate(take: Take, grid: Grid, play: Number | None) -> Fraction:
     if asked := checked_play(play):
         return asked
     if isinstance(grid, Rate):
-        return grid.rate_hz
+        return of_film(grid.rate_hz)
     assert isinstance(grid, Times)
-    return grid.multiple * take.rate
+    return of_film(grid.multiple * take.rate)
+
+
+def of_film(rate: Fraction) -> Fraction:
+    """The rate nearest to one, above 0, that a film can have."""
+    slow = max(rate, SLOWEST_HZ)
+    return slow.limit_denominator(max(1, min(FINEST, TERMS // ceil(slow))))
 
 
 def _by_curve(curve: str) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from interp import pretrained
 from interp.interpolate.choice import device_of
 from interp.interpolate.instants import Number, parse_number
-from interp.interpolate.pictures import Pictures, checked_play
+from interp.interpolate.pictures import Pictures, checked_play, of_film
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
 from interp.reconstruct.of_network import OfNetwork
@@ -103,7 +103,7 @@ def reconstruct(
     made_by, why, about = _choice(network, cutoff_hz, size, nats, where)
     if told:
         told(f"{made_by.name}: {why}")
-    rate = checked_play(play) or (Fraction(FPS) if isinstance(slicing, Count) else 10**6 / slicing.us)
+    rate = checked_play(play) or (Fraction(FPS) if isinstance(slicing, Count) else of_film(10**6 / slicing.us))
     pictures = Pictures(kind, 8, "srgb")
     job = {
         "versions": versions(("torch",)),

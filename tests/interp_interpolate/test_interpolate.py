@@ -16,6 +16,7 @@ from interp import pretrained
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate import frames, interpolate
 from interp.interpolate.choice import choice
+from interp.interpolate.pictures import SLOWEST_HZ
 from interp.interpolate.take import Options
 from interp.networks import make
 from interp.representation.carried import footprint_of
@@ -205,6 +206,20 @@ def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tm
     film = interpolate(source, tmp_path / "out.mp4", multiple=4, method="linear")
     assert Fraction(film["film_rate"]) == Fraction(4, 3600)
     assert interpolate(recording(tmp_path / "r", moving(3), step_us=hour_us), tmp_path / "rec")["frames"] == 17
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [{"multiple": "2.718281828459"}, {"multiple": "1e-400"}, {"fps": "959.123456789"}, {"fps": "1e-9"},
+     {"play": "29.97002997002997"}, {"play": "1e-400"}],
+)  # fmt: skip
+def test_a_film_of_any_rate_is_written_at_the_nearest_that_films_have(tmp_path: Path, asked: dict[str, str]) -> None:
+    source = images(tmp_path / "in", moving(2), step_us=40_000)
+    told = interpolate(source, tmp_path / "a.mp4", method="linear", **asked)
+    (key, number), rate = *asked.items(), Fraction(told["film_rate"])
+    meant = max(Fraction(number) * (25 if key == "multiple" else 1), SLOWEST_HZ)
+    assert abs(rate - meant) <= meant * 1e-6
+    assert len(list(open_source(tmp_path / "a.mp4").frames())) == told["frames"]
 
 
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
