@@ -16,7 +16,9 @@ import numpy as np
 from vid2ev import Events
 from vid2ev.errors import UsageError
 
-__all__ = ["AS_IT_IS", "Key", "Options", "Take", "open_take"]
+__all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take"]
+
+LATEST_S, MOST_NATS = 1e9, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +83,18 @@ class Take(Protocol):
         where the one before ended.  Raises DataError for files that cannot be read."""
 
 
+def check_second(second: float | None, option: str) -> None:
+    """Raise UsageError for a time [s] that no clock shows."""
+    if second is not None and not abs(second) <= LATEST_S:
+        raise UsageError(f"{option} {second:g}: expected seconds, such as 1.5")
+
+
+def check_contrast(contrast: tuple[float, float] | None) -> None:
+    """Raise UsageError for what no OFF and ON event stands for."""
+    if contrast is not None and not (np.shape(contrast) == (2,) and all(0 < nats < MOST_NATS for nats in contrast)):
+        raise UsageError(f"contrast {contrast}: expected nats of an OFF and an ON event, such as (0.2, 0.25)")
+
+
 @dataclass(frozen=True, slots=True)
 class Options:
     """How it is read.
@@ -90,6 +104,7 @@ class Options:
     source_hz   frames per second, where the source has no times
     contrast    what an OFF and an ON event stand for [nat], in place of what the recording says
     events      file of the events, where the frames are in another one
+    Raises UsageError for times and contrasts that are none.
     """
 
     start_s: float | None = None
@@ -100,6 +115,11 @@ class Options:
     source_hz: Fraction | None = None
     contrast: tuple[float, float] | None = None
     events: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_second(self.start_s, "--start")
+        check_second(self.stop_s, "--stop")
+        check_contrast(self.contrast)
 
 
 AS_IT_IS = Options()

@@ -16,6 +16,7 @@ from interp.interpolate.choice import device_of
 from interp.interpolate.instants import Number, parse_number
 from interp.interpolate.pictures import Pictures, checked_play, of_film
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
+from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
 from interp.reconstruct.of_network import OfNetwork
 from interp.representation.event_counts import USUAL_NATS
@@ -97,6 +98,7 @@ def reconstruct(
     """
     output, path = Path(output), Path(events)
     kind, slicing = kind_of(output, format), _slicing(fps, events_per_frame)
+    check_contrast(contrast)
     recording, size = _window(path, start_s, stop_s)
     nats = contrast or _contrast(path)
     where = device_of(device)
@@ -192,6 +194,8 @@ def _slicing(fps: Number | None, events_per_frame: int | None) -> Duration | Cou
 
 def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[Recording, tuple[int, int]]:
     """The part of the file, and the size of its sensor."""
+    check_second(start_s, "--start")
+    check_second(stop_s, "--stop")
     if start_s is not None and stop_s is not None and stop_s <= start_s:
         raise UsageError(f"--stop {stop_s:g} is not after --start {start_s:g}; choose a later one")
     file = open_events(path)

@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from interp import pretrained
 from interp.commands.reconstruct import reconstruct as command
 from interp.interpolate.shelf import PIECE
+from interp.interpolate.take import Options
 from interp.networks import make
 from interp.reconstruct.high_pass import GREY, HighPass
 from interp.reconstruct.of_network import OfNetwork
@@ -187,6 +188,8 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
         (["a.npz", "--network", "rrin.safetensors"], 1, "takes frames"),
         (["a.npz", "--network", "rrin.safetensors", "--cutoff", "1"], 2, "leave out one"),
         (["a.npz", "--start", "5"], 2, "no events"),
+        (["a.npz", "--start", "nan"], 2, "expected seconds"),
+        (["a.npz", "--stop", "inf"], 2, "expected seconds"),
         (["a.npz", "--start", "0.5", "--stop", "0.2"], 2, "not after"),
     ],
 )
@@ -203,6 +206,14 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert result.exception.exit_code == code
     assert sentence in str(result.exception) and "\n" not in str(result.exception)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("contrast", [(0, 0.2), (math.nan, 0.2), (0.2, math.inf), (0.2,), 0.2])
+def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> None:
+    with pytest.raises(UsageError, match="expected nats"):
+        reconstruct(written(tmp_path / "a.npz", drawn(10)), tmp_path / "a", contrast=contrast)
+    with pytest.raises(UsageError, match="expected nats"):
+        Options(contrast=contrast)
 
 
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
