@@ -91,6 +91,9 @@ def evaluate(
             raise UsageError(f"{several}: expected a list, also of one; give ['{several}']")
     if limit is not None and not is_whole(limit, 1):
         raise UsageError(f"limit {limit!r}: expected a whole number of at least 1; leave it out for all gaps")
+    for name, value, kind in (("protocol", protocol, Protocol), ("simulated", simulated, Simulated)):
+        if not isinstance(value, kind | None):
+            raise UsageError(f"{name} {value!r}: expected a {kind.__name__}; leave it out for the usual one")
     folder, protocol = Path(folder), protocol or Protocol()
     simulated = simulated or Simulated.of("clean")
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]

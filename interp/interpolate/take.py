@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from numbers import Real
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -85,8 +86,8 @@ class Take(Protocol):
 
 def check_second(second: float | None, option: str) -> None:
     """Raise UsageError for a time [s] that no clock shows."""
-    if second is not None and not abs(second) <= LATEST_S:
-        raise UsageError(f"{option} {second:g}: expected seconds, such as 1.5")
+    if second is not None and not (isinstance(second, Real) and abs(second) <= LATEST_S):
+        raise UsageError(f"{option} {second}: expected seconds, such as 1.5")
 
 
 def check_contrast(contrast: tuple[float, float] | None) -> None:
@@ -131,6 +132,8 @@ def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
 
     Raises UsageError for what is none of these, or options that it cannot have, DataError for what is damaged.
     """
+    if not isinstance(options, Options):
+        raise UsageError(f"options {options!r}: expected Options, as of `interp.interpolate`; leave them out for none")
     if not Path(path).exists():
         raise UsageError(f"{path}: no such file or folder; give a recording, a video or a folder of images")
     from interp.data.layouts import is_sequence

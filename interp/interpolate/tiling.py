@@ -80,7 +80,7 @@ def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
     """
     if text == "none" or (text == "auto" and size[0] * size[1] <= WHOLE_PX):
         return Tiling(((0, size[0]),), ((0, size[1]),))
-    width, times, height = text.partition("x")
+    width, times, height = str(text).partition("x")
     if text == "auto":
         sides = SIDE, SIDE
     elif times and width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= LEAST:

@@ -54,6 +54,7 @@ def open_method(name: str, device: torch.device | str = "cpu", running: Running 
     Raises UsageError for a name that is none, and for a way to run what is no network; DataError for a file that holds
     no network which rebuilds frames.
     """
+    name = str(name)
     if name in METHODS:
         if running != PLAIN:
             raise UsageError(f"method '{name}' is no network: leave out --precision and --compile, which are of these")

@@ -85,8 +85,8 @@ def spec_of(name: str, size: str = "tiny", **options: Any) -> NetworkSpec:
 
 
 def _entry(name: str) -> Entry:
-    if name not in NETWORKS:
-        raise UsageError(f"network '{name}'{nearest(name, NETWORKS)}: expected one of {', '.join(NETWORKS)}")
+    if not isinstance(name, str) or name not in NETWORKS:
+        raise UsageError(f"network '{name}'{nearest(str(name), NETWORKS)}: expected one of {', '.join(NETWORKS)}")
     return NETWORKS[name]
 
 

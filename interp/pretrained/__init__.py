@@ -23,7 +23,7 @@ def path_of(weights: str | Path) -> Path:
 
     Raises UsageError where there is no such file.
     """
-    path = Path(weights)
+    path = Path(str(weights))
     if path.is_dir():
         path = path / OF_RUN
     if path.exists():

@@ -14,7 +14,7 @@ import numpy as np
 from interp import pretrained
 from interp.interpolate.choice import device_of
 from interp.interpolate.instants import Number, parse_number
-from interp.interpolate.pictures import Pictures, checked_play, of_film
+from interp.interpolate.pictures import SLOWEST_HZ, Pictures, checked_play, of_film
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
@@ -25,6 +25,7 @@ from vid2ev.errors import UsageError
 from vid2ev.formats import open_events
 from vid2ev.formats.event_file import Recording
 from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
+from vid2ev.sensors.limits import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
 from vid2ev.views.window import beginning_us, window
 
@@ -183,12 +184,12 @@ def _slicing(fps: Number | None, events_per_frame: int | None) -> Duration | Cou
     if events_per_frame is not None:
         if fps is not None:
             raise UsageError(f"--fps {fps} and --events-per-frame {events_per_frame}: leave out one of them")
-        if events_per_frame < 1:
+        if not is_whole(events_per_frame, 1):
             raise UsageError(f"--events-per-frame {events_per_frame}: expected at least 1, such as 20000")
         return Count(events_per_frame)
     rate = parse_number(FPS if fps is None else fps, "--fps")
-    if not 0 < rate <= 10**5:
-        raise UsageError(f"--fps {fps}: expected more than 0 and at most 100000 pictures per second")
+    if not SLOWEST_HZ <= rate <= 10**5:
+        raise UsageError(f"--fps {fps}: expected from {float(SLOWEST_HZ):g} to 100000 pictures per second")
     return Duration(10**6 / rate)
 
 

@@ -110,9 +110,11 @@ def test_events_outside_of_the_sensor_and_no_sub_intervals_are_refused() -> None
     some = events(np.arange(START + 1, START + 50), SIZE)
     with pytest.raises(UsageError, match="outside of the 3x4 sensor"):
         count_events(some, (3, 4), START, STOP)
-    for steps in (0, 2.5):
+    for number in (0, 2.5, True, None):
         with pytest.raises(UsageError, match="at least 1"):
-            count_events(some, SIZE, START, STOP, steps)  # type: ignore[arg-type]
+            count_events(some, SIZE, START, STOP, number)  # type: ignore[arg-type]
+        with pytest.raises(UsageError, match="at least 1"):
+            exact_voxels(some, SIZE, START, STOP, number)  # type: ignore[arg-type]
 
 
 def test_changes_of_windows_in_a_row_add_up() -> None:

@@ -112,6 +112,7 @@ def test_every_option_says_what_it_is(name: str) -> None:
     ("name", "options", "sentence"),
     [
         ("rrin_event", {}, "did you mean rrin_events?"),
+        (None, {}, "network 'None': expected one of"),
         ("rrin_events", {"size": "huge"}, "size = 'huge' is impossible"),
         ("rrin_events", {"gates": True}, "no option 'gates' (did you mean gate?)"),
         ("rrin_events", {"depths": (9, 4, 4, 3)}, "depths"),

@@ -6,6 +6,7 @@ import json
 import re
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -222,6 +223,24 @@ def test_a_film_of_any_rate_is_written_at_the_nearest_that_films_have(tmp_path: 
     meant = max(Fraction(number) * (25 if key == "multiple" else 1), SLOWEST_HZ)
     assert abs(rate - meant) <= meant * 1e-6
     assert len(list(open_source(tmp_path / "a.mp4").frames())) == told["frames"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("tile", 3, "tile '3': expected none, auto"),
+        ("hdr", True, "weights True: no such file"),
+        ("network", 3, "weights 3: no such file"),
+        ("method", 3, "method '3': expected one of"),
+        ("options", None, "options None: expected Options"),
+    ],
+)
+def test_arguments_that_are_none_are_refused_in_a_sentence(
+    tmp_path: Path, name: str, value: Any, sentence: str
+) -> None:
+    with pytest.raises(UsageError, match=sentence) as refused:
+        interpolate(images(tmp_path / "in", moving(2)), tmp_path / "out", **{name: value})
+    assert "\n" not in str(refused.value)
 
 
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -181,7 +181,7 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
     [
         (["nowhere.h5"], 2, "no such file"),
         (["text.txt"], 1, "no event file"),
-        (["a.npz", "--fps", "0"], 2, "expected more than 0"),
+        (["a.npz", "--fps", "0"], 2, "expected from 1e-05"),
         (["a.npz", "--fps", "10", "--events-per-frame", "9"], 2, "leave out one"),
         (["a.npz", "--events-per-frame", "0"], 2, "at least 1"),
         (["a.npz", "--cutoff", "-1"], 2, "0 to 10000"),
@@ -214,6 +214,25 @@ def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> Non
         reconstruct(written(tmp_path / "a.npz", drawn(10)), tmp_path / "a", contrast=contrast)
     with pytest.raises(UsageError, match="expected nats"):
         Options(contrast=contrast)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("events_per_frame", True, "at least 1"),
+        ("events_per_frame", 2.5, "at least 1"),
+        ("fps", "1e-400", "from 1e-05 to 100000"),
+        ("cutoff_hz", "1", "from 0 to 10000"),
+        ("network", 3, "weights 3: no such file"),
+        ("start_s", "1", "expected seconds"),
+    ],
+)
+def test_arguments_that_are_none_are_refused_in_a_sentence(
+    tmp_path: Path, name: str, value: Any, sentence: str
+) -> None:
+    with pytest.raises(UsageError, match=sentence) as refused:
+        reconstruct(written(tmp_path / "a.npz", drawn(10)), tmp_path / "a", **{name: value})
+    assert "\n" not in str(refused.value)
 
 
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def test_overrides_that_are_no_list_of_texts_are_refused(overrides: Any) -> None
 
 
 @pytest.mark.parametrize(
-    "options", [{"seed": 1.5}, {"seed": "random"}, {"seed": None}, {"camera": 0.5}, {"threads": 2.5}]
+    "options", [{"seed": 1.5}, {"seed": "random"}, {"seed": None}, {"camera": 0.5}, {"threads": 2.5}, {"threads": True}]
 )
 def test_what_is_no_whole_number_is_refused(options: Any) -> None:
     for sensor in (lambda: Dvs(DvsSpec(), (2, 2), **options), lambda: Cis(CisSpec(), (2, 2), **options)):

@@ -52,9 +52,9 @@ def time_ns(t_ns: Any) -> int:
 
 
 def is_whole(number: Any, least: int, most: int | None = None) -> bool:
-    """Whether a number is whole, and within these limits."""
+    """Whether a number is whole, and within these limits; true and false are no numbers."""
     try:
         whole = operator.index(number)
     except TypeError:
         return False
-    return least <= whole and (most is None or whole <= most)
+    return not isinstance(number, bool) and least <= whole and (most is None or whole <= most)
