@@ -21,7 +21,7 @@ from vid2ev.errors import UsageError
 class SampleSettings(BaseModel):
     """How samples are drawn from clips."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     size: int = Field(default=96, ge=16, description="width and height [px]")
     targets: int = Field(default=2, ge=1, le=31, description="instants to rebuild")
@@ -40,6 +40,10 @@ class SampleSettings(BaseModel):
     def _rises(self) -> SampleSettings:
         if self.quality[0] > self.quality[1]:
             raise ValueError(f"quality {self.quality}: expected the lower one first")
+        if not 0 <= self.lost[0] <= self.lost[1] <= 1:
+            raise ValueError(f"lost {self.lost}: expected shares from 0 to 1")
+        if self.threshold_error[0] <= 0:
+            raise ValueError(f"threshold_error {self.threshold_error}: expected factors above 0")
         return self
 
 

@@ -23,7 +23,7 @@ class ClipSettings(BaseModel):
     Raises `pydantic.ValidationError` for what does not go together.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
         default=(128, 128), description="width and height of the frames [px]"
@@ -42,9 +42,7 @@ class ClipSettings(BaseModel):
     recording_folders: tuple[str, ...] = Field(
         default=(), description="recordings: own, or in the HS-ERGB or BS-ERGB layout"
     )
-    slowdown: float = Field(
-        default=1.0, gt=0, allow_inf_nan=False, description="how many times slower than the world the videos play"
-    )
+    slowdown: float = Field(default=1.0, gt=0, description="how many times slower than the world the videos play")
     scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), min_length=1, description="of the scenes")
     textures: tuple[str, ...] = Field(
         default=TRAINED_ON, min_length=1, description="photographs: bundled ones by name, or files"
@@ -76,7 +74,8 @@ class ClipSettings(BaseModel):
             raise ValueError(f"bins {self.bins}: expected a multiple of {max(self.multiples)} up to 64")
         if self.gap_ms[0] <= 0:
             raise ValueError(f"gap_ms {self.gap_ms}: expected times above 0")
-        if sum(share for share, _, _ in self.motion) <= 0 or any(not 0 <= low <= high for _, low, high in self.motion):
+        shares = [share for share, _, _ in self.motion]
+        if sum(shares) <= 0 or min(shares) < 0 or any(not 0 <= low <= high for _, low, high in self.motion):
             raise ValueError(f"motion {self.motion}: expected shares above 0, each with a range of pixels that rises")
         if sum(self.shares) <= 0:
             raise ValueError("no clips: expected a share of scenes, photographs, videos or recordings above 0")

@@ -72,6 +72,10 @@ def spec_of(name: str, size: str = "tiny", **options: Any) -> NetworkSpec:
     """The specification of a network; raises as `make` does."""
     entry = _entry(name)
     model = getattr(_module(entry), f"{entry.network}Spec")
+    for key, value in options.items():
+        field = model.model_fields.get(key)
+        if isinstance(value, bool) and field is not None and field.annotation is not bool:  # (pydantic: 1 or 0)
+            raise UsageError(f"{name}: {key} = {value!r} is impossible: it must not be true or false")
     try:
         return model(**{**entry.defaults, "size": size, **options})
     except ValidationError as error:

@@ -31,7 +31,7 @@ EXAMPLE = "rate=0.001, network.bins=5, clips.multiples=[16] or samples.size=128"
 class Window(BaseModel):
     """Which of all clips samples are drawn from while training goes on (`interp.data.pool`)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     begin: int = Field(256, ge=1, description="clips that there are before the first sample")
     most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 1.6 MB of disk")
@@ -148,8 +148,16 @@ def _by_part(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise UsageError(
                 f"setting '{text}': '{part}' has no settings{nearest(part, parts)}; write for example {EXAMPLE}"
             )
+        if part != "network" and _has_truth(value):  # (pydantic: 1 or 0)
+            raise UsageError(f"setting {text} is impossible: true and false are no numbers")
         parts[part if dot else "recipe"][rest if dot else key] = value
     return parts
+
+
+def _has_truth(value: Any) -> bool:
+    """Whether a value is true or false, or has one within."""
+    within = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return isinstance(value, bool) or any(map(_has_truth, within))
 
 
 def _valid(model: type[Any], values: dict[str, Any], prefix: str) -> Any:

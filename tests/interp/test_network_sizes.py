@@ -117,6 +117,7 @@ def test_every_option_says_what_it_is(name: str) -> None:
         ("rrin_events", {"gates": True}, "no option 'gates' (did you mean gate?)"),
         ("rrin_events", {"depths": (9, 4, 4, 3)}, "depths"),
         ("firenet", {"bins": 0}, "bins = 0 is impossible"),
+        ("firenet", {"bins": True}, "bins = True is impossible: it must not be true or false"),
     ],
 )
 def test_what_cannot_be_is_refused_in_a_sentence(name: str, options: dict, sentence: str) -> None:

@@ -48,6 +48,16 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["clips.sensors.threshold=1"], r"setting 'clips.sensors.threshold' is unknown"),
         ("rrin", ["samples.size=3"], r"setting samples.size = 3 is impossible: it must be greater than or equal to 16"),
         ("rrin", ["window.begin=0"], r"setting window.begin = 0 is impossible"),
+        ("rrin", ["window.fresh=inf"], r"setting window.fresh = inf is impossible"),
+        ("rrin", ["batch=true"], r"setting batch=true is impossible: true and false are no numbers"),
+        ("rrin", ["clips.motion=[[true, 1, 2]]"], r"true and false are no numbers"),
+        ("rrin", ["clips.sensors={exposed=true}"], r"true and false are no numbers"),
+        ("rrin", ["network.bins=true"], r"bins = True is impossible"),
+        ("rrin", ["clips.motion=[[nan, 1, 2]]"], r"nan is impossible: it must be a finite number"),
+        ("rrin", ["clips.motion=[[2, 1, 2], [-1, 3, 4]]"], r"expected shares above 0"),
+        ("rrin", ["clips.step_px=inf"], r"inf is impossible: it must be a finite number"),
+        ("rrin", ["samples.lost=[0.5, 2]"], r"settings of samples: lost \(0.5, 2.0\): expected shares from 0 to 1"),
+        ("rrin", ["samples.threshold_error=[0, 1]"], r"expected factors above 0"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_a_sentence(network: str, settings: list[str], sentence: str) -> None:
