@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from numbers import Real
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -86,7 +85,7 @@ class Take(Protocol):
 
 def check_second(second: float | None, option: str) -> None:
     """Raise UsageError for a time [s] that no clock shows."""
-    if second is not None and not (isinstance(second, Real) and abs(second) <= LATEST_S):
+    if second is not None and not (isinstance(second, int | float) and abs(second) <= LATEST_S):
         raise UsageError(f"{option} {second}: expected seconds, such as 1.5")
 
 

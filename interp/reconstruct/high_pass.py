@@ -13,7 +13,6 @@ eq. 5 (without frames), with the cut-off frequency in Hz.
 from __future__ import annotations
 
 import math
-from numbers import Real
 
 import numpy as np
 from numba import njit
@@ -37,7 +36,7 @@ class HighPass:
     name = "high-pass"
 
     def __init__(self, size: tuple[int, int], contrast: tuple[float, float], cutoff_hz: float = CUTOFF_HZ):
-        if not (isinstance(cutoff_hz, Real) and 0 <= cutoff_hz <= 1e4):
+        if not (isinstance(cutoff_hz, int | float) and 0 <= cutoff_hz <= 1e4):
             raise UsageError(f"--cutoff {cutoff_hz}: expected from 0 to 10000 Hz, such as 1")
         self.contrast, self.per_us = contrast, 2e-6 * math.pi * cutoff_hz
         self._level = np.zeros(size[::-1], np.float64)
