@@ -12,6 +12,7 @@ import torch
 from scipy.io import savemat
 from small_takes import SIZE, STEP_US, images, moving
 
+from interp.data.layouts import open_sequence
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.take import Options, open_take
 from interp.interpolate.whole import frames, interpolate
@@ -162,6 +163,34 @@ def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tm
     for k, frame in enumerate(frames):
         found = read_codes(tmp_path / "png_out" / f"{2 * k:06d}.png")
         np.testing.assert_array_equal(found, read_codes(frame))
+
+
+@pytest.mark.parametrize("other", ["size = [32, 24]", "translation_mm = [80, 0, 0]"])
+def test_frames_to_rebuild_are_those_of_a_camera_that_sees_what_key_frames_show(tmp_path: Path, other: str) -> None:
+    """And events are of the camera in its place, whatever else is in the rig."""
+    rig = tmp_path / "rig.toml"
+    cameras = [("a", "dvs", "translation_mm = [80, 0, 0]"), ("b", "cis", other), ("c", "dvs", ""), ("d", "cis", "")]
+    rates = {"b": "set = { frame_rate_hz = 30 }", "d": "set = { frame_rate_hz = 15 }"}
+    rig.write_text(
+        "".join(
+            f'[[camera]]\nname = "{name}"\nkind = "{kind}"\nsensor = "ideal"\n{place}\n{rates.get(name, "")}\n'
+            for name, kind, place in cameras
+        )
+    )
+    made = tmp_path / "made"
+    convert(
+        images(tmp_path / "in", moving(7)), made, rig=rig, depth="plane:2", pictures="png", preview=False, threads=1
+    )
+    sequence = open_sequence(made)
+    assert sequence.remarks == ["its camera b is left out: it sees other pictures than d"] and not sequence.apart
+    told = interpolate(made, tmp_path / "out", multiple=2)
+    assert told["size"] == [*SIZE] and told["key_frames"] == len(sequence.times_us)
+    for k in range(told["key_frames"]):
+        frame = read_codes(made / "d" / "frames" / f"{k:06d}.png")
+        np.testing.assert_array_equal(sequence.frame(k), frame)
+        np.testing.assert_array_equal(read_codes(tmp_path / "out" / f"{2 * k:06d}.png"), frame)
+    start_us, stop_us = sequence.covered_us
+    same(sequence.events(start_us, stop_us).within(SIZE)[0], Events.concatenate(read_events(made / "c")))
 
 
 def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """Recordings of `vid2ev convert` as sequences: an event camera, and frame cameras beside it.
 
-Of several frame cameras, the fastest has the frames to rebuild, and the slowest the key frames, as `vid2ev dataset`
-writes them.
+Of several frame cameras, the slowest has the key frames, and the fastest of those that see the same as it does the
+frames to rebuild, as `vid2ev dataset` writes them.  Of several event cameras the first that sees the same counts, or
+else the first.
 """
 
 from __future__ import annotations
@@ -39,8 +40,16 @@ class Own:
         events = [each for each in cameras if each["kind"] == "dvs"]
         if not events or not frames:
             raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
-        self._keys, self._frames = _Pictures(frames[0]), _Pictures(frames[-1])
-        self.keys_folder, self.events_folder = frames[0]["folder"], events[0]["folder"]
+        keys = frames[0]
+        alike = [each for each in frames if each["size"] == keys["size"] and not _apart(folder, keys, each)]
+        sent = next((each for each in events if not _apart(folder, keys, each)), events[0])
+        self.remarks += [
+            f"its camera {each['name']} is left out: it sees other pictures than {keys['name']}"
+            for each in frames
+            if each not in alike
+        ]
+        self._keys, self._frames = _Pictures(keys), _Pictures(alike[-1])
+        self.keys_folder, self.events_folder = keys["folder"], sent["folder"]
         _check_events(self.events_folder)
         self.times_us, key_times = self._frames.times_us, self._keys.times_us
         self._key_of = {
@@ -50,10 +59,10 @@ class Own:
         }
         first = self._frames.codes(0)
         self.size, self.grey = first.shape[1::-1], first.ndim == 2
-        self.event_size = tuple(events[0]["size"])
-        self.contrast = events[0]["contrast"]
-        self.apart = _apart(folder, self.keys_folder.parent.name, self.events_folder.name)
-        self._span_us = events[0]["span_us"]
+        self.event_size = tuple(sent["size"])
+        self.contrast = sent["contrast"]
+        self.apart = _apart(folder, keys, sent)
+        self._span_us = sent["span_us"]
 
     @property
     def covered_us(self) -> tuple[int, int]:
@@ -113,7 +122,7 @@ def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
         return None
     numbers = sensor["parameters"]
     width, height = (_whole(side, 1, MOST_PIXELS) for side in sensor["size"])
-    facts = {"kind": sensor["kind"], "folder": folder, "size": (width, height)}
+    facts = {"kind": sensor["kind"], "name": folder.name, "folder": folder, "size": (width, height)}
     if sensor["kind"] == "cis":
         return facts | {"folder": _pictures_in(folder), "rate_hz": float(numbers["frame_rate_hz"]), "numbers": numbers}
     begin, length = (_whole(said[key], -LATEST_US, LATEST_US) for key in ("start_us", "duration_us"))
@@ -130,12 +139,12 @@ def _whole(said: Any, least: int, most: int) -> int:
     return int(said)
 
 
-def _apart(folder: Path, *names: str) -> bool:
+def _apart(folder: Path, *cameras: dict[str, Any]) -> bool:
     """Whether two cameras of a recording look from different places, or through different lenses."""
     said = read_manifest(folder / MANIFEST)
     with as_stated(folder / MANIFEST):
         placed = {each["name"]: each for each in said.get("rig", {}).get("cameras", [])}
-        one, other = (placed.get(name) for name in names)
+        one, other = (placed.get(each["name"]) for each in cameras)
         return one is not None and other is not None and not np.allclose(_sight(one), _sight(other), atol=1e-6)
 
 
