@@ -99,10 +99,10 @@ def _is_grey(about: dict[str, Any]) -> bool:
         from vid2ev.light.recognise import PICTURE_SUFFIXES
 
         path = Path(about["path"])
-        files = (
-            [file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES] if path.is_dir() else [path]
-        )
-        return all(read_picture(file).pixels.ndim == 2 for file in files[:1])
+        there = path.iterdir() if path.is_dir() else ()
+        pictures = [file for file in there if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != "."]
+        # (the first one in colour ends it)
+        return all(read_picture(file).pixels.ndim == 2 for file in pictures or [path])
     return str(about.get("pixel_format", "")).startswith("gray")
 
 

@@ -243,6 +243,16 @@ def test_arguments_that_are_none_are_refused_in_a_sentence(
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("grey", range(3))
+def test_a_grey_picture_among_coloured_ones_takes_no_colours(tmp_path: Path, grey: int) -> None:
+    shown = [frame[..., 0].copy() if k == grey else frame for k, frame in enumerate(moving(3))]
+    source = images(tmp_path / "in", shown)
+    (source / "._000000.png").write_bytes(b"what a Mac leaves beside")
+    interpolate(source, tmp_path / "out", multiple=2, method="linear")
+    for frame, found in zip(shown, made(tmp_path / "out")[::2], strict=True):
+        np.testing.assert_array_equal(found, frame if frame.ndim == 3 else np.repeat(frame[..., None], 3, axis=2))
+
+
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     images(tmp_path / "a", moving(3))
