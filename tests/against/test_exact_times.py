@@ -267,9 +267,9 @@ def test_any_piecewise_linear_light(clip):
 @pytest.mark.parametrize("follower_us", [31.6, 5.0, 300.0])
 def test_a_pulse_that_dies_away_within_one_long_interval(filter_at: str, dark_ns: int, follower_us: float) -> None:
     """The signal goes on rising after the light is gone, turns, and has settled long before the next frame."""
-    pixel = Pixel(0.2, 0.2, 31.6, follower_us, filter=filter_at, dark_level=1e-5)
+    pixel = Pixel(0.1, 0.2, 31.6, follower_us, filter=filter_at, dark_level=1e-5)
     t_ns = np.array([0, 3, 4, 10_004, 10_004 + dark_ns])
     light = np.array([0, 0, 1, 0, 0], np.float32).reshape(5, 1, 1)
     sent = play(sensor(pixel), t_ns, light)
     judge_clip(pixel, t_ns, light, sent)
-    assert len(sent) > 0 or (filter_at, follower_us) == ("after", 300.0)  # (which follows too slowly)
+    assert len(sent) > 0  # (where the second pole is slow and after the log, only one, of the last interval)
