@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from against.clips import clean, feed, noisy, per_pixel, play, start
+from against.clips import AFTER_TRACKING, clean, feed, noisy, per_pixel, play, start
 from against.reference import Pixel, Response, events, log_light, signal
 
 VIDEOS = Path(__file__).parents[2] / "../shared/data/videos"
@@ -97,6 +97,15 @@ def test_swallowed_crossings_are_those_of_the_reference():
     known = [events(signal(pixel, t_ns, light[:, 0, x])) for x in range(12)]
     assert len(sent) == sum(len(found) for found, _ in known)
     assert dvs.counts["swallowed"] == sum(swallowed for _, swallowed in known) > 100
+
+
+def test_a_pixel_whose_memory_jumps_to_the_signal_swallows_nothing():
+    """While it is blind it sees no crossing, whatever it has just sent: also an event of the photoreceptor's noise."""
+    t_ns = np.arange(0, 60_000_000, 2_000_000)
+    light = np.exp(np.random.default_rng(5).normal(-1.5, 0.3, (len(t_ns), 20, 30))).astype(np.float32)
+    dvs = start(AFTER_TRACKING.model_copy(update={"refractory_us": 900.0}), light)
+    assert len(feed(dvs, t_ns, light)) > 1_000
+    assert dvs.counts["swallowed"] == 0
 
 
 def test_beyond_the_work_cap_the_rest_is_taken_in_one_step():

@@ -269,6 +269,8 @@ def walk_pixel(
                 on, off, out, n = cross_one(
                     lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
                 )
+                if len(flags.track):
+                    blind_until = s + num.refractory_ns / iv.dt_ns
             rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
         elif knots[piece] >= 1.0:
             break
