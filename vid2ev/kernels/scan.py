@@ -194,10 +194,16 @@ def may_reach(block, scratch, i, gain0, flags, num, iv):
     """Whether the hull of an interval with a turning point reaches a level: y stays among inputs and first pole."""
     if len(flags.log_compare) and not len(flags.log_input):
         return True  # the hull in nats would cost another logarithm
+    top, bottom = hull_of_turn(block, scratch, i)
+    return hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv)
+
+
+@inner
+def hull_of_turn(block, scratch, i):
+    """(top, bottom) of the inputs and the first pole of pixel i in the interval."""
     old, new = block[INPUT * PITCH + i], scratch[NEW + i]
     first = old - block[LAG1 * PITCH + i]
-    top, bottom = max(old, max(new, first)), min(old, min(new, first))
-    return hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv)
+    return max(old, max(new, first)), min(old, min(new, first))
 
 
 @inner
@@ -250,10 +256,13 @@ def advance_noise(block, scratch, p0, n, poles, num, iv):
 @inner
 def flag_rice(block, scratch, flagged, p0, n, flags, num, iv):
     """Flag the pixels in which unresolved photoreceptor noise may reach a level in this interval."""
-    before = (LAG1 + len(flags.poles) + 2) * PITCH
+    before, drift = (LAG1 + len(flags.poles) + 2) * PITCH, F(iv.leak1 - iv.leak0)
     for i in range(n):
         was, seen = block[before + i], scratch[SEEN + i]
-        top, bottom = max(was, seen), min(was, seen)
+        top, bottom = max(was + drift, seen), min(was, seen - drift)  # (between its ends the leak may make it turn)
+        if (len(flags.log_input) > 0) & (len(flags.straight) == 0) and turns_at(block, scratch, i, flags):
+            upper, lower = hull_of_turn(block, scratch, i)
+            top, bottom = max(top, upper + F(iv.leak1)), min(bottom, lower + F(iv.leak0))
         expected = rice_expected(block[HIGH * PITCH + i] - top, bottom - block[LOW * PITCH + i], num, iv)
         flagged[i] |= np.uint8(rice_gap(p0 + i, 0, num, iv) < 1.01 * expected)
 

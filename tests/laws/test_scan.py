@@ -1,0 +1,49 @@
+"""The scan leaves out no pixel that has an event: a sensor that is made to solve every pixel sends the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from against.clips import AFTER_TRACKING, EVERYTHING, clean, start
+
+from vid2ev import load_sensor
+from vid2ev.kernels.layout import HIGH, LOW, PITCH
+from vid2ev.sensors.dvs import Dvs, DvsSpec
+
+SENSORS = {
+    "default": DvsSpec(),
+    "two poles": clean(photoreceptor_tau_us=300, follower_tau_us=100),
+    "two poles after the log": clean(photoreceptor_tau_us=300, follower_tau_us=100, filter="after"),
+    "leak before the log": clean(photoreceptor_tau_us=300, leak_rate_hz=200),
+    "leak after the log": clean(photoreceptor_tau_us=300, leak_rate_hz=200, filter="after"),
+    "everything": EVERYTHING,
+    "after, tracking": AFTER_TRACKING,
+    "v2e-noisy": load_sensor("v2e-noisy"),
+}
+
+
+def solve_all(dvs: Dvs) -> None:
+    """Let the levels that the scan compares, of a sensor of one block, be such that all pixels but bad ones are
+    beyond them."""
+    state = dvs.state()
+    planes = state["fast"].reshape(-1, PITCH)
+    good = planes[HIGH] < np.inf
+    planes[HIGH, good], planes[LOW, good] = -np.inf, np.inf
+    dvs.restore(state)
+
+
+@pytest.mark.parametrize("spec", SENSORS.values(), ids=SENSORS)
+def test_no_pixel_that_has_an_event_is_left_out(spec):
+    """Light goes here and there in steps about as long as the time constants, so that many signals turn within one."""
+    rng = np.random.default_rng(4)
+    t_ns = np.cumsum(10 ** rng.uniform(3.5, 6.5, 60)).astype(np.int64)
+    light = np.exp(-1.5 + 0.25 * rng.normal(size=(60, 30, 60))).astype(np.float32)
+    scans, solves = (start(spec, light, seed=2, skip=False) for _ in range(2))
+    sent = 0
+    for frame, t in zip(light, t_ns.tolist(), strict=True):
+        ours, theirs = scans.step(frame, t), solves.step(frame, t)
+        for name in "txyp":
+            assert np.array_equal(getattr(ours, name), getattr(theirs, name)), (name, t)
+        solve_all(solves)
+        sent += len(ours)
+    assert sent > 1_000
