@@ -7,6 +7,10 @@ d [px] is how far a pixel lies within the overlap; the tile that begins there we
 outer quarter of each tile's overlap, of which a network sees least around, does not count at all.  Each tile is a gap
 for itself, with its part of the events: what is done once per gap, such as the first flow, is done once per tile.
 
+Away from borders a network's tiles are what it makes of the whole, within 1e-5.  Optical flow of DIS is not, as its
+search begins elsewhere in each tile: of `flow`, `guided` and what starts from them 1 to 5 % of the pixels are more than
+1/255 off, and as near to the truth, within 0.03 dB at 1280x720 and 0.2 dB at 333x217.
+
 Frames of up to `WHOLE_PX` pixels are not divided unless asked for, larger ones into tiles of about as many.
 """
 
