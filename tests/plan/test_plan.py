@@ -11,6 +11,7 @@ import pytest
 from against.clips import clean
 
 from vid2ev.errors import UsageError
+from vid2ev.physics.omission import light_events
 from vid2ev.physics.photoreceptor_omission import reach_of_follower
 from vid2ev.plan.measure import scene_of
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
@@ -269,3 +270,64 @@ def test_where_nothing_moves_events_of_the_leak_are_later_or_missing_all_the_sam
     said = EFFECTS[effect].omission(scene_of(spec, (64, 48), frames), spec)
     left = sent(without(spec, effect, said), (64, 48), frames)
     assert 0 < distance(sent(spec, (64, 48), frames), left, (64, 48)) <= said.distance
+
+
+def flashing(contrast_nat: float, dt_ns: int, frames: int, size: tuple[int, int] = (32, 24)) -> list[Frame]:
+    """Light of all pixels that is bright in every other frame."""
+    lights = [np.full(size[::-1], 0.2 * math.exp(contrast_nat * (k % 2)), np.float32) for k in range(frames)]
+    return [Frame(light, k * dt_ns) for k, light in enumerate(lights)]
+
+
+def held(spec: DvsSpec, size: tuple[int, int], frames: list[Frame], *effects: str) -> None:
+    """Hold the bounds of these effects against what leaving them out changes."""
+    seen, full = scene_of(spec, size, frames), sent(spec, size, frames)
+    for effect in effects:
+        said = EFFECTS[effect].omission(seen, spec)
+        assert said.kind == "99.9 % bound"
+        changed = distance(full, sent(without(spec, effect, said), size, frames), size)
+        assert 0 < changed <= said.distance, effect
+
+
+@pytest.mark.parametrize("more", [{"mismatch": 0.015}, {"crossing_noise": 0.01}, {"threshold_off": 0.2}])
+def test_what_trembling_light_has_brought_to_rest_is_not_counted_on(more: dict) -> None:
+    """Levels that are farther apart than light goes: plays have hundreds of events for each one that is sent."""
+    spec = clean(random_phase=True, shot_rate_hz=0.05, hot_probability=0.02, hot_rate_hz=10.0, **more)
+    level = 0.2 * np.abs((np.arange(1500) / 20) % 1 * 2 - 1)
+    frames = [Frame(np.full((24, 32), 0.2 * math.exp(each), np.float32), k * 1_000_000) for k, each in enumerate(level)]
+    held(spec, (32, 24), frames, "shot", "hot")
+
+
+def test_less_is_sent_at_least_than_by_any_thresholds() -> None:
+    """Of trembling light, of light that goes one way all pixels send what plays have."""
+    size, thresholds = (64, 48), {"threshold_on": 0.15, "threshold_off": 0.2}
+    spec = clean(random_phase=True, crossing_noise=0.02, filter="after", **thresholds)
+    rising = [Frame(np.full((48, 64), 0.01 * math.exp(0.05 * k), np.float32), k * 1_000_000) for k in range(60)]
+    for frames, all_of_it in ((trembling(0.3), False), (trembling(1.0), False), (rising, True)):
+        least = light_events(scene_of(spec, size, frames), spec)
+        many = len(sent(spec, size, frames))
+        assert least <= 1.01 * many and (not all_of_it or least >= 0.95 * many)
+
+
+@pytest.mark.parametrize("timing", ["response", "frame"])
+def test_pixels_that_are_blind_may_be_set_to_the_other_half_of_a_flicker(timing: str) -> None:
+    """Shots have them send ON events of light whose OFF events they would send; other pixels see a slow ramp."""
+    spec = clean(random_phase=True, shot_rate_hz=2.5, shot_light_factor=1.0, refractory_us=90.0, timing=timing)
+    frames = flashing(0.2, 50_000, 800)
+    for frame in frames:
+        frame.light[:, 16:] = 0.2 * math.exp(frame.t_ns * 1e-7)
+    held(spec, (32, 24), frames, "shot")
+
+
+def test_events_that_hot_pixels_do_not_send_of_light_are_as_dense_as_these() -> None:
+    spec = clean(random_phase=True, hot_probability=0.1, hot_rate_hz=1.0, threshold_on=0.1, threshold_off=0.1)
+    held(spec, (32, 24), flashing(3.0, 200_000, 200), "hot")
+
+
+def test_where_nothing_moves_the_photoreceptors_noise_sends_events() -> None:
+    """Which move with thresholds, are swallowed, missing and late; and auto leaves out nothing that they depend on."""
+    frames = [Frame(np.full((24, 32), 0.3, np.float32), k * 1_000_000) for k in range(40)]
+    noisy = {"photoreceptor_noise": 0.04, "photoreceptor_tau_us": 300.0, "follower_tau_us": 100.0}
+    spec = DvsSpec(**noisy, mismatch=0.05, crossing_noise=0.03, refractory_us=3000.0, cold_probability=0.1, delay_us=50)
+    held(spec, (32, 24), frames, "photoreceptor_noise", "mismatch", "crossing_noise", "refractory", "cold", "delay")
+    plan = plan_of(scene_of(spec, (32, 24), frames), spec, 0.5)
+    assert not {"crossing_noise", "refractory"} & {*plan.gone}

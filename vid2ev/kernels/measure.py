@@ -37,6 +37,7 @@ from vid2ev.kernels.play import (
     STEEPER,
     STEPS,
     WAY,
+    WIDE,
     follow,
 )
 from vid2ev.physics.log_curve import light_per_nat_32, log_level_32
@@ -52,6 +53,7 @@ class Pace(NamedTuple):
 
     halves       float32 [BLOCK], half of the threshold of each pixel of a block [nat]
     half         of the threshold that all sums are taken in [nat]
+    wide         half of the width that what is sent at least is counted with [nat]; per_on, per_off: for a nat of it
     before_log   light is straight between frames, else its level; bends are relative to the light near them: that from
                  a delay of the poles before the bend to four delays after it
     dt_s         how long it is, before_s the one before it
@@ -66,6 +68,9 @@ class Pace(NamedTuple):
 
     halves: np.ndarray
     half: float
+    wide: float
+    per_on: float
+    per_off: float
     before_log: bool
     dt_s: float
     before_s: float
@@ -101,8 +106,9 @@ class Seen(NamedTuple):
 
 
 @compiled
-def settle_measure(light, shade, curve, halves, found):
-    """Begin with a frame of light [float32, n]: the play of every pixel is pushed from below."""
+def settle_measure(light, shade, curve, halves, below, found):
+    """Begin with a frame of light [float32, n]: the play of every pixel is pushed from below, and the wide one is so
+    far below the signal [nat]."""
     state, tiles = found.state, found.tiles
     for i in range(light.size):
         seen = arriving(light[i]) * (shade[i] if shade.size else F(1.0))
@@ -111,7 +117,7 @@ def settle_measure(light, shade, curve, halves, found):
         level = log_level_32(seen, curve)
         at = (i // BLOCK) * PLANES * PITCH + i % BLOCK
         state[at + LIGHT * PITCH], state[at + LEVEL * PITCH] = seen, level
-        state[at + PLAY * PITCH] = level - halves[i % BLOCK]
+        state[at + PLAY * PITCH], state[at + WIDE * PITCH] = level - halves[i % BLOCK], level - F(below)
         for plane in (SLOPE, WAY, BENDS, SMOOTH):
             state[at + plane * PITCH] = F(0.0)
     if len(found.bare):

@@ -17,8 +17,8 @@ from vid2ev.physics.log_curve import light_per_nat_32
 
 F = np.float32
 # Planes of the state of a block, in units of PITCH; the last two are of memories that jump to the signal.
-LIGHT, LEVEL, SLOPE, PLAY, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH, STIRS, STIRS_AT_TURNS = range(12)
-PLANES = 12
+LIGHT, LEVEL, SLOPE, PLAY, WIDE, WAY, BENDS, TURNS, TURNED_BENDS, TRAVEL, SMOOTH, STIRS, STIRS_AT_TURNS = range(13)
+PLANES = 13
 # Planes of the scratch: light now, the level and the smoothed slope before, bend, all bends as they count at a turn and
 # as they are felt, the greater of the slopes beside the bend.
 SEEN, BEFORE, SMOOTHED, BENT, IF_TURNED, FELT, STEEPER, BARE_BEFORE = (k * PITCH for k in range(8))
@@ -27,8 +27,8 @@ SCRATCH = 8 * PITCH
 AT_LEVEL, AT_PLAY, FROM, AT_SLOPE, AT_SMOOTH, AT_LIGHT = (k * PITCH for k in range(6))
 AT_HALF, PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(6, 15))
 LANES = 15 * PITCH
-TRAVELLED, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(3, 9)  # sums of a block, after its extremes
-FIGURES = 9
+TRAVELLED, AT_LEAST, PUSHED_S, TURNED, BEND, TURN_BEND, DENSE = range(3, 10)  # sums of a block, after its extremes
+FIGURES = 10
 # How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
 BY_SLOPE, BY_TURNS, BY_BENDS, BY_LIGHT, BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS = range(7)
 BY_ALL, BY_JUMPS = 4, 7  # how many there are, without and with memories that jump
@@ -54,7 +54,7 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     where it goes another way or none, a turn.
     """
     # (sums in numbers of their own: an entry of an array would go through memory each time)
-    travelled = pushed_s = turns = bends = turn_bends = dense = 0.0
+    travelled = at_least = pushed_s = turns = bends = turn_bends = dense = 0.0
     mean, dt = F(num.half), num.dt_s
     for k in range(count):
         i, pushed, half = np.uintp(hits[k]), lanes[k + PUSHED], lanes[k + AT_HALF]
@@ -80,6 +80,7 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
         here_s = dt * lanes[SHARE + k]
         own[PLAY * PITCH + i] = own[LEVEL * PITCH + i] - pushed * half
         own[TRAVEL * PITCH + i] += moved
+        at_least += widely(i, half, gone, num, own)
         travelled += moved
         pushed_s += here_s
         note(spread, BY_TURNS, own[TURNS * PITCH + i], lost)
@@ -94,11 +95,25 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
         note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
         dense += moved * lanes[BUNCHED + k]
     tile[TRAVELLED] += travelled
+    tile[AT_LEAST] += at_least
     tile[PUSHED_S] += pushed_s
     tile[TURNED] += turns
     tile[BEND] += bends
     tile[TURN_BEND] += turn_bends
     tile[DENSE] += dense
+
+
+@inner
+def widely(i, half, gone, num, own):
+    """Push the wide play of a pixel by its play, as plays of plays are plays; returns by how much [nat]."""
+    wide = own[WIDE * PITCH + i]
+    ahead = own[PLAY * PITCH + i] - wide
+    pushed = F(max(abs(ahead) - (F(num.wide) - half), F(0.0)))
+    own[WIDE * PITCH + i] = wide + (pushed if ahead > F(0.0) else -pushed)
+    pushed *= F(num.per_on) if ahead > F(0.0) else F(num.per_off)
+    if len(num.tracks):
+        pushed /= F(1.0) + gone * F(num.blind_s / (num.dt_s * 2.0 * num.half))
+    return pushed
 
 
 @inner

@@ -21,9 +21,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.omission import kind_of, light_events
+from vid2ev.physics.omission import kind_of, light_events, sent_share, trembling
 from vid2ev.physics.random import HOT_MAP, philox, unit
-from vid2ev.stream.bounds import added, at_most, surely
+from vid2ev.stream.bounds import added, at_most, surely, together
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
@@ -47,20 +47,27 @@ def bad_pixel_map(n, seed, camera, hot_probability, cold_probability):
 
 
 def omission_of_hot(scene: Scene, spec: Any) -> Omission:
-    """The hot pixels."""
+    """The hot pixels: their events, and those of light that they do not send.
+
+    Of Poisson's events, each is by itself, and their mean rate adds to that of the events of light, which may be of
+    the other sign: the root of what both change is no more than the sum of the two.
+    """
     extra = at_most(at_most(spec.hot_probability * scene.pixels) * spec.hot_rate_hz * scene.seconds)
-    bunched = 1.0 + 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S
-    distance = added(light_events(scene, spec), extra, surely(scene, spec.hot_probability)) * bunched
+    share = added(light_events(scene, spec), extra, 0.0)
+    of_light = min(surely(scene, spec.hot_probability, sent_share(scene, spec)), 1.0)
+    of_light *= 0.0 if scene.still else 0.5 * scene.bunched
+    distance = share + together(share * 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S, of_light)
     figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
     return Omission(distance, kind_of(spec), figure, f"{extra:.0f} events at most")
 
 
 def omission_of_cold(scene: Scene, spec: Any) -> Omission:
     """The cold pixels."""
-    share, noisy = surely(scene, spec.cold_probability), spec.leak_rate_hz > 0 or spec.shot_rate_hz > 0
+    share = surely(scene, spec.cold_probability, sent_share(scene, spec))
+    noisy = spec.leak_rate_hz > 0 or spec.shot_rate_hz > 0 or spec.photoreceptor_noise > 0
     if noisy:
         share = max(share, at_most(spec.cold_probability * scene.pixels) / scene.pixels)
     share = min(share, 1.0)
-    bunched = max(scene.bunched, 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S)
+    bunched = max(scene.bunched, 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S, trembling(scene, spec)[1])
     distance = 0.0 if scene.still and not noisy else share / (2.0 - share) * bunched
     return Omission(distance, "99.9 % bound", f"{spec.cold_probability:.3g} of the events", "silent pixels")

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.omission import echoes, light_events, noise_events, omitted
+from vid2ev.physics.omission import echoes, light_events, noise_events, omitted, sent_share
 from vid2ev.stream.bounds import added, elsewhere, off_by
 from vid2ev.stream.scene import Omission, Scene
 
@@ -36,7 +36,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     figure = f"{spec.leak_rate_hz:.3g} events/pixel/s"
     error = np.full(len(scene.travel), per_pixel * spec.threshold_on)
     moved = omitted(scene, spec, off_by(scene, error, echoes=echoes(spec), one_way=True), figure, "")
-    touched = min(per_pixel, 1.0) * elsewhere(scene) if echoes(spec) else 0.0
+    touched = min(per_pixel, 1.0) * elsewhere(scene) / max(sent_share(scene, spec), 1e-9) if echoes(spec) else 0.0
     extra = added(light_events(scene, spec) + noise_events(scene, spec)[0], per_pixel * scene.pixels, touched)
     why = f"{per_pixel:.2g} events more per pixel, and levels off by as many thresholds"
     anyway = omitted(scene, spec, math.inf, figure, "").distance

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.physics.slopes import slopes_of
-from vid2ev.physics.thresholds import soon, spread_of
+from vid2ev.physics.slopes import most_too_soon, slopes_of
+from vid2ev.physics.thresholds import STEPS, soon, spread_of, spread_thresholds
 from vid2ev.stream.bounds import at_least, at_most, off_by, surely, unlike
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 
@@ -47,6 +47,8 @@ def kind_of(spec: Any) -> Kind:
 
 def obstacle(spec: Any) -> str:
     """Why the bounds by levels do not hold for a sensor; "" where they do."""
+    if spec.photoreceptor_noise > 0:
+        return "noise that trembles sends events wherever levels are, and others if these move"
     if not spec.random_phase and not (spec.mismatch > 0 or spec.crossing_noise > 0):
         return "all pixels start in step, so nothing is known of how far their levels are"
     return ""
@@ -61,7 +63,7 @@ def crowding(spec: Any, scene: Scene) -> float:
     spread = spread_of(spec)
     if spread == 0.0:
         return 1.0 if spec.random_phase else math.inf
-    in_step = max(min(spec.threshold_on, spec.threshold_off) / (spread * math.sqrt(2.0 * math.pi)), 1.0)
+    in_step = max(_in_step(spec), 1.0)
     if not spec.random_phase:
         return in_step
     return 1.0 + min(reset(scene, spec) + _at_rest(scene, spec), 1.0) * (in_step - 1.0)
@@ -96,8 +98,40 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def light_events(scene: Scene, spec: Any) -> float:
     """How many events of light there are at least, on average."""
-    crossings = scene.travel_at_least / scene.threshold - _missing(scene, spec)
-    return max(crossings, 0.0) * (1.0 - unsent(scene, spec))
+    return crossings(scene, spec) * (1.0 - unsent(scene, spec))
+
+
+def crossings(scene: Scene, spec: Any) -> float:
+    """How many crossings of light there are at least, on average."""
+    return max(float(scene.travel_at_least.sum()) / scene.threshold - _rounded(scene, spec), 0.0)
+
+
+def sent_share(scene: Scene, spec: Any) -> float:
+    """The share of the events of light expected that is sent at least."""
+    return min(light_events(scene, spec) / scene.events, 1.0) if not scene.still else 0.0
+
+
+def set_anew(scene: Scene, spec: Any, share: float) -> float:
+    """Bound on the distance where memories are set to the signal in a share of the pixels [mean], which go on from
+    there, so that all their events may be others.
+
+    Two memories on one signal take turns, one event of this after one of that, and so each two cost no more than one
+    by itself.  Not so where a pixel is blind after an event: then one of them may send the ON events of light that
+    flickers, and the other the OFF events.  Levels that start from the signal are as crowded as those of pixels in
+    step; there is one event more, at most, each time that the pixel is pushed.
+    """
+    if scene.still:
+        return 0.0
+    spread = spread_of(spec)
+    in_step = max(_in_step(spec) - 1.0, 0.0) if spread > 0.0 else math.inf
+    more = 1.0 + 0.5 * min(float(scene.turns.sum()) / scene.events, in_step)
+    each = unlike(scene) if unsent(scene, spec) > 0.0 else 1.0
+    return min(surely(scene, share * more * each, sent_share(scene, spec)), unlike(scene))
+
+
+def _in_step(spec: Any) -> float:
+    """How crowded levels are that start together, for thresholds that are spread."""
+    return min(spec.threshold_on, spec.threshold_off) / (spread_of(spec) * math.sqrt(2.0 * math.pi))
 
 
 def unsent(scene: Scene, spec: Any) -> float:
@@ -112,22 +146,25 @@ def unsent(scene: Scene, spec: Any) -> float:
     leaked, (travel, _) = spec.leak_rate_hz * spec.threshold_on * blind_s, scene.by_slope
     slopes, seen = slopes_of(scene, spec), np.flatnonzero(travel)
     chances = [soon(slopes[k] * blind_s + leaked, spec)[0] for k in seen]
-    return min(float(np.dot(chances, travel[seen])) / float(travel.sum()), 1.0)
+    return min(float(np.dot(chances, travel[seen])) / float(travel.sum()), most_too_soon(scene, blind_s, spec))
 
 
 def _missing(scene: Scene, spec: Any) -> float:
-    """How many events the poles round off at turns; of pixels in step, up to one for each time that they are pushed."""
+    """How many events poles round off; of pixels in step, up to one more for each time that they are pushed."""
+    in_step = 0.0 if spec.random_phase else float(scene.turns.sum()) + scene.moving
+    return _rounded(scene, spec) + in_step
+
+
+def _rounded(scene: Scene, spec: Any) -> float:
+    """How many events the poles round off at turns."""
     _, slowest_us = taus_of(scene, spec)
     reach_s = 0.5e-6 * np.hypot(slowest_us, spec.follower_tau_us)
-    missing = 2.0 * float(np.dot(reach_s, scene.bend_at_turns)) / scene.threshold
-    if not spec.random_phase:
-        missing += float(scene.turns.sum()) + scene.moving
-    return missing
+    return 2.0 * float(np.dot(reach_s, scene.bend_at_turns)) / scene.threshold
 
 
 def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
-    """How many events shot noise and hot pixels send at least and at most, each in 999 of 1000 cases, and leak with
-    them at most; light is to an octave."""
+    """How many events shot noise and hot pixels send at least and at most, each in 999 of 1000 cases, and with them
+    leak and noise of the photoreceptor at most; light is to an octave."""
     octaves = np.exp2(np.arange(len(scene.brightness) + 1) - 20.0)
     shares = 1.0 - (1.0 - spec.shot_light_factor) * np.minimum(octaves, 1.0)
     pixels = scene.brightness / max(float(scene.brightness.sum()), 1.0) * scene.pixels
@@ -135,14 +172,49 @@ def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
         spec.shot_rate_hz * float(np.dot(pixels, each)) * scene.seconds for each in (shares[1:], shares[:-1])
     )
     hot, hot_s = spec.hot_probability * scene.pixels, spec.hot_rate_hz * scene.seconds
-    leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
-    return at_least(least) + at_least(at_least(hot) * hot_s), at_most(most) + at_most(at_most(hot) * hot_s) + leaked
+    others = _unforced(scene, spec)
+    return at_least(least) + at_least(at_least(hot) * hot_s), at_most(most) + at_most(at_most(hot) * hot_s) + others
+
+
+def _unforced(scene: Scene, spec: Any) -> float:
+    """How many events leak and noise of the photoreceptor send at most; they depend on where levels are."""
+    return spec.leak_rate_hz * scene.pixels * scene.seconds + trembling(scene, spec)[0]
+
+
+def trembling(scene: Scene, spec: Any) -> tuple[float, float]:
+    """How many events noise of the photoreceptor sends at most, in 999 of 1000 cases, and what each half of one costs
+    beside the others.
+
+    Of levels that lie anywhere, the one that is s away from the middle switches there and back no more often than the
+    noise reaches |s| + theta/2, so by Rice's rate nu they send, for a pixel's theta,
+
+        2/theta integral nu(|s| + theta/2) ds = 2 nu(0) sqrt(2 pi) rms/theta erfc(theta / (sqrt(8) rms))  [1/s]
+
+    and those at the middle 2 nu(theta/2); once more for each threshold that the greatest excursion reaches over.  A
+    level sends ON and OFF in turn, so by itself each costs no more than the half of one; and as the root of D is a
+    metric, levels m thresholds farther, that switch less often by exp(-m (m + 1) theta^2 / (2 rms^2)), cost together
+    the square of the sum of the roots.
+    """
+    rms = spec.photoreceptor_noise
+    if rms == 0.0:
+        return 0.0, 1.0
+    per_s = 1e6 / (2.0 * math.pi * math.sqrt(spec.photoreceptor_tau_us * spec.follower_tau_us))
+    reach_nat = rms * math.sqrt(2.0 * math.log(2.0 + per_s * scene.seconds))
+    thetas = spread_thresholds(min(spec.threshold_on, spec.threshold_off), spec, STEPS) / rms
+    anywhere = math.sqrt(2.0 * math.pi) / thetas * np.array([math.erfc(theta / math.sqrt(8.0)) for theta in thetas])
+    rates_hz = 2.0 * per_s * np.maximum(anywhere, np.exp(-0.125 * thetas**2))
+    events = rates_hz * scene.seconds + 2.0 * reach_nat / rms / thetas
+    farther = np.arange(1.0, 64.0)[:, None]
+    less = np.exp(-0.5 * farther * (farther + 1.0) * thetas**2)
+    costs = (1.0 + 2.0 * np.sqrt(less).sum(axis=0)) ** 2 / (1.0 + 2.0 * less.sum(axis=0))
+    return at_most(scene.pixels * float(events.mean())), float(np.dot(costs, events) / events.sum())
 
 
 def late_noise(scene: Scene, spec: Any, late_us: float) -> float:
     """Bound on the distance where all events of noise are later."""
     _, most = noise_events(scene, spec)
     bunched = 1.0 + 2.0 * DISTANCE_TAU_S * max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability else 0.0)
+    bunched = max(bunched, trembling(scene, spec)[1])
     share = most / max(most + light_events(scene, spec), 1e-9)
     return share * bunched * min(1e-6 * late_us / DISTANCE_TAU_S, 1.0)
 
@@ -158,21 +230,21 @@ def omitted(
 ) -> Omission:
     """The 99.9 % bound from one on the mean distance of events of light, which levels anywhere would make; infinite
     where nothing is known but how dense events are.  Signals are no further apart than by lag_s.  Events of the leak
-    are other ones, too, and those of noise that a pixel is blind to.
+    and of the photoreceptor's noise are other ones, too, and those of noise that a pixel is blind to.
 
     Where memories jump to the signal, it is an estimate (`kind_of`), unless it is how dense events are that counts.
     """
     kind: Kind = "99.9 % bound"
     spread = spread_of(spec)
-    if scene.still and not spec.leak_rate_hz:
+    if scene.still and not spec.leak_rate_hz and not spec.photoreceptor_noise:
         return Omission(0.0, "99.9 % bound", figure, why, replace)
     noise, most = noise_events(scene, spec)
-    leaked = spec.leak_rate_hz * scene.pixels * scene.seconds
+    unforced = _unforced(scene, spec)
     light = min(crowding(spec, scene), 1e9) * scene.events
-    swallowed = light * spec.refractory_us * 1e-6 * (most - leaked) / max(scene.pixels * scene.seconds, 1e-9)
-    many = light + leaked + min(swallowed, noise)
+    swallowed = light * spec.refractory_us * 1e-6 * (most - unforced) / max(scene.pixels * scene.seconds, 1e-9)
+    many = light + unforced + min(swallowed, noise)
     share = many / (many + noise)
-    distance = max(unlike(scene, lag_s), 1.0) * share
+    distance = max(unlike(scene, lag_s), trembling(scene, spec)[1]) * share
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
         sent = 1.0 - unsent(scene, spec)

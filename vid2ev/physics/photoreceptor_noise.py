@@ -25,11 +25,11 @@ from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.physics.elementary import exp64, log64
-from vid2ev.physics.omission import light_events
+from vid2ev.physics.omission import light_events, trembling
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
-from vid2ev.stream.bounds import added, at_most, surely, unlike
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
+from vid2ev.stream.bounds import added, surely, unlike
+from vid2ev.stream.scene import Omission, Scene
 
 RESOLVED = 8.0
 
@@ -98,14 +98,9 @@ def rice_gap(pixel, k, num, iv):
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
-    """The noise: events come where it spans a threshold, by Rice's rate at half of one to either side of its middle,
-    and once more for each threshold that its greatest excursion reaches over; all others move."""
-    rms, threshold = spec.photoreceptor_noise, min(spec.threshold_on, spec.threshold_off)
-    per_s = 1e6 / (2.0 * math.pi * math.sqrt(spec.photoreceptor_tau_us * spec.follower_tau_us))
-    rate_hz = 2.0 * per_s * math.exp(-0.125 * (threshold / rms) ** 2)
-    reach_nat = rms * math.sqrt(2.0 * math.log(2.0 + per_s * scene.seconds))
-    extra = at_most(scene.pixels * (rate_hz * scene.seconds + 2.0 * reach_nat / threshold))
-    bunched = 1.0 + 2.0 * rate_hz * DISTANCE_TAU_S
+    """The noise: events come where it spans a threshold (`omission.trembling`); all others move."""
+    extra, bunched = trembling(scene, spec)
+    rate_hz = extra / max(scene.pixels * scene.seconds, 1e-9)
     distance = surely(scene, unlike(scene)) + added(light_events(scene, spec), extra, 0.0) * bunched
     why = f"{extra:.0f} events at most, and all others move by noise over slope"
     return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)

@@ -21,8 +21,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.omission import crowding, light_events, noise_events, omitted
-from vid2ev.physics.slopes import slopes_of, steepest
+from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
+from vid2ev.physics.slopes import most_too_soon, slopes_of, steepest
 from vid2ev.physics.thresholds import soon
 from vid2ev.stream.bounds import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
@@ -66,15 +66,14 @@ def omission(scene: Scene, spec: Any) -> Omission:
     why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
     why += f", and {noise:.2g} by noise" if noise else ""
     together = cost / swallowed if swallowed else 1.0
-    crossings, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
-    others = light_events(scene, spec) + noise_events(scene, spec)[0]
+    swallowed = min(swallowed, total * most_too_soon(scene, spec.refractory_us * 1e-6, spec))
+    gone, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
+    both = crossings(scene, spec) + light_events(scene, spec) + 2.0 * noise_events(scene, spec)[0] - noisy
     rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
     dense = 1.0 + 2.0 * DISTANCE_TAU_S * rate_hz * min(rate_hz * spec.refractory_us * 1e-6, 1.0)
-    both = max(2.0 * others - crossings - noisy, 1e-9)
     said = omitted(scene, spec, math.inf, figure, why)
-    of_light = crossings * together / both
-    of_light = of_light if scene.still else min(of_light, said.distance or math.inf)
-    return replace(said, distance=float(of_light + noisy * dense / both))
+    distance = (gone * together + noisy * dense) / max(both, 1e-9)
+    return replace(said, distance=float(min(distance, max(said.distance or 0.0, dense))))
 
 
 def _swallowed_with_noise(scene: Scene, spec: Any) -> float:

@@ -25,7 +25,7 @@ from pydantic import BaseModel, Field
 
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
-from vid2ev.physics.omission import echoes, light_events, omitted, reset
+from vid2ev.physics.omission import echoes, light_events, omitted, reset, set_anew
 from vid2ev.physics.photoreceptor_omission import lag_s, otherwise_late
 from vid2ev.stream.bounds import added, at_most, bare
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
@@ -61,7 +61,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
         mean += otherwise_late(scene, spec, tuple(gains))
     said = omitted(scene, spec, mean, figure, "a constant gain does not change the log", lag_s=lag_s(scene, spec))
-    extra = added(light_events(scene, spec), _other_shots(scene, spec, gains), reset(scene, spec))
+    others = set_anew(scene, spec, reset(scene, spec))
+    extra = added(light_events(scene, spec), _other_shots(scene, spec, gains), others)
     return replace(said, distance=(said.distance or 0.0) + 2.0 * extra)
 
 

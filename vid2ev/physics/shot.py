@@ -21,8 +21,8 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.omission import kind_of, light_events
-from vid2ev.stream.bounds import added, at_most, surely
+from vid2ev.physics.omission import kind_of, light_events, set_anew
+from vid2ev.stream.bounds import added, at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 CELL_NS, CELL_PIXELS = 1_000_000, 2048
@@ -46,8 +46,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     least = np.clip(scene.light_min, 0.0, 1.0)
     rate_hz = spec.shot_rate_hz * float(np.mean(1.0 - (1.0 - spec.shot_light_factor) * least))
     extra = at_most(rate_hz * scene.pixels * scene.seconds)
-    touched = surely(scene, -math.expm1(-spec.shot_rate_hz * scene.seconds))
     bunched = 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S
-    distance = added(light_events(scene, spec), extra, touched) * bunched
+    distance = added(light_events(scene, spec), extra, 0.0) * bunched
+    distance += set_anew(scene, spec, -math.expm1(-spec.shot_rate_hz * scene.seconds))
     why = f"{extra:.0f} events at most, and their pixels' levels"
     return Omission(distance, kind_of(spec), f"{rate_hz:.3g} events/pixel/s", why)

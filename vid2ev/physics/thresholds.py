@@ -24,6 +24,13 @@ def spread_of(spec: Any) -> float:
     return math.hypot(spec.mismatch, spec.crossing_noise)
 
 
+def widest(spec: Any) -> float:
+    """How far the ON level and the OFF level of a pixel are apart at most, whatever is drawn at its crossings, on
+    average over all pixels [nat]."""
+    means = np.array([spec.threshold_on, spec.threshold_off])
+    return float(_limited(means, spec.crossing_noise, np.array(np.inf)).sum())
+
+
 def spread_thresholds(mean: float, spec: Any, count: int) -> np.ndarray:
     """So many thresholds of this mean that stand for those of all pixels and crossings, in no order [nat]."""
     draws, normal = random.Random(0), NormalDist()
@@ -55,6 +62,17 @@ def chances_below(level: float, mean: float, spec: Any) -> tuple[float, float]:
 def soon(way_nat: float, spec: Any) -> tuple[float, float]:
     """`chances_below` of the polarity that is the sooner reached after an event, while the signal goes so far."""
     return max(chances_below(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
+
+
+@lru_cache(64)
+def per_nat(spec: Any) -> float:
+    """1 / threshold on average, as thresholds are met, lower ones the more often [1/nat].
+
+    So many crossings there are on average in each nat that a signal goes after one, at most: by the renewal equation
+    N(x) = integral up to x of 1 + N(x - theta), and E 1/theta E min(theta, x) >= E min(1, x / theta) >= P(theta <= x).
+    """
+    often = 1.0 / spread_thresholds(min(spec.threshold_on, spec.threshold_off), spec, STEPS)
+    return float((often**2).sum() / often.sum())
 
 
 def _limited(means: np.ndarray, sigma: float, z: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import tracks
 from vid2ev.physics.shading import shading_map
-from vid2ev.physics.thresholds import spread_thresholds
+from vid2ev.physics.thresholds import spread_thresholds, widest
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.frames import Frame
@@ -31,7 +31,7 @@ LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 45 bytes a pixel, for a
+    The light that is measured is that behind the sensor's lens shading.  Memory is 49 bytes a pixel, for a
     shading 33 more, for memories that jump to the signal 12.  What frames say of what is still (`Frame.still`) is taken
     for granted where it is about the last one.  `threads` change nothing but the time it takes.
     """
@@ -41,6 +41,7 @@ class Measure:
         self.spec, self.size = spec, (width, height)
         self._curve = curve_of(spec.log_curve, spec.dark_level)
         self._half = 0.5 * min(spec.threshold_on, spec.threshold_off)
+        self._wide = 0.5 * widest(spec)
         self._halves = (0.5 * spread_thresholds(2 * self._half, spec, BLOCK)).astype(np.float32)
         self._shade = shading_map(spec.shading, width, height).ravel() if spec.shading else np.empty(0, np.float32)
         blocks = -(-width * height // BLOCK)
@@ -73,7 +74,8 @@ class Measure:
             raise UsageError(f"frame time {frame.t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames")
         light = np.ascontiguousarray(frame.light, np.float32).reshape(-1)
         if self._t_ns is None or frame.cut:
-            settle_measure(light, self._shade, self._curve, self._halves, self._found)
+            below = self._wide if self.spec.random_phase else 0.0
+            settle_measure(light, self._shade, self._curve, self._halves, below, self._found)
             self._dt_s = math.inf
         else:
             self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
@@ -93,7 +95,6 @@ class Measure:
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
-            travel_at_least=self._at_least(travel),
             by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
             **dict(zip(SPREAD, _spread(self._found.spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
@@ -108,6 +109,9 @@ class Measure:
         pace = Pace(
             halves=self._halves,
             half=self._half,
+            wide=self._wide,
+            per_on=2.0 * self._half / self.spec.threshold_on,
+            per_off=2.0 * self._half / self.spec.threshold_off,
             before_log=self.spec.filter == "before",
             dt_s=dt_s,
             before_s=self._dt_s,
@@ -128,13 +132,6 @@ class Measure:
             )
         )
         self._dt_s = dt_s
-
-    def _at_least(self, travel: np.ndarray) -> float:
-        """The travel [nat] that is there at least: where pixels keep a threshold until it is crossed, trembling light
-        leaves them at greater ones than are drawn, so those of the greater half stand for all."""
-        if self.spec.crossing_noise == 0:
-            return float(travel.sum())
-        return 2.0 * float(travel[:, :BLOCK][:, self._halves >= np.float32(self._half)].sum())
 
     def _plane(self, plane: int) -> np.ndarray:
         """A plane of the state [tiles, PITCH]; beyond the pixels there is nothing."""

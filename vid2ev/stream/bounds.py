@@ -103,9 +103,10 @@ def elsewhere(scene: Scene) -> float:
     return float(scene.by_turns[0].sum() / scene.travel.sum()) if not scene.still else 0.0
 
 
-def surely(scene: Scene, mean: float) -> float:
+def surely(scene: Scene, mean: float, share: float = 1.0) -> float:
     """The 99.9 % bound on a distance of this mean (Chernoff): pixels are independent, each event of light is as likely
-    to be the first that changes as any other, and what follows in its pixel changes with it.
+    to be the first that changes as any other, and what follows in its pixel changes with it.  Of all pixels a share
+    sends what is expected of it, the others nothing; infinite if that may be none.
 
     For independent X_i, even on [0, m_i] with the chance 2 mu_i / m_i and else 0, and all l > 0,
 
@@ -113,11 +114,13 @@ def surely(scene: Scene, mean: float) -> float:
     """
     if scene.still or mean == 0.0:
         return mean
+    if share <= 0.0:
+        return math.inf
     most = np.arange(len(scene.by_pixel)) + 2.0  # events
-    means = mean * scene.by_pixel / scene.threshold  # [events]
+    means = share * mean * scene.by_pixel / scene.threshold  # [events]
     tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
     sums = (2.0 * means * (np.expm1(tries * most) / (tries * most) - 1.0) / most).sum(axis=1)
-    return float(((sums + RARE) / tries[:, 0]).min()) / scene.events
+    return float(((sums + RARE) / tries[:, 0]).min()) / (share * scene.events)
 
 
 def added(events: float, extra: float, touched: float) -> float:

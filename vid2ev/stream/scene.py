@@ -24,6 +24,14 @@ within theta moves the pixels whose thresholds are lower, and these send the mor
 measured with a threshold of its own, spread as the sensor's are, of 2048 that stand for all, and what it adds to a sum
 weighs theta / its own: all sums are those of events, times the mean theta.
 
+Light that trembles brings such levels to rest where it does not reach them, and there they stay: sooner or later a
+pixel whose ON and OFF levels are farther apart than light goes sends nothing, however often that plays would have it.
+What is sent **at least** goes by W, what the levels of a pixel are apart at most.  The memory keeps within them, and so
+goes as far as the play of width W does, which goes least of all that keeps within W of the signal (truncated
+variation: R. Lochowski, "On truncated variation, upward truncated variation and downward truncated variation", 2011).
+This is sup sum (|dy| - W)+ over all partitions of the time, and so convex in y and in W: noise in y, and thresholds
+that differ from pixel to pixel, make it no less on average.
+
 **Memories that jump to the signal** a blind time R after each event (`refractory = "track"`) follow each other by
 t -> t':  y(t') = y(t + R) +- theta.  Events are theta + R |dy/dt| of the signal apart, so travel is counted as that
 much less.  Let b = a + e.  From event to event the error of the memory grows by e(t + R) - e(t'), its share of a
@@ -54,7 +62,18 @@ import numpy as np
 DISTANCE_TAU_S = 1e-3
 
 Kind = Literal["exact", "bound", "99.9 % bound", "estimate", "no bound yet"]
-OF_TILES = ("light_min", "light_max", "slope_max", "travel", "pushed_s", "turns", "bend", "bend_at_turns", "dense")
+OF_TILES = (
+    "light_min",
+    "light_max",
+    "slope_max",
+    "travel",
+    "travel_at_least",
+    "pushed_s",
+    "turns",
+    "bend",
+    "bend_at_turns",
+    "dense",
+)
 OF_BARE = ("bare_apart", "bare_frozen", "bare_travel")
 SPREAD = (
     "by_slope",
@@ -101,7 +120,7 @@ class Scene:
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
     travel                    [tiles] sum |dp| [nat]: events expected, times the threshold
-    travel_at_least           of all tiles, whatever the noise at crossings does [nat]
+    travel_at_least           [tiles] that of the play as wide as levels may be apart [nat]
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
@@ -131,7 +150,7 @@ class Scene:
     light_max: np.ndarray
     slope_max: np.ndarray
     travel: np.ndarray
-    travel_at_least: float
+    travel_at_least: np.ndarray
     pushed_s: np.ndarray
     turns: np.ndarray
     bend: np.ndarray
