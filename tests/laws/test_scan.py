@@ -16,6 +16,9 @@ SENSORS = {
     "two poles after the log": clean(photoreceptor_tau_us=300, follower_tau_us=100, filter="after"),
     "leak before the log": clean(photoreceptor_tau_us=300, leak_rate_hz=200),
     "leak after the log": clean(photoreceptor_tau_us=300, leak_rate_hz=200, filter="after"),
+    "shots between": clean(
+        photoreceptor_tau_us=300, filter="after", leak_rate_hz=200, shot_rate_hz=300, crossing_noise=0.04
+    ),
     "everything": EVERYTHING,
     "after, tracking": AFTER_TRACKING,
     "v2e-noisy": load_sensor("v2e-noisy"),
@@ -36,8 +39,9 @@ def solve_all(dvs: Dvs) -> None:
 def test_no_pixel_that_has_an_event_is_left_out(spec):
     """Light goes here and there in steps about as long as the time constants, so that many signals turn within one."""
     rng = np.random.default_rng(4)
-    t_ns = np.cumsum(10 ** rng.uniform(3.5, 6.5, 60)).astype(np.int64)
-    light = np.exp(-1.5 + 0.25 * rng.normal(size=(60, 30, 60))).astype(np.float32)
+    short, contrast = np.arange(100) >= 60, np.repeat([0.25, 1.0], [60, 40])  # (short: noise is resolved)
+    t_ns = np.cumsum(np.where(short, 1e4, 10 ** rng.uniform(3.5, 6.5, 100))).astype(np.int64)
+    light = np.exp(-1.5 + contrast[:, None, None] * rng.normal(size=(100, 30, 60))).astype(np.float32)
     scans, solves = (start(spec, light, seed=2, skip=False) for _ in range(2))
     sent = 0
     for frame, t in zip(light, t_ns.tolist(), strict=True):

@@ -254,3 +254,47 @@ def test_a_sensor_that_slept_owes_nothing_to_a_state_that_it_takes_up():
         ours, theirs = (dvs.step(dark, 300_000 + 100_000 * k) for dvs in (slept, other))
         assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.x, theirs.x)
     assert_same_state(slept, other)
+
+
+def assert_alike(spec: DvsSpec, light: np.ndarray, t_ns: np.ndarray, seed: int = 0) -> None:
+    """A sensor that may sleep and one that walks all send the same, and have the same in them at the end."""
+    skips, walks = (Dvs(spec, light.shape[:0:-1], seed=seed, skip=skip) for skip in (True, False))
+    for frame, t in zip(light, t_ns.tolist(), strict=True):
+        ours, theirs = skips.step(frame, t), walks.step(frame, t)
+        assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.p, theirs.p)
+    assert skips.slept[0] > 0
+    assert_same_state(skips, walks)
+
+
+@pytest.mark.parametrize("dt_ns", [100_000, 5_000_000])
+def test_a_pixel_by_itself_wakes_for_what_its_shots_leave_to_be_reached(dt_ns):
+    """It sleeps between its levels, near one and then near the other: a shot has it go on from where it is, and from
+    there the light or the leak may reach a level that they did not before."""
+    spec = load_sensor("v2e-noisy", ["leak_rate_hz=3", f"shot_rate_hz={1e7 / dt_ns}"])
+    nats = np.repeat(0.18 * np.array([0, 1, -1, 1, -1]), 90)
+    light = 0.5 * np.exp(nats).astype(np.float32)[:, None, None]
+    for seed in range(20):
+        assert_alike(spec, light, dt_ns * np.arange(len(light)), seed)
+
+
+def test_an_interval_too_short_for_a_lag_to_move_does_not_end_the_making_up():
+    spec = clean(photoreceptor_tau_us=1e6, follower_tau_us=5e5)
+    light = np.full((60, *SIZE[::-1]), 0.5, np.float32)
+    light[0] = 0.47
+    dt_ns = np.where(np.arange(60) % 20 < 10, 10, 50_000_000)
+    assert_alike(spec, light, np.cumsum(dt_ns))
+
+
+def test_strips_that_change_now_and_then_are_asked_as_often_as_it_pays():
+    """Where frames say nothing, ever more rarely while they change; of those that do every word is heard."""
+    light = np.full((18, *SIZE[::-1]), 0.5, np.float32)
+    light[1:9] *= np.exp(0.01 * np.arange(1, 9, dtype=np.float32))[:, None, None]
+    light[9:] = light[8]
+    frames = list(light)
+    for told, slept in ((False, 2), (True, 9)):
+        dvs = Dvs(load_sensor("ideal"), SIZE)
+        dvs.step(frames[0], 0)
+        for k in range(1, 18):
+            still = Still(frames[k - 1], still_strips(frames[k - 1], frames[k])) if told else None
+            dvs.step(frames[k], 1_000_000 * k, still)
+        assert dvs.slept[0] == 27 * slept
