@@ -18,13 +18,16 @@ from interp.precision import in_full_precision
 
 
 @in_full_precision
-def warp(images: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
+def warp(images: torch.Tensor, flow: torch.Tensor, corner: tuple[int, int] | None = None) -> torch.Tensor:
     """Pictures [B, C, H, W] where a flow leads: [B, C, h, w] for a flow [B, 2, h, w] px.
 
     Of N flows for each picture, [B, N, 2, h, w], it gives [B, N, C, h, w] without copies of the pictures.
+
+    corner   row and column of the pictures at which the flow begins, where it is of a part of them
     """
     here = pixel_places(*flow.shape[-2:], device=flow.device, dtype=flow.dtype)
-    return sample(images, here + torch.nan_to_num(flow))
+    places = here + torch.nan_to_num(flow)
+    return sample(images, places) if corner is None else _sample_part(images, places, corner)
 
 
 @in_full_precision
@@ -40,6 +43,18 @@ def sample(images: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
     below = grid.flatten(1, 2)  # the N pictures as one, below each other
     found = F.grid_sample(larger, below, mode="bilinear", padding_mode="border", align_corners=False)
     return found.unflatten(2, grid.shape[1:3]).transpose(1, 2)
+
+
+def _sample_part(images: torch.Tensor, places: torch.Tensor, corner: tuple[int, int]) -> torch.Tensor:
+    """Pictures at places from a corner on; no more of them is touched than is looked at."""
+    looked_at, from_there = [], []
+    for start, place, side in zip(corner, reversed(places.unbind(-3)), images.shape[-2:], strict=True):
+        inside = (place + start).clamp(0, side - 1)
+        first = int(inside.min())
+        looked_at.append(slice(first, int(inside.max()) + 2))
+        from_there.append(inside - first)
+    rows, columns = looked_at
+    return sample(images[..., rows, columns], torch.stack(from_there[::-1], -3))
 
 
 def pixel_places(height: int, width: int, **kind: object) -> torch.Tensor:

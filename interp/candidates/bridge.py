@@ -53,17 +53,34 @@ class Candidates:
 
 
 @in_full_precision
-def integrated(light_0: torch.Tensor, light_1: torch.Tensor, events: EventCounts, times: torch.Tensor) -> Candidates:
-    """What the events make of the luminance of both frames, [B, 1, H, W], at times [B, N]."""
+def integrated(
+    light_0: torch.Tensor,
+    light_1: torch.Tensor,
+    events: EventCounts,
+    times: torch.Tensor,
+    highest: torch.Tensor | float = BRIGHTEST,
+) -> Candidates:
+    """What the events make of the luminance of both frames, [B, 1, H, W], at times [B, N].
+
+    highest   log of light [B, 1, 1, 1] that it may be at the most, as `highest_of`
+    """
     windows = before_and_after(times)
     before, after = events.number(*windows).chunk(2, 1)
     risen, to_rise = events.change(*windows).chunk(2, 1)
     drift = (before + EVEN_EVENTS * times[..., None, None]) / (before + after + EVEN_EVENTS)
     logs = [torch.log(light.clamp(min=0) + DARK) for light in (light_0, light_1)]
-    top = torch.maximum(*logs).amax((1, 2, 3), keepdim=True).clamp(min=BRIGHTEST)  # of light above white its brightest
+    top = torch.as_tensor(highest).to(risen)
     forward = torch.minimum((logs[0] + risen).clamp(min=DARKEST), top)
     backward = torch.minimum((logs[1] - to_rise).clamp(min=DARKEST), top)
     return Candidates(forward[:, :, None], backward[:, :, None], drift[:, :, None])
+
+
+@in_full_precision
+def highest_of(frame_0: torch.Tensor, frame_1: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+    """Log of light [B, 1, 1, 1] that may be made of frames [B, C, H, W]: a little above white, or the brightest of any
+    colour in them."""
+    brightest = torch.maximum(frame_0.amax((1, 2, 3), keepdim=True), frame_1.amax((1, 2, 3), keepdim=True))
+    return torch.log(to_light(brightest, transfer) + DARK).clamp(min=BRIGHTEST)
 
 
 @in_full_precision
@@ -87,10 +104,12 @@ def bridge(
     transfer: Transfer = "srgb",
     method: Method = "bridge",
     around: torch.Tensor | None = None,
+    highest: torch.Tensor | None = None,
 ) -> torch.Tensor:
     """Frames [B, N, C, H, W] at times [B, N], from codes [B, C, H, W] of the two frames around.
 
     method   bridge; both: weights 1 - t and t; nearest: integration from the nearer frame alone
+    highest  `highest_of` of the whole, where these are parts of frames
     around   codes [B, N, C, H, W] to take the colours from; those of the two frames unless given
     Raises UsageError for a transfer or a method that is none of these.
     """
@@ -98,7 +117,8 @@ def bridge(
         if value not in get_args(known):
             raise UsageError(f"{name} {value!r}: expected one of {', '.join(get_args(known))}")
     lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
-    found = integrated(luminance(lights[0]), luminance(lights[1]), events, times)
+    highest = highest_of(frame_0, frame_1, transfer) if highest is None else highest
+    found = integrated(luminance(lights[0]), luminance(lights[1]), events, times, highest)
     if around is None:
         first, second = (ratios_of(light)[:, None] for light in lights)
         ratios = first + found.drift * (second - first)

@@ -52,6 +52,7 @@ from vid2ev.upsample.flow import convincing
 SMALLEST = 16  # px: DIS refuses less than 12
 CONVINCED_CODES = 0.5  # by how much motion must be better than none
 SHARP = 40.0  # a: weights fall to 1/e where luminance (codes 0 ... 1) is off by a fortieth
+SEES_PX = 10  # of the event camera, that what becomes of a pixel depends on around it, motion apart
 AROUND_PX = 5  # mean of errors over so many pixels
 DOUBT_PX = 17  # and of doubts: lone events of noise are rare
 LEAST_OFF = 0.003  # that J is off by, at the least, codes: less than one of 255
@@ -96,15 +97,17 @@ def guided(
     pictures: torch.Tensor,
     transfer: Transfer = "srgb",
     footprint: int = 1,
-    like: torch.Tensor | None = None,
+    flows: torch.Tensor | None = None,
+    corner: tuple[int, int] | None = None,
 ) -> Guided:
     """Frames [B, C, H, W] carried to where the luminance of pictures [B, N, C, H, W] is; all are codes.
 
     footprint   k, pixels across that a pixel of the event camera looks at
-    like        pictures that look more like the targets, to find motion by
+    flows       the motion, if it is known already: `flows_to` these pictures or to what looks more like the targets
+    corner      row and column of the frames at which the pictures begin, where they and the flows are of a part
     """
-    flows = flows_to(frame_0, frame_1, pictures if like is None else like, transfer, footprint)
-    warps = torch.stack([warp(frame_0, flows[:, :, :2]), warp(frame_1, flows[:, :, 2:])], 2)
+    flows = flows_to(frame_0, frame_1, pictures, transfer, footprint) if flows is None else flows
+    warps = torch.stack([warp(frame_0, flows[:, :, :2], corner), warp(frame_1, flows[:, :, 2:], corner)], 2)
     return Guided(flows, warps, agreement(warps, pictures, transfer, footprint), footprint)
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import torch
 
-from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, EVEN_EVENTS, coloured, ratios_of
+from interp.candidates.bridge import DARK, DARKEST, EVEN_EVENTS, coloured, highest_of, ratios_of
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
 from interp.representation.event_counts import EventCounts, as_voxels
@@ -92,19 +92,21 @@ def ramps(
     transfer: Transfer = "srgb",
     around: torch.Tensor | None = None,
     found: Risen | None = None,
+    highest: torch.Tensor | None = None,
 ) -> torch.Tensor:
     """Frames [B, N, C, H, W] at times [B, N], from codes [B, C, H, W] of the two frames around.
 
     around   codes [B, N, C, H, W] to take the colours from; those of the two frames unless given
     found    what `risen` gives for the times, if it is known already
+    highest  `bridge.highest_of` of the whole, where these are parts of frames
     """
     found = risen(events, times) if found is None else found
     lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
     before, after = (_log(light) for light in lights)
     drift = found.drift(times)
     logs = before + found.change + drift * found.missed(before, after)
-    top = torch.maximum(before, after).amax((1, 2, 3, 4), keepdim=True).clamp(min=BRIGHTEST)
-    made = (torch.exp(torch.minimum(logs.clamp(min=DARKEST), top)) - DARK).clamp(min=0)
+    highest = highest_of(frame_0, frame_1, transfer) if highest is None else highest
+    made = (torch.exp(torch.minimum(logs.clamp(min=DARKEST), highest[:, None])) - DARK).clamp(min=0)
     if around is None:
         first, second = (ratios_of(light)[:, None] for light in lights)
         ratios = first + drift * (second - first)

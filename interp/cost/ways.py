@@ -19,10 +19,10 @@ from typing import Self
 import torch
 
 from interp import pretrained
-from interp.interpolate.tiling import between, parse_tiling
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import OfEvents, OfFrames, of_weights
 from interp.methods.running import PLAIN, PRECISIONS, Running
+from interp.methods.tiling import Tiling, parse_tiling
 from interp.networks.spec import BASES
 
 KINDS = (pretrained.WITH_EVENTS, pretrained.OF_FRAMES, pretrained.OF_EVENTS)
@@ -61,10 +61,10 @@ class Tiled:
         """See `interp.methods.gap.Method`."""
         return replace(self, method=self.method.begin())
 
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`."""
         height, width = gap.frame_0.shape[-2:]
-        return between(self.method, gap, times, parse_tiling(self.tile, (width, height), self.multiple))
+        return self.method.between(gap, times, parse_tiling(self.tile, (width, height), self.multiple))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +79,9 @@ class Anew:
         """See `interp.methods.gap.Method`."""
         return replace(self, method=self.method.begin())
 
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`."""
-        return torch.cat([self.method.between(gap, time) for time in times.split(1)])
+        return torch.cat([self.method.between(gap, time, tiling) for time in times.split(1)])
 
 
 def ways(networks: Sequence[str | Path], device: str) -> list[Way]:

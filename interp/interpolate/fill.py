@@ -22,8 +22,8 @@ from interp.interpolate.instants import Instant
 from interp.interpolate.memory import as_arrays, nested
 from interp.interpolate.stretches import CUT, UNRELATED, Stretch
 from interp.interpolate.take import Key, Take
-from interp.interpolate.tiling import Tiling, between
 from interp.methods import Gap, Method
+from interp.methods.tiling import Tiling
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts, count_events
 
@@ -118,7 +118,7 @@ class Fill:
         for first in range(0, len(instants), some):
             group = instants[first : first + some]
             times = torch.tensor([float(instant.share) for instant in group], device=self.device)
-            images = between(method, gap, times, self.tiling).movedim(1, -1).cpu().numpy()
+            images = method.between(gap, times, self.tiling).movedim(1, -1).cpu().numpy()
             for instant, image in zip(group, images, strict=True):
                 yield Filled(instant, False, shot, image)
 

@@ -22,9 +22,9 @@ from interp.interpolate.pictures import Pictures, film_rate
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
-from interp.interpolate.tiling import parse_tiling
 from interp.methods import open_method
 from interp.methods.running import PLAIN, Running
+from interp.methods.tiling import parse_tiling
 from interp.representation.carried import footprint_of
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, versions

@@ -1,24 +1,31 @@
-"""Methods that need no training: blends of the key frames, and integrals of the events."""
+"""Methods that need no training: blends of the key frames, and integrals of the events.
+
+Large frames are made in cells, so that memory is bounded, and become what they do at once: motion is sought in whole
+frames, and what is carried comes from anywhere in them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 import torch
 
-from interp.candidates.guided import guided
+from interp.candidates.bridge import highest_of
+from interp.candidates.guided import SEES_PX, flows_to, guided
 from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.methods.gap import Gap
-from interp.representation.carried import over
+from interp.methods.tiling import Tile, Tiling, part, undivided
+from interp.representation.carried import footprint_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
 ROUNDS = 2  # of guiding, where events are coarse
-Law = Callable[[Gap, torch.Tensor], torch.Tensor]
-Form = Callable[[torch.Tensor, torch.Tensor, EventCounts, torch.Tensor], torch.Tensor]
+Law = Callable[[Gap, torch.Tensor, Tiling], torch.Tensor]
+Form = Callable[..., torch.Tensor]  # (frame_0, frame_1, events, times, highest=)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,46 +41,73 @@ class ClosedForm:
         """Itself."""
         return self
 
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`."""
         if self.needs_events and gap.events is None:
             raise UsageError(f"method '{self.name}' integrates events, and there are none; choose flow or linear")
-        return self.law(gap, times)
+        return self.law(gap, times, tiling or undivided(gap))
 
 
-def nearest(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+def nearest(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     """The nearer key frame; halfway the first."""
     return torch.where(times[:, None, None, None] > 0.5, gap.frame_1, gap.frame_0)
 
 
-def linear(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+def linear(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     """A blend of the codes of both."""
     return gap.frame_0 + times[:, None, None, None] * (gap.frame_1 - gap.frame_0)
 
 
 def of_events(form: Form) -> Law:
-    """Integration of events: a form of `interp.candidates`, some images at a time."""
-
-    def law(gap: Gap, times: torch.Tensor) -> torch.Tensor:
-        assert gap.events is not None
-        height, width = gap.frame_0.shape[-2:]
-        events = over(gap.events, (height, width))
-        some = max(1, AT_ONCE_PX // (height * width))
-        frames = gap.frame_0[None], gap.frame_1[None]
-        return torch.cat([form(*frames, events, part[None])[0] for part in times.split(some)])
-
-    return law
+    """Integration of events, pixel by pixel: a form of `interp.candidates`, some images at a time."""
+    return lambda gap, times, tiling: torch.cat(
+        [tiling.cells(partial(_in_tile, form, gap, some, highest_of(*_frames(gap)))) for some in _some(gap, times)]
+    )
 
 
-def guided_by_ramps(
-    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, times: torch.Tensor
-) -> torch.Tensor:
+def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     """Ramps in the colours of carried frames, mixed with these as either is in doubt (`candidates.guided`)."""
+    return torch.cat([_guided(gap, some, tiling) for some in _some(gap, times)])
+
+
+def _guided(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+    assert gap.events is not None
+    frames, footprint = _frames(gap), footprint_over(gap.events, tiling.size)
+    seen = tiling.cells(partial(_in_tile, _ramps_and_doubt, gap, times, highest_of(*frames)))
+    images = pictures = seen[None, :, :-1]
+    doubt = seen[None, :, -1:]
+    for _ in range(1 if footprint == 1 else ROUNDS):
+        flows = flows_to(*frames, images, footprint=footprint)
+
+        def law(tile: Tile, flows: torch.Tensor = flows) -> torch.Tensor:
+            shown, motion, off = (each[(..., *tile.within)] for each in (pictures, flows, doubt))
+            corner = None if shown.shape == pictures.shape else (tile.top, tile.left)
+            carried = guided(*frames, shown, footprint=footprint, flows=motion, corner=corner)
+            return carried.image(shown, off, times[None])
+
+        images = tiling.cells(law, SEES_PX * footprint)
+    return images[0]
+
+
+def _ramps_and_doubt(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, times: torch.Tensor, highest: torch.Tensor
+) -> torch.Tensor:
+    """Both, one channel after the other, [B, N, C + 1, H, W]."""
     found = risen(events, times)
-    pictures = ramps(frame_0, frame_1, events, times, found=found)
-    doubt = in_doubt(frame_0, frame_1, found, times)
-    images = pictures
-    for _ in range(1 if events.footprint == 1 else ROUNDS):
-        carried = guided(frame_0, frame_1, pictures, footprint=events.footprint, like=images)
-        images = carried.image(pictures, doubt, times)
-    return images
+    pictures = ramps(frame_0, frame_1, events, times, found=found, highest=highest)
+    return torch.cat([pictures, in_doubt(frame_0, frame_1, found, times)], 2)
+
+
+def _in_tile(form: Form, gap: Gap, times: torch.Tensor, highest: torch.Tensor, tile: Tile) -> torch.Tensor:
+    """Images [N, C, h, w] of a form that looks at pixels alone."""
+    seen = part(gap, tile)
+    assert seen.events is not None
+    return form(*_frames(seen), seen.events, times[None], highest=highest)[0]
+
+
+def _frames(gap: Gap) -> tuple[torch.Tensor, torch.Tensor]:
+    return gap.frame_0[None], gap.frame_1[None]
+
+
+def _some(gap: Gap, times: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    return times.split(max(1, AT_ONCE_PX // gap.frame_0[0].numel()))

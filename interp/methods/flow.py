@@ -7,13 +7,14 @@ import torch
 
 from interp.light import to_codes, to_light
 from interp.methods.gap import Gap
+from interp.methods.tiling import Tiling
 from vid2ev import Frame
 from vid2ev.upsample.flow import FlowUpsampling, carried
 
 GAP_NS = 1 << 40  # any, so long that times of 24 bits are whole
 
 
-def flow(gap: Gap, times: torch.Tensor) -> torch.Tensor:
+def flow(gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
     """A frame for each time that lies between, however they are spaced; at 0 and 1 the key frames themselves."""
     first, last = (Frame(_light(frame), number * GAP_NS) for number, frame in enumerate((gap.frame_0, gap.frame_1)))
     made = {0: first.light, GAP_NS: last.light}

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 import torch
 
 from interp.representation.event_counts import EventCounts
+
+if TYPE_CHECKING:
+    from interp.methods.tiling import Tiling
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,7 @@ class Method(Protocol):
     def begin(self) -> Self:
         """The same for a new sequence, which knows of no gap before."""
 
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """Images [N, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second.
-        Gaps of a sequence come in their order if the method is `sequential`.  Raises UsageError without events that it
-        needs."""
+        Gaps of a sequence come in their order if the method is `sequential`.  What takes much memory is done tile by
+        tile, if there are tiles.  Raises UsageError without events that it needs."""

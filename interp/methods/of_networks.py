@@ -9,8 +9,11 @@ from typing import Any, Self
 import torch
 from torch.nn import functional as F
 
+from interp.methods.around_tiles import around_tiles
 from interp.methods.gap import Gap
 from interp.methods.running import PLAIN, Running
+from interp.methods.tiling import Tiling, part
+from interp.networks.around import Around
 from interp.networks.event_fed import EventFed, States
 from interp.networks.frame_fed import FrameFed
 from interp.weights import load
@@ -34,15 +37,34 @@ class OfFrames:
         return self
 
     @torch.inference_mode()
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
-        events = gap.events if self.needs_events else None
-        some = max(1, AT_ONCE_PX // gap.frame_0[0].numel())
+        gap = gap if self.needs_events else replace(gap, events=None)
         with self.running.on(gap.frame_0.device):
-            pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], events)
-            images = [self.network.at(pair, part).images[0] for part in times.split(some)]
-        return _finite(self, torch.cat(images).float())
+            if tiling is None or len(tiling) == 1:
+                images = self._made(gap, times)
+            else:
+                images = self._in_tiles(gap, times, tiling)
+        return _finite(self, images)
+
+    def _in_tiles(self, gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+        """Each tile is a gap for itself: what is done once per gap is done once per tile."""
+        some = _at_once(gap) if self.network.spec.guided else len(times)  # (motion to targets is large)
+        images = []
+        for group in times.split(some):
+            around = around_tiles(self.network, gap, group, tiling)
+            whole = gap.frame_0.new_zeros(len(group), *gap.frame_0.shape)
+            for tile in tiling:
+                made = self._made(part(gap, tile), group, replace(around, corner=(tile.top, tile.left)))
+                whole[(..., *tile.within)] += made * tiling.weights(tile).to(made)
+            images.append(whole)
+        return torch.cat(images)
+
+    def _made(self, gap: Gap, times: torch.Tensor, around: Around | None = None) -> torch.Tensor:
+        pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], gap.events, around)
+        images = [self.network.at(pair, some).images[0] for some in times.split(_at_once(gap))]
+        return torch.cat(images).float()
 
 
 @dataclass(slots=True)
@@ -61,7 +83,7 @@ class OfEvents:
         return replace(self, states=())
 
     @torch.inference_mode()
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
         assert gap.events is not None
@@ -85,6 +107,11 @@ def of_weights(
     if isinstance(network, EventFed):
         return OfEvents(name, network, running)
     raise DataError(f"{path} holds a network that rebuilds no frames in between; give one of frames or of events")
+
+
+def _at_once(gap: Gap) -> int:
+    """How many images are made at a time."""
+    return max(1, AT_ONCE_PX // gap.frame_0[0].numel())
 
 
 def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:

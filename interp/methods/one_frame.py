@@ -22,6 +22,7 @@ import torch
 from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, coloured, ratios_of
 from interp.light import luminance, to_codes, to_light
 from interp.methods.gap import Gap
+from interp.methods.tiling import Tiling
 from interp.precision import in_full_precision
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
@@ -42,7 +43,7 @@ class OneFrame:
         """Itself."""
         return self
 
-    def between(self, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """See `interp.methods.gap.Method`.  Raises UsageError without events."""
         if gap.events is None:
             raise UsageError(f"method '{self.name}' integrates events, and there are none; give some with --events")

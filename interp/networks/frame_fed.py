@@ -19,6 +19,9 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from interp.candidates.guided import motion_between
+from interp.light import Transfer
+from interp.networks.around import Around
 from interp.networks.spec import FrameFedSpec
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
@@ -38,6 +41,7 @@ class Pair:
     flows              [B, 4, H, W] px: from the first to the second (x, y) and back; at the network's own resolution
     once               what else the network computes once
     size, grey         height and width, and whether the frames were grey, as they came
+    around             the whole frames, where these are parts of them
     """
 
     frame_0: torch.Tensor
@@ -48,6 +52,7 @@ class Pair:
     grey: bool
     flows: torch.Tensor | None = None
     once: tuple[torch.Tensor, ...] = ()
+    around: Around | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +82,11 @@ class FrameFed(nn.Module):
     spec: FrameFedSpec
     multiple: int
 
+    @property
+    def seeks_motion(self) -> bool:
+        """Whether it takes the motion between the frames by DIS."""
+        return False
+
     def flows_of(self, pair: Pair) -> torch.Tensor | None:
         """Flows between the frames, [B, 4, h, w] px."""
         return None
@@ -101,9 +111,17 @@ class FrameFed(nn.Module):
         """
         return self.at(self.prepare(frame_0, frame_1, events), times)
 
-    def prepare(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None = None) -> Pair:
-        """What does not depend on the targets; see `forward`."""
-        pair = self._padded(frame_0, frame_1, events)
+    def prepare(
+        self,
+        frame_0: torch.Tensor,
+        frame_1: torch.Tensor,
+        events: EventCounts | None = None,
+        around: Around | None = None,
+    ) -> Pair:
+        """What does not depend on the targets; see `forward`.  `around` is what parts of frames know of the whole."""
+        pair = self.padded(frame_0, frame_1, events)
+        if around is not None:
+            pair = replace(pair, around=around.of_part(pair.frame_0.shape[-2:]))
         pair = replace(pair, flows=self.flows_of(pair))
         return replace(pair, once=self.computed_once(pair))
 
@@ -124,7 +142,8 @@ class FrameFed(nn.Module):
         made = self.synthesise(pair, asked if asked.ndim == 2 else asked.expand(len(pair.frame_0), -1))
         return _cut_back(made, pair)
 
-    def _padded(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None) -> Pair:
+    def padded(self, frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts | None = None) -> Pair:
+        """A pair that nothing is computed of yet; see `forward`."""
         self._check(frame_0, frame_1, events)
         batch, channels, height, width = frame_0.shape
         right, below = -width % self.multiple, -height % self.multiple
@@ -165,7 +184,18 @@ def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:
 
 def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
     """Both frames, warped by flows [B, N, 4, H, W] to them: [B, N, 2, C, H, W]."""
-    return torch.stack([warp(pair.frame_0, flows_at[:, :, :2]), warp(pair.frame_1, flows_at[:, :, 2:])], 2)
+    whole, corner = (pair, None) if pair.around is None else (pair.around, pair.around.corner)
+    flows = flows_at[:, :, :2], flows_at[:, :, 2:]
+    return torch.stack(
+        [warp(frame, flow, corner) for frame, flow in zip((whole.frame_0, whole.frame_1), flows, strict=True)], 2
+    )
+
+
+def sought(pair: Pair, transfer: Transfer = "srgb") -> torch.Tensor:
+    """Motion between the frames by DIS, [B, 4, H, W] px."""
+    if pair.around is not None and pair.around.between is not None:
+        return pair.around.between
+    return motion_between(pair.frame_0, pair.frame_1, transfer)
 
 
 def shares_at(times: torch.Tensor) -> torch.Tensor:

@@ -63,11 +63,18 @@ class Guide:
         return start + share * (carried - start) + DEVIATIONS * spread * torch.tanh(said[:, :, :-1])
 
 
+def light_at(pair: Pair, times: torch.Tensor, transfer: Transfer, found: Risen | None = None) -> torch.Tensor:
+    """C [B, N, C, H, W] at times [B, N]: what motion is sought by."""
+    highest = None if pair.around is None else pair.around.highest
+    return ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found, highest=highest)
+
+
 def guide_of(pair: Pair, times: torch.Tensor, transfer: Transfer, gate: torch.Tensor) -> Guide:
     """What is known of a pair at times [B, N]; `gate` is that of the pair (`gate.py`)."""
     found = risen(pair.events, times)
-    light = ramps(pair.frame_0, pair.frame_1, pair.events, times, transfer, found=found)
-    flows = flows_to(pair.frame_0, pair.frame_1, light, transfer)
+    light = light_at(pair, times, transfer, found)
+    flows = None if pair.around is None else pair.around.to_targets
+    flows = flows_to(pair.frame_0, pair.frame_1, light, transfer) if flows is None else flows
     wrong, _ = off_by(light, in_doubt(pair.frame_0, pair.frame_1, found, times, transfer), transfer)
     carried = carried_off_by(agreement(warped(pair, flows), light, transfer), wrong)
     near = gate[:, None]

@@ -42,10 +42,9 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.scale import Scale
 from interp.blocks.unet import HalfSized, Unet, rrin_layout
-from interp.candidates.guided import motion_between
 from interp.candidates.ramps import RISEN_CHANNELS, Risen, ramps, risen
 from interp.light import Transfer
-from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, warped
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, sought, warped
 from interp.networks.gate import gate_of
 from interp.networks.spec import Depth, FrameFedSpec
 from interp.representation.event_counts import EventCounts
@@ -134,10 +133,15 @@ class RrinEvents(FrameFed):
     def _residue_sees_events(self) -> bool:
         return self.spec.events_into_residue and self.spec.candidate != "none"
 
+    @property
+    def seeks_motion(self) -> bool:
+        """See `FrameFed`."""
+        return self.flow is None
+
     def flows_of(self, pair: Pair) -> torch.Tensor:
         """Flows between the frames, in pixels of the resolution of U1 to U3."""
         if self.flow is None:
-            return self.scale.down(motion_between(pair.frame_0, pair.frame_1, self.spec.transfer)) / self.scale.factor
+            return self.scale.down(sought(pair, self.spec.transfer)) / self.scale.factor
         frames = torch.cat([pair.frame_0, pair.frame_1], 1)
         return self.flow(self.scale.down(frames)).float() * self.spec.flow_scale
 
@@ -182,7 +186,8 @@ class RrinEvents(FrameFed):
         around = None
         if self.spec.chroma == "warps":
             around = warps[:, :, 0] + times[..., None, None, None] * (warps[:, :, 1] - warps[:, :, 0])
-        return [ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around, found)]
+        highest = None if pair.around is None else pair.around.highest
+        return [ramps(pair.frame_0, pair.frame_1, pair.events, times, self.spec.transfer, around, found, highest)]
 
     def _visible(
         self, seen: list[torch.Tensor], warps: torch.Tensor, events: list[torch.Tensor], candidate: list[torch.Tensor]

@@ -24,14 +24,13 @@ from torch.nn import functional as F
 from interp.blend import blend
 from interp.blocks.frozen import Frozen
 from interp.blocks.unet import Unet, rrin_layout
-from interp.candidates.guided import motion_between
 from interp.candidates.ramps import RISEN_CHANNELS
 from interp.light import Transfer
 from interp.networks.e2vid import E2vid, E2vidSpec
 from interp.networks.event_input import EventInput, EventInputSpec, first_last_and_target
 from interp.networks.firenet import FireNet, FireNetSpec
 from interp.networks.flow import FlowNetwork, FlowNetworkSpec
-from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at
+from interp.networks.frame_fed import FrameFed, Interpolated, Pair, run, shares_at, sought
 from interp.networks.gate import gate_of
 from interp.networks.guide import OFFS, Guide, guide_of
 from interp.networks.refinement import refined
@@ -100,10 +99,15 @@ class RrinSlomoEvents(FrameFed):
         self.residue = Unet(taken, said, rrin_layout(3, spec.base), zero) if spec.refine == "unet" else None
         self.multiple = MULTIPLE
 
+    @property
+    def seeks_motion(self) -> bool:
+        """See `FrameFed`."""
+        return self.flow is None
+
     def flows_of(self, pair: Pair) -> torch.Tensor:
         """Flows between the frames."""
         if self.flow is None:
-            return motion_between(pair.frame_0, pair.frame_1)
+            return sought(pair)
         return self.flow(pair.frame_0, pair.frame_1, pair.events)
 
     def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:

@@ -79,6 +79,12 @@ def footprint_of(size: tuple[int, int], event_size: tuple[int, int]) -> int:
     return max(1, round(size[0] / event_size[0]))
 
 
+def footprint_over(counts: EventCounts, size: tuple[int, int]) -> int:
+    """The footprint that counts have, laid `over` frames of a size (height, width)."""
+    height, width = counts.off_on.shape[-2:]
+    return counts.footprint if (height, width) == size else footprint_of(size[::-1], (width, height))
+
+
 def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> float:
     """How many pixels of the event camera a pixel of the frame is wide, in the middle of all."""
     across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
