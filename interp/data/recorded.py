@@ -41,6 +41,17 @@ def left_out(settings: ClipSettings, multiple: int) -> list[str]:
     return _places(settings.recording_folders, multiple, settings.size)[1]
 
 
+def coarser_by(settings: ClipSettings) -> tuple[int, ...]:
+    """How many pixels of frames there are, across, to a pixel of events: of all recordings that give clips, in order.
+
+    Raises UsageError where there is none that does.
+    """
+    places = (
+        place for each in settings.multiples for place in _places(settings.recording_folders, each, settings.size)[0]
+    )
+    return tuple(sorted({_coarser(_opened(folder)) for folder, _ in places}))
+
+
 def clip_of(
     sequence: Sequence, first: int, multiple: int, bins: int = 32, part: tuple[int, int, int, int] | None = None
 ) -> Clip:
@@ -102,7 +113,7 @@ def _places(
         for path in paths:
             try:
                 first, reason = _windows_of(path, multiple, size)
-            except DataError as error:
+            except (DataError, UsageError) as error:
                 first, reason = np.empty(0, np.int64), str(error)
             if len(first):
                 found.append((str(path), first))
@@ -122,6 +133,7 @@ def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.nd
             f"{path}: frames of {wide}x{high} are smaller than clips, {width}x{height}; give --set clips.size=[W,H] and"
             " --set samples.size=N"
         )
+    _coarser(sequence)
     window = windows(sequence, multiple, even=True)
     reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
     too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"

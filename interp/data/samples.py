@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from interp.data import alter
 from interp.data.chance import Range, chance, uniform
 from interp.data.clip import Clip
 from interp.data.pool import Pool
+from interp.data.recorded import coarser_by
 from interp.data.settings import ClipSettings
 from interp.data.tensors import Sample, as_tensor, tensors
 from vid2ev.errors import UsageError
@@ -81,7 +83,7 @@ class Samples(Drawn):
 
     frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
     off_on     [2, S, h, w] OFF and ON events of S sub-intervals, in the geometry of the frames: uint8; float16 if some
-               event cameras stand elsewhere
+               event cameras stand elsewhere, or of recordings
     contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
     times      [N] float32, instants from 0 to 1, both left out, in order
     truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
@@ -108,8 +110,12 @@ def check_fits(clips: ClipSettings, side: int) -> None:
         raise UsageError(
             f"samples of {side} pixels from clips of {clips.size[0]}x{clips.size[1]}: expected smaller ones"
         )
-    if clips.rigs > 0 and any(side % each for each in clips.coarser):
-        raise UsageError(f"samples of {side} pixels with event cameras coarser by {clips.coarser}: expected multiples")
+    coarser = (*(clips.coarser if clips.rigs > 0 else ()), *(coarser_by(clips) if clips.recordings > 0 else ()))
+    if any(side % each for each in coarser):
+        raise UsageError(
+            f"samples of {side} pixels with event cameras coarser by {', '.join(map(str, coarser))}: expected a"
+            f" multiple of {math.lcm(*coarser)}; give --set samples.size=N"
+        )
 
 
 def drawn_clip(pool: Pool, settings: SampleSettings, index: int) -> tuple[Clip, np.random.Generator]:

@@ -56,6 +56,14 @@ def test_a_part_has_its_own_events(coarser: int) -> None:
     )
 
 
+def test_recordings_of_finer_and_coarser_events_make_one_batch() -> None:
+    settings = ClipSettings(recordings=1, recording_folders=("somewhere",))
+    clips = [clip_of(coarser=coarser) for coarser in (1, 2, 3)]
+    batch = torch.stack([tensors(clip, settings)["off_on"] for clip in clips])
+    np.testing.assert_array_equal(batch[0], clips[0].off_on)  # (as many as were counted)
+    np.testing.assert_array_equal(batch[2, ..., 1::3, 1::3], clips[2].off_on)  # (at the middle of their pixels)
+
+
 def test_nothing_happens_in_still_parts() -> None:
     still = np.zeros((24, 24), bool)
     still[:, :10] = True

@@ -15,7 +15,8 @@ from interp.data.layouts import open_sequence, sequences_in, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.sequence import Placed
 from interp.data.layouts.writing import write_sequence
-from interp.data.recorded import clip_of, recorded
+from interp.data.recorded import clip_of, left_out, recorded
+from interp.data.samples import check_fits
 from interp.data.settings import ClipSettings
 from vid2ev import DataError, UsageError
 from vid2ev.recording.exposures import write_codes
@@ -326,6 +327,25 @@ def test_recorded_clips_are_drawn_from_all_that_can_be_used(tmp_path: Path) -> N
     )
     with pytest.raises(UsageError, match="no window of 33 frames"):
         recorded(settings, 0, 0, 32)
+
+
+def test_samples_end_where_pixels_of_coarser_events_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # (else the part of a pixel that is cut off is missing, and the others are stretched over all of the sample)
+    for name in ("fine", "coarse", "uneven"):
+        written(tmp_path / name, images=12)
+    sizes = {"fine": SIZE, "coarse": (SIZE[0] // 8, SIZE[1] // 8), "uneven": (17, 11)}
+
+    def opened(folder: str) -> Any:
+        sequence = open_sequence(folder)
+        sequence.event_size = sizes[sequence.name]
+        return sequence
+
+    monkeypatch.setattr("interp.data.recorded._opened", opened)
+    settings = ClipSettings(size=(24, 24), recordings=1, scenes=0, photographs=0, recording_folders=(str(tmp_path),))
+    check_fits(settings, 16)
+    with pytest.raises(UsageError, match="20 pixels with event cameras coarser by 1, 8: expected a multiple of 8"):
+        check_fits(settings, 20)
+    assert [each for each in left_out(settings, 8) if "expected whole multiples" in each and "uneven" in each]
 
 
 @pytest.mark.parametrize("lost", [1, 4, 7])
