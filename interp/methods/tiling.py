@@ -7,7 +7,7 @@ d [px] is how far a pixel lies within the overlap; the tile that begins there we
 outer quarter of each tile's overlap, of which a network sees least around, does not count at all.  What sees so many
 pixels around it and no more, as closed forms do, needs no weights: cells lie side by side, each made with a halo.
 
-What a tile cannot know by itself is found in the whole frames before: see `interp.around`.
+What a tile cannot know by itself is found in the whole frames before: see `interp.networks.around`.
 
 Frames of up to `WHOLE_PX` pixels are not divided unless asked for, larger ones into tiles of about as many.
 """
