@@ -30,6 +30,13 @@ def warp(images: torch.Tensor, flow: torch.Tensor, corner: tuple[int, int] | Non
     return sample(images, places) if corner is None else _sample_part(images, places, corner)
 
 
+def both_warped(
+    frame_0: torch.Tensor, frame_1: torch.Tensor, flows: torch.Tensor, corner: tuple[int, int] | None = None
+) -> torch.Tensor:
+    """Two pictures [B, C, H, W] where flows [B, N, 4, h, w] px to the one and the other lead: [B, N, 2, C, h, w]."""
+    return torch.stack([warp(frame_0, flows[:, :, :2], corner), warp(frame_1, flows[:, :, 2:], corner)], 2)
+
+
 @in_full_precision
 def sample(images: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
     """Pictures [B, C, H, W] at places [B, 2, h, w] or [B, N, 2, h, w] px; as `warp`.  Places must not be NaN."""

@@ -46,15 +46,15 @@ from interp.blend import blend
 from interp.candidates.bridge import coloured, ratios_of
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
-from interp.warp import warp
+from interp.warp import both_warped
 from vid2ev.upsample.flow import convincing
 
 SMALLEST = 16  # px: DIS refuses less than 12
 CONVINCED_CODES = 0.5  # by how much motion must be better than none
 SHARP = 40.0  # a: weights fall to 1/e where luminance (codes 0 ... 1) is off by a fortieth
-SEES_PX = 10  # of the event camera, that what becomes of a pixel depends on around it, motion apart
 AROUND_PX = 5  # mean of errors over so many pixels
 DOUBT_PX = 17  # and of doubts: lone events of noise are rare
+SEES_PX = DOUBT_PX // 2 + 2  # of the event camera, that what becomes of a pixel depends on around it, motion apart
 LEAST_OFF = 0.003  # that J is off by, at the least, codes: less than one of 255
 OF_MEAN = math.pi / 2  # the mean square of a normal distribution by the square of its mean absolute value
 GAMMA, DARKEST = 2.2, 0.02  # d code / d ln light = code / 2.2, of codes that are not quite black
@@ -107,7 +107,7 @@ def guided(
     corner      row and column of the frames at which the pictures begin, where they and the flows are of a part
     """
     flows = flows_to(frame_0, frame_1, pictures, transfer, footprint) if flows is None else flows
-    warps = torch.stack([warp(frame_0, flows[:, :, :2], corner), warp(frame_1, flows[:, :, 2:], corner)], 2)
+    warps = both_warped(frame_0, frame_1, flows, corner)
     return Guided(flows, warps, agreement(warps, pictures, transfer, footprint), footprint)
 
 

@@ -45,7 +45,8 @@ class ClosedForm:
         """See `interp.methods.gap.Method`."""
         if self.needs_events and gap.events is None:
             raise UsageError(f"method '{self.name}' integrates events, and there are none; choose flow or linear")
-        return self.law(gap, times, tiling or undivided(gap))
+        height, width = gap.frame_0.shape[-2:]
+        return self.law(gap, times, tiling or undivided(width, height))
 
 
 def nearest(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
@@ -60,9 +61,12 @@ def linear(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
 
 def of_events(form: Form) -> Law:
     """Integration of events, pixel by pixel: a form of `interp.candidates`, some images at a time."""
-    return lambda gap, times, tiling: torch.cat(
-        [tiling.cells(partial(_in_tile, form, gap, some, highest_of(*_frames(gap)))) for some in _some(gap, times)]
-    )
+
+    def law(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+        highest = highest_of(*_frames(gap))
+        return torch.cat([tiling.cells(partial(_in_tile, form, gap, some, highest)) for some in _some(gap, times)])
+
+    return law
 
 
 def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:

@@ -1,7 +1,7 @@
 """Large frames in tiles that overlap, so that memory is bounded whatever the size of the frames.
 
-    a tile begins at a whole multiple of what its network takes: what it computes lies on the same grid as of the whole
-    frames w(d) = s((d / overlap - 1/4) / (1/2)),  s(u) = u^2 (3 - 2 u), u within 0 ... 1
+    a tile begins at a whole multiple of what its network takes: all it computes lies on the same grid as in the whole
+    w(d) = s((d / overlap - 1/4) / (1/2)),  s(u) = u^2 (3 - 2 u), u within 0 ... 1
 
 d [px] is how far a pixel lies within the overlap; the tile that begins there weighs w, the one that ends 1 - w.  The
 outer quarter of each tile's overlap, of which a network sees least around, does not count at all.  What sees so many
@@ -99,9 +99,8 @@ class Tiling:
         return f"{len(self)} tiles of {width}x{height}"
 
 
-def undivided(gap: Gap) -> Tiling:
-    """The tiling of a gap's frames into one tile."""
-    height, width = gap.frame_0.shape[-2:]
+def undivided(width: int, height: int) -> Tiling:
+    """The tiling of frames into one tile."""
     return Tiling(((0, width),), ((0, height),))
 
 
@@ -111,7 +110,7 @@ def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
     Raises UsageError for a text that says none of these, or for tiles smaller than `LEAST`.
     """
     if text == "none" or (text == "auto" and size[0] * size[1] <= WHOLE_PX):
-        return Tiling(((0, size[0]),), ((0, size[1]),))
+        return undivided(*size)
     width, times, height = str(text).partition("x")
     if text == "auto":
         sides = SIDE, SIDE

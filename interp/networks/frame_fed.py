@@ -25,7 +25,7 @@ from interp.networks.around import Around
 from interp.networks.spec import FrameFedSpec
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
-from interp.warp import warp
+from interp.warp import both_warped
 from vid2ev.errors import UsageError
 
 Times = torch.Tensor | Sequence[float]
@@ -185,10 +185,7 @@ def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:
 def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
     """Both frames, warped by flows [B, N, 4, H, W] to them: [B, N, 2, C, H, W]."""
     whole, corner = (pair, None) if pair.around is None else (pair.around, pair.around.corner)
-    flows = flows_at[:, :, :2], flows_at[:, :, 2:]
-    return torch.stack(
-        [warp(frame, flow, corner) for frame, flow in zip((whole.frame_0, whole.frame_1), flows, strict=True)], 2
-    )
+    return both_warped(whole.frame_0, whole.frame_1, flows_at, corner)
 
 
 def sought(pair: Pair, transfer: Transfer = "srgb") -> torch.Tensor:

@@ -11,7 +11,7 @@ from interp.losses import objectives
 from interp.networks.frame_fed import Interpolated
 from interp.train.batches import Batch
 from interp.train.frame_fed import FrameFedLearner, events_of
-from interp.warp import flows_at, warp
+from interp.warp import both_warped, flows_at
 
 
 class FlowLearner(FrameFedLearner):
@@ -28,7 +28,7 @@ class FlowLearner(FrameFedLearner):
         first, last = batch["frames"].unbind(1)
         flows, times = self.network(first, last, events_of(batch)), batch["times"]
         at = flows_at(flows, times)
-        warps = torch.stack([warp(first, at[:, :, :2]), warp(last, at[:, :, 2:])], 2)
+        warps = both_warped(first, last, at)
         later = (times > 0.5)[:, :, None, None, None]
         images = torch.where(later, warps[:, :, 1], warps[:, :, 0])
         weights = torch.cat([~later, later], 2).float().expand(-1, -1, -1, *images.shape[-2:])
