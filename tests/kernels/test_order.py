@@ -1,54 +1,69 @@
-"""Putting events in order: whatever the parts are, the answer is that of a plain stable sort."""
+"""Putting events in order: whatever parts, groups and frames they are in, the answer is that of a stable sort."""
+
+from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vid2ev.kernels.order import order_keys, unpack
+import vid2ev.sensors.sent as sent
+from vid2ev.sensors.sent import Keys, Sent, even_cuts, in_turn
 
 WIDTH = 53
+PIXELS_OF_GROUP = 40
 
 
 @given(
-    sizes=st.lists(st.integers(0, 400), min_size=1, max_size=5),
-    last_us=st.sampled_from([0, 1, 40, 65_535, 65_536, 3_000_000, (1 << 44) // 1000]),
+    groups=st.lists(st.integers(1, 3), min_size=1, max_size=4),
+    last_us=st.lists(st.sampled_from([0, 1, 40, 65_535, 65_536, 3_000_000, (1 << 44) // 1000]), min_size=1, max_size=5),
+    mean=st.sampled_from([0, 1, 30, 300]),
     crowded=st.booleans(),
     seed=st.integers(0, 2**32 - 1),
+    worth=st.sampled_from([(1 << 16, 1 << 18, 1 << 16), (0, 0, 200), (0, 200, 50), (0, 1 << 18, 1)]),
 )
-@settings(max_examples=200, deadline=None)
-def test_ordered_by_time_row_column(sizes, last_us, crowded, seed):
+@settings(max_examples=300, deadline=None)
+def test_ordered_by_time_row_column(groups, last_us, mean, crowded, seed, worth):
+    """Events by few or many threads, frame by frame, all together or in runs of frames beside each other."""
     rng = np.random.default_rng(seed)
-    parts = []
-    for k, size in enumerate(sizes):
-        # Parts hold ascending pixels; a pixel's own events come in order of time, also at the same microsecond.
-        pixel = 200 * k + np.sort(rng.integers(0, 200, size))
-        time = rng.integers(0, min(last_us, 3) + 1 if crowded else last_us + 1, size)
-        time = time[np.lexsort((time, pixel))]
-        parts.append((time << 28 | pixel << 3 | rng.integers(0, 8, size)).astype(np.uint64))
-    ends = np.cumsum([0, *sizes])
-    n, keys = ends[-1], np.empty(ends[-1], np.uint64)
-    for k, part in enumerate(parts):
-        order_keys(*among_others(part, rng), last_us, keys[ends[k] : ends[k + 1]])
-    t, x, y, p, label = (np.full(n, 77, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint8, np.uint8))
-    for share in range(len(parts)):
-        unpack(keys, ends, share, len(parts), WIDTH, 1000, t, x, y, p, label)
-    want = np.concatenate(parts)
-    want = want[np.argsort(want >> np.uint64(3), kind="stable")].astype(np.int64)
-    pixel = want >> 3 & 0x1FFFFFF
-    assert np.array_equal(t, 1000 + (want >> 28))
-    assert np.array_equal(y * np.int64(WIDTH) + x, pixel)
-    assert np.array_equal(p, want >> 2 & 1)
-    assert np.array_equal(label, want & 3)
+    first_us = rng.integers(0, 1 << 40, len(last_us))
+    parts, want, begun = [], [[] for _ in last_us], 0
+    for count in groups:
+        runs = [[keys_of(begun + g, at_most, mean, crowded, rng) for at_most in last_us] for g in range(count)]
+        ends = np.cumsum([len(run) for group in runs for run in group]).reshape(count, -1)
+        others = rng.integers(0, 1 << 63, rng.integers(0, 3), np.uint64)  # behind those that are meant
+        parts.append(Keys(np.concatenate([*(run for group in runs for run in group), others]), ends))
+        for group in runs:
+            for k, run in enumerate(group):
+                want[k].append(run)
+        begun += count
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in zip(("WORTH_WAKING", "WORTH_WAKING_THRICE", "IN_CACHE"), worth, strict=True):
+            patch.setattr(sent, name, value)
+        got = Sent(parts, first_us, np.array(last_us), WIDTH, labels=True).ordered(in_turn(len(parts)))
+    assert len(got) == len(want)
+    for events, keys, since in zip(got, map(np.concatenate, want), first_us, strict=True):
+        keys = keys[np.argsort(keys >> np.uint64(3), kind="stable")].astype(np.int64)
+        assert np.array_equal(events.t, since + (keys >> 28))
+        assert np.array_equal(events.y * np.int64(WIDTH) + events.x, keys >> 3 & 0x1FFFFFF)
+        assert np.array_equal(events.p, keys >> 2 & 1)
+        assert np.array_equal(events.label, keys & 3)
 
 
-def among_others(keys, rng):
-    """The keys in runs, some of them empty, between others that are not meant: (all, where runs begin, and end)."""
-    cuts = np.sort(rng.integers(0, len(keys) + 1, rng.integers(0, 4)))
-    runs, begins, ends, count = [], [], [], 0
-    for run in np.split(keys, cuts):
-        others = rng.integers(0, 1 << 63, rng.integers(0, 3), np.uint64)
-        begins.append(count + len(others))
-        count = begins[-1] + len(run)
-        ends.append(count)
-        runs += [others, run]
-    return np.concatenate(runs), np.array(begins), np.array(ends)
+def keys_of(group, last_us, mean, crowded, rng):
+    """Keys of one frame of a group: ascending pixels, each with its events in order of time."""
+    size = rng.poisson(mean)
+    pixel = PIXELS_OF_GROUP * group + np.sort(rng.integers(0, PIXELS_OF_GROUP, size))
+    time = rng.integers(0, min(last_us, 3) + 1 if crowded else last_us + 1, size)
+    time = time[np.lexsort((time, pixel))]
+    return (time << 28 | pixel << 3 | rng.integers(0, 8, size)).astype(np.uint64)
+
+
+@given(st.lists(st.integers(0, 1000), min_size=1, max_size=20), st.integers(1, 12))
+def test_even_cuts(sizes, runs):
+    """Cuts are of whole frames, each run has one at the least, and none has more than its share and a frame."""
+    starts = [0, *np.cumsum(sizes).tolist()]
+    cuts = even_cuts(starts, runs)
+    assert cuts[0] == 0 and cuts[-1] == len(sizes) and len(cuts) <= runs + 1
+    assert all(a < b for a, b in pairwise(cuts))
+    assert max(starts[b] - starts[a] for a, b in pairwise(cuts)) <= sum(sizes) / runs + max(sizes)

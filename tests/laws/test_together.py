@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import vid2ev.sensors.sent as events_sent
 from vid2ev import load_sensor
 from vid2ev.kernels.layout import BLOCK
 from vid2ev.sensors.dvs import AT_ONCE_PX, MOST, Dvs
 from vid2ev.sensors.pixels import GROUP
-from vid2ev.sensors.sent import WORTH_THREADS
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.upsample.stillness import still_strips
@@ -96,16 +96,21 @@ def test_codes_and_light_do_not_go_together():
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7])
-def test_more_or_fewer_frames_at_a_time_than_threads(count: int) -> None:
-    """So many events that the threads put them in order together, or a frame each."""
+@pytest.mark.parametrize("waking", [1, 1000, 1 << 30])
+def test_more_or_fewer_frames_at_a_time_than_threads(count: int, waking: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads put events in order together, or some frames each, or one does all: according to what it takes to wake
+    them."""
+    monkeypatch.setattr(events_sent, "WORTH_WAKING", waking)
+    monkeypatch.setattr(events_sent, "WORTH_WAKING_THRICE", 4 * waking)
     rng, t_ns = np.random.default_rng(count), [3_000_000 * k for k in range(count + 1)]
     light = np.exp(rng.normal(0, 1, (count + 1, *SIZE[::-1]))).astype(np.float32)
-    light[count // 2] = light[count // 2 - 1]  # (nothing happens there)
+    if count > 1:
+        light[count // 2] = light[count // 2 - 1]  # (nothing happens there)
     sensors = [Dvs(SENSORS["ideal"], SIZE, threads=threads, labels=True) for threads in (1, 2, 5)]
     for dvs in sensors:
         dvs.step(light[0], t_ns[0])
     alone, *others = (dvs.steps(light[1:], t_ns[1:]) for dvs in sensors)
-    assert count == 1 or sum(map(len, alone)) > 2 * WORTH_THREADS
+    assert sum(map(len, alone)) > 100_000
     for other in others:
         for one, two in zip(alone, other, strict=True):
             for name in ("t", "x", "y", "p", "label"):

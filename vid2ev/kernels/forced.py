@@ -10,7 +10,6 @@ import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import INPUT, PITCH
-from vid2ev.kernels.order import first_from
 from vid2ev.kernels.scan import NEW
 from vid2ev.physics.elementary import log64
 from vid2ev.physics.log_curve import light_at
@@ -141,3 +140,16 @@ def keep_likely(block, scratch, keys, chance, n, flags, num, iv):
             keys[left], chance[left] = keys[j], chance[j]
             left += 1
     return left
+
+
+@inner
+def first_from(numbers, least):
+    """Index of the first of the ascending `numbers` that is at least `least`."""
+    low, high = 0, numbers.size
+    while low < high:
+        middle = (low + high) // 2
+        if numbers[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low

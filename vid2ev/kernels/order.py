@@ -1,9 +1,9 @@
-"""Events of one interval in order of (time, row, column), by as many threads as there are parts.
+"""Events of each interval in order of (time, row, column), by as many threads as there are parts.
 
-Each part is ordered by itself: a stable counting sort of the keys on their microsecond, in passes of 16 bits (one pass
-for intervals up to 65 ms), then an insertion sort on the pixel within each microsecond: keys come block by block and
-each pixel's in order of time, so it finds them nearly sorted.  Then each thread merges a share of the time; of keys at
-the same microsecond those of the first part come first, as its pixels do.
+A stable counting sort of the keys on their microsecond, in passes of 16 bits (one pass for intervals up to 65 ms), then
+an insertion sort on the pixel within each microsecond: keys come part by part, block by block and each pixel's in order
+of time, so it finds them nearly sorted.  A place is counted for each microsecond and row; parts that are put at the
+same time have a row each, as what is of the first goes before what is of the second, and else one row does for all.
 """
 
 from __future__ import annotations
@@ -14,40 +14,85 @@ from vid2ev.kernel_compiler import compiled, inner
 
 _TIME, _PIXEL = np.uint64(28), np.uint64(3)
 _PASS, _MASK = np.uint64(16), np.uint64(0xFFFF)
-_NEVER = np.uint64(1 << 36)
+LAST_OF_PASS = 0xFFFF  # the last microsecond that one pass can tell from all others
 
 
 @compiled
-def order_keys(keys, begins, ends, last_us, ordered):
-    """Those of a part, keys[begins[k] : ends[k]] of all k, into `ordered`; their time is at most last_us."""
-    source, shift, left = keys, _TIME, last_us
-    places = np.empty(min(last_us, np.int64(_MASK)) + 1, np.int64)
-    while True:
-        target = ordered if left <= np.int64(_MASK) else np.empty(ordered.size, np.uint64)
-        to_places(source, begins, ends, shift, places)
-        for run in range(begins.size):
-            for i in range(begins[run], ends[run]):
-                k = np.int64((source[i] >> shift) & _MASK)
-                target[places[k]] = source[i]
-                places[k] += 1
-        if left <= np.int64(_MASK):
-            break
-        source, shift, left = target, shift + _PASS, left >> np.int64(_PASS)
-        begins, ends = np.zeros(1, np.int64), np.full(1, ordered.size)
-    order_pixels(ordered)
+def sizes_of(ends, sizes):
+    """Add to sizes [frames] how many keys of a part each frame has; of group g and frame k they end at ends[g, k]."""
+    for group in range(ends.shape[0]):
+        for k in range(ends.shape[1]):
+            first, last = run_of(ends, group, k)
+            sizes[k] += last - first
+
+
+@compiled
+def count_keys(keys, ends, first, last, places):
+    """Count those of a part in frames first ... last - 1 by their microsecond: places [frames, microseconds]."""
+    for k in range(first, last):
+        for group in range(ends.shape[0]):
+            begin, end = run_of(ends, group, k)
+            count(keys[begin:end], _TIME, places[k - first])
+
+
+@compiled
+def lay_out(places, stops):
+    """Counts [rows, frames, microseconds] become places, frame after frame; stops [frames] where each frame ends."""
+    total = np.int64(0)
+    for k in range(places.shape[1]):
+        for microsecond in range(places.shape[2]):
+            for row in range(places.shape[0]):
+                counted = places[row, k, microsecond]
+                places[row, k, microsecond] = total
+                total += counted
+        stops[k] = total
+
+
+@compiled
+def put_keys(keys, ends, first, last, places, ordered):
+    """Those of a part in frames first ... last - 1 to their places in `ordered`."""
+    for k in range(first, last):
+        for group in range(ends.shape[0]):
+            begin, end = run_of(ends, group, k)
+            put(keys[begin:end], _TIME, places[k - first], ordered)
 
 
 @inner
-def to_places(keys, begins, ends, shift, places):
-    """Where the keys of each digit begin in the order of digits."""
-    for k in range(places.size):
-        places[k] = 0
-    for run in range(begins.size):
-        for i in range(begins[run], ends[run]):
-            places[np.int64((keys[i] >> shift) & _MASK)] += 1
-    total = np.int64(0)
-    for k in range(places.size):
-        places[k], total = total, total + places[k]
+def run_of(ends, group, frame):
+    """Where the keys of a group and frame begin and end."""
+    if frame > 0:
+        return ends[group, frame - 1], ends[group, frame]
+    return (ends[group - 1, ends.shape[1] - 1] if group > 0 else np.int64(0)), ends[group, 0]
+
+
+@inner
+def count(keys, shift, places):
+    """Count keys by a digit."""
+    for i in range(keys.size):
+        places[np.int64((keys[i] >> shift) & _MASK)] += 1
+
+
+@inner
+def put(keys, shift, places, target):
+    """Each key to the next place of its digit."""
+    for i in range(keys.size):
+        k = np.int64((keys[i] >> shift) & _MASK)
+        target[places[k]] = keys[i]
+        places[k] += 1
+
+
+@inner
+def order_later_digits(keys, last_us):
+    """What is in order of the first digit of its microsecond in order of all, up to last_us."""
+    shift, left = _TIME + _PASS, last_us >> np.int64(_PASS)
+    target = np.empty(keys.size, np.uint64)
+    while left > 0:
+        places = np.zeros((1, 1, min(left, np.int64(_MASK)) + 1), np.int64)
+        count(keys, shift, places[0, 0])
+        lay_out(places, np.empty(1, np.int64))
+        put(keys, shift, places[0, 0], target)
+        keys[:] = target
+        shift, left = shift + _PASS, left >> np.int64(_PASS)
 
 
 @inner
@@ -64,19 +109,34 @@ def order_pixels(keys):
 
 
 @compiled
-def unpack(keys, ends, share, shares, width, first_us, t, x, y, p, label):
-    """A share of the time of the ordered parts keys[ends[k] : ends[k + 1]] to the arrays of `Events`.
+def unpack(keys, stops, first_us, last_us, share, shares, width, t, x, y, p, label):
+    """A share of the keys of each frame, which end at stops [frames], to the arrays of `Events`.
 
-    `label` has length 0 where none are wanted.
+    Keys of a frame count their times from first_us [frames], at the most to last_us; above `LAST_OF_PASS`, the share is
+    all.  `label` has length 0 where none are wanted.
     """
-    heads, stops = share_of(keys, ends, share, shares), share_of(keys, ends, share + 1, shares)
-    first, last = np.int64(0), np.int64(0)
-    for k in range(heads.size):
-        first, last = first + heads[k] - ends[k], last + stops[k] - ends[k]
-    mine = keys[first:last] if heads.size == 1 else merged(keys, heads, stops, np.empty(last - first, np.uint64))
-    unpack_keys(mine, width, first_us, t[first:last], x[first:last], y[first:last], p[first:last])
-    for i in range(min(mine.size, label.size)):
-        label[first + i] = np.uint8(mine[i] & np.uint64(3))
+    begin = np.int64(0)
+    for k in range(stops.size):
+        frame = keys[begin : stops[k]]
+        if last_us[k] > np.int64(_MASK):
+            order_later_digits(frame, last_us[k])
+        i, j = cut_of(frame, share, shares), cut_of(frame, share + 1, shares)
+        mine, first, last = frame[i:j], begin + i, begin + j
+        order_pixels(mine)
+        unpack_keys(mine, width, first_us[k], t[first:last], x[first:last], y[first:last], p[first:last])
+        for i in range(min(mine.size, label.size)):
+            label[first + i] = np.uint8(mine[i] & np.uint64(3))
+        begin = stops[k]
+
+
+@inner
+def cut_of(keys, share, shares):
+    """Where a share of the keys begins, at the first of a microsecond (which other threads may put in order of
+    pixels meanwhile: its keys have the same time)."""
+    i = keys.size * share // shares
+    while 0 < i < keys.size and keys[i] >> _TIME == keys[i - 1] >> _TIME:
+        i += 1
+    return i
 
 
 @compiled
@@ -90,54 +150,6 @@ def unpack_frames(keys, ends, first_us, width, t, x, y, p, label):
         first = last
     for i in range(min(keys.size, label.size)):
         label[i] = np.uint8(keys[i] & np.uint64(3))
-
-
-@inner
-def share_of(keys, ends, share, shares):
-    """Where a share of the time begins in each part: at what is that share of the longest part."""
-    longest, begins = 0, np.empty(ends.size - 1, np.int64)
-    for k in range(begins.size):
-        begins[k] = ends[k] if share == 0 else ends[k + 1]
-        if ends[k + 1] - ends[k] > ends[longest + 1] - ends[longest]:
-            longest = k
-    if 0 < share < shares:
-        time = keys[ends[longest] + (ends[longest + 1] - ends[longest]) * share // shares] >> _TIME
-        for k in range(begins.size):
-            begins[k] = ends[k] + first_from(keys[ends[k] : ends[k + 1]], time << _TIME)
-    return begins
-
-
-@inner
-def first_from(numbers, least):
-    """Index of the first of the ascending `numbers` that is at least `least`."""
-    low, high = 0, numbers.size
-    while low < high:
-        middle = (low + high) // 2
-        if numbers[middle] < least:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@inner
-def merged(keys, heads, stops, into):
-    """keys[heads[k] : stops[k]] of all parts k in order of (time, part): run by run of one part."""
-    n = 0
-    while n < into.size:
-        part, earliest, limit = 0, _NEVER, _NEVER  # whose turn it is, and the time at which it no longer is
-        for k in range(heads.size):
-            time = keys[heads[k]] >> _TIME if heads[k] < stops[k] else _NEVER
-            if time < earliest:
-                part, earliest, limit = k, time, earliest
-            else:
-                limit = min(limit, time + np.uint64(1))
-        i, stop = heads[part], stops[part]
-        while i < stop and keys[i] >> _TIME < limit:
-            into[n] = keys[i]
-            i, n = i + 1, n + 1
-        heads[part] = i
-    return into
 
 
 @inner

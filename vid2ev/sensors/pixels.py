@@ -94,7 +94,7 @@ class Pixels:
 
         parts = self.tiles.each_blocks(walk)
         self.sleep.end(len(steps))
-        return Sent(parts, intervals, self.size[0], self._labels)
+        return self._sent(parts, intervals)
 
     def _of_walk(
         self, k: int, first: int, last: int, light: np.ndarray, row: int, rows: int, table: np.ndarray,
@@ -109,8 +109,12 @@ class Pixels:
     def _wait_for_walk(self, elsewhere: Elsewhere, intervals: list[Interval]) -> None:
         """Until it is compiled; meanwhile what puts events in order is, by one event of no meaning."""
         event = Keys(np.zeros(1, np.uint64), np.ones((1, 1), np.int64))
-        Sent([event], intervals[:1], self.size[0], self._labels).ordered(self.tiles.each)
+        self._sent([event], intervals[:1]).ordered(self.tiles.each)
         elsewhere.wait()
+
+    def _sent(self, parts: list[Keys], intervals: list[Interval]) -> Sent:
+        first_us, last_us = (np.array([getattr(iv, name) for iv in intervals]) for name in ("first_us", "last_us"))
+        return Sent(parts, first_us, last_us, self.size[0], self._labels)
 
     def state(self) -> dict[str, np.ndarray]:
         """All that later events depend on and that is in the pixels, and what was tallied (copies)."""

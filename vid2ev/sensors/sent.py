@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import accumulate, chain, pairwise
+from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vid2ev.kernels.layout import Interval
-from vid2ev.kernels.order import order_keys, unpack, unpack_frames
+from vid2ev.kernels.order import LAST_OF_PASS, count_keys, lay_out, put_keys, sizes_of, unpack, unpack_frames
 from vid2ev.stream.events import Events
 
 Each = Callable[[Callable[[int], None]], Any]
 
-WORTH_THREADS = 1 << 15  # events that take longer to put in order than threads take to wake
+# Events that take longer to put in order than threads take to wake: once, for frames beside each other, or three times
+WORTH_WAKING, WORTH_WAKING_THRICE = 1 << 16, 1 << 18
+IN_CACHE = 1 << 16  # events whose keys stay in a cache between the steps of putting them in order
 
 
 class Keys(NamedTuple):
@@ -23,66 +27,90 @@ class Keys(NamedTuple):
     keys: np.ndarray  # uint64; there may be more, which mean nothing
     ends: np.ndarray  # int64 [groups, frames], how many there are after each frame of each group
 
-    def runs(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Where those of a frame begin and end in each group."""
-        begins = self.ends.ravel()[frame - 1 :: self.ends.shape[1]] if frame else np.append(0, self.ends[:-1, -1])
-        return begins[: len(self.ends)].copy(), self.ends[:, frame].copy()
-
 
 @dataclass(frozen=True)
 class Sent:
     """What is sent in some frames, in parts of pixels; keys of one pixel are in order of time."""
 
     parts: list[Keys]
-    intervals: list[Interval]
+    first_us: np.ndarray  # int64 [frames], from which the times of keys count
+    last_us: np.ndarray  # int64 [frames], counted so, the last that a key may have
     width: int
     labels: bool
 
     def ordered(self, each: Each) -> list[Events]:
-        """The events of each frame; `each` does a work for all numbers of parts, at the same time: frame beside frame,
-        or, where there are too few for that, each frame by all."""
-        count, frames = len(self.parts), len(self.intervals)
-        counts = sum(np.diff(part.ends.ravel(), prepend=0).reshape(part.ends.shape).sum(axis=0) for part in self.parts)
-        most = int(np.max(counts))
-        if frames < count or np.sum(counts) <= WORTH_THREADS:
-            keys = np.empty(most, np.uint64)
-            return [self._ordered(k, keys, each if counts[k] > WORTH_THREADS else self._alone) for k in range(frames)]
-        made, waiting = [Events.empty()] * frames, iter(range(frames))
+        """The events of each frame; `each` does a work for all numbers of parts, at the same time: runs of frames
+        beside each other, or, where there are too few for that, each frame by all."""
+        parts, frames = len(self.parts), len(self.first_us)
+        sizes = np.zeros(frames, np.int64)
+        for _, ends in self.parts:
+            sizes_of(ends, sizes)
+        starts = [0, *accumulate(sizes.tolist())]
+        most = max(map(sub, starts[1:], starts))
+        if starts[-1] <= WORTH_WAKING or (frames < parts and most <= WORTH_WAKING_THRICE):
+            return self._ordered(0, frames, np.empty(starts[-1], np.uint64))
+        if frames < parts:
+            room = np.empty(most, np.uint64)
+            return list(chain.from_iterable(self._ordered(k, k + 1, room[: sizes[k]], each) for k in range(frames)))
+        cuts = even_cuts(starts, parts * -(-starts[-1] // (parts * IN_CACHE)))
+        made: dict[int, list[Events]] = {}
+        waiting = iter(pairwise(cuts))
 
         def some(_: int) -> None:
-            keys = np.empty(most, np.uint64)
-            for k in waiting:  # (of all: each takes one that none has taken)
-                made[k] = self._ordered(k, keys, self._alone)
+            keys = np.empty(IN_CACHE + most, np.uint64)
+            for first, last in waiting:  # (of all: each takes a run that none has taken)
+                made[first] = self._ordered(first, last, keys[: starts[last] - starts[first]])
 
         each(some)
-        return made
+        return list(chain.from_iterable(made[first] for first in cuts[:-1]))
 
-    def _alone(self, work: Callable[[int], None]) -> None:
-        """`each`, one after the other."""
-        for k in range(len(self.parts)):
-            work(k)
-
-    def _ordered(self, frame: int, keys: np.ndarray, work: Each) -> Events:
-        """The events of a frame, for which there is room in `keys`."""
-        runs = [part.runs(frame) for part in self.parts]
-        ends = np.cumsum([0, *(int((stops - begins).sum()) for begins, stops in runs)])
-        n, count, interval = int(ends[-1]), len(runs), self.intervals[frame]
-        if n == 0:
-            return Events.empty(self.labels)
-        t, x, y, p, label = self._room(n)
-        work(lambda k: order_keys(self.parts[k].keys, *runs[k], interval.last_us, keys[ends[k] : ends[k + 1]]))
-        work(lambda k: unpack(keys, ends, k, count, self.width, interval.first_us, t, x, y, p, label))
-        return Events(t, x, y, p, label if self.labels else None)
+    def _ordered(self, first: int, last: int, keys: np.ndarray, each: Each | None = None) -> list[Events]:
+        """The events of frames first ... last - 1, in whose `keys` there is room for theirs; if `each` is given, by
+        all threads."""
+        if len(keys) == 0:
+            return [Events.empty(self.labels)] * (last - first)
+        first_us, last_us = self.first_us[first:last], self.last_us[first:last]
+        longest_us, parts = max(last_us.tolist()), len(self.parts)
+        rows = parts if each and longest_us <= LAST_OF_PASS else 1
+        of_parts, of_rows = (each, each) if each and rows > 1 else (in_turn(parts), in_turn(1))
+        places = np.zeros((rows, last - first, min(longest_us, LAST_OF_PASS) + 1), np.int64)
+        stops = np.empty(last - first, np.int64)
+        of_parts(lambda k: count_keys(*self.parts[k], first, last, places[k % rows]))
+        lay_out(places, stops)
+        of_parts(lambda k: put_keys(*self.parts[k], first, last, places[k % rows], keys))
+        t, x, y, p, label = self._room(len(keys))
+        of_rows(lambda k: unpack(keys, stops, first_us, last_us, k, rows, self.width, t, x, y, p, label))
+        events = Events(t, x, y, p, label if self.labels else None)
+        return [events.stretch(*frame) for frame in pairwise((0, *stops.tolist()))]
 
     def unordered(self) -> Iterator[Events]:
         """The events of all frames, part by part; in order of time are those of a pixel alone."""
-        first_us = np.array([interval.first_us for interval in self.intervals], np.int64)
         for keys, ends in self.parts:
             t, x, y, p, label = self._room(int(ends[-1, -1]))
-            since_us = np.tile(first_us, len(ends))
+            since_us = np.tile(self.first_us, len(ends))
             unpack_frames(keys[: len(t)], ends.ravel(), since_us, self.width, t, x, y, p, label)
             yield Events(t, x, y, p, label if self.labels else None)
 
     def _room(self, n: int) -> tuple[np.ndarray, ...]:
         u16, u8 = np.uint16, np.uint8
         return np.empty(n, np.int64), np.empty(n, u16), np.empty(n, u16), np.empty(n, u8), np.empty(n * self.labels, u8)
+
+
+def in_turn(count: int) -> Each:
+    """`each` of so many, one after the other."""
+
+    def each(work: Callable[[int], None]) -> None:
+        for k in range(count):
+            work(k)
+
+    return each
+
+
+def even_cuts(starts: list[int], runs: int) -> list[int]:
+    """Where to cut frames that begin at ascending `starts` [frames + 1], so that each of the runs has about as much."""
+    cuts, frames = [0], len(starts) - 1
+    for k in range(1, runs):
+        cut = bisect_left(starts, starts[-1] * k // runs)
+        if cuts[-1] < cut < frames:
+            cuts.append(cut)
+    return [*cuts, frames]

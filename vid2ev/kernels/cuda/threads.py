@@ -9,8 +9,8 @@ from vid2ev.kernels.cuda.clips import Due
 from vid2ev.kernels.cuda.counter import take
 from vid2ev.kernels.cuda.pixel import glance, planes_of_clip, settle, walk
 from vid2ev.kernels.cuda.staged import Staged
+from vid2ev.kernels.forced import first_from
 from vid2ev.kernels.layout import TALLIES, stride_of
-from vid2ev.kernels.order import first_from
 from vid2ev.kernels.rows import sensor_of
 
 
