@@ -84,6 +84,27 @@ def put_eight(typing_context, array, index, first, packed):
     return types.none(array, types.int64, types.int32, types.uint64), codegen
 
 
+@intrinsic
+def from_entry(typing_context, array, index):
+    """An array as long as this one that begins at another entry than its first, before or after it, unchecked: it is up
+    to the caller that there is one."""
+
+    def codegen(context, builder, signature, arguments):
+        view = context.make_array(array)(context, builder, arguments[0])
+        other = context.make_array(array)(context, builder)
+        context.populate_array(
+            other,
+            data=builder.gep(view.data, [arguments[1]]),
+            shape=view.shape,
+            strides=view.strides,
+            itemsize=view.itemsize,
+            meminfo=None,
+        )
+        return other._getvalue()
+
+    return array(array, types.int64), codegen
+
+
 bits_32 = _bitcast(types.float32, types.int32)
 float_32 = _bitcast(types.int32, types.float32)
 bits_64 = _bitcast(types.float64, types.int64)

@@ -19,7 +19,7 @@ from vid2ev.upsample.flow import FlowUpsampling, Motion, Moving
 from vid2ev.upsample.flow import carried as carried_between
 from vid2ev.upsample.proxies import agreement
 from vid2ev.upsample.subframes import instants, steps_for
-from vid2ev.upsample.warp import AFTER, BEFORE, carry, settle, splat
+from vid2ev.upsample.warp import AFTER, BEFORE, carry, moving_of, settle, splat
 
 F = np.float32
 INTERVAL_NS = 33_333_333
@@ -251,8 +251,8 @@ def test_even_motion_is_thrown_to_even_motion(across: float, down: float, time: 
     inside = np.pad(np.ones((6, 8), bool), 3)
     np.testing.assert_allclose(sure[inside], 1, atol=1e-6)
     field, motion = np.zeros((14, 16, 4), F), np.empty((3, 12, 14), F)
-    splat(flow, sure, F(1e-3), F(time), F(1), F(1 - time), 2, field)
-    splat(-flow, sure, F(1e-3), F(1 - time), F(-1), F(time), 3, field)
+    splat(moving_of(flow, sure, F(1e-3), 2, field), F(time), F(1), F(1 - time), 2, field)
+    splat(moving_of(-flow, sure, F(1e-3), 3, field), F(1 - time), F(-1), F(time), 3, field)
     settle(field, F(time), F(0.05), motion)
     np.testing.assert_allclose(motion[0][inside], across, atol=1e-4)
     np.testing.assert_allclose(motion[1][inside], down, atol=1e-4)

@@ -118,7 +118,8 @@ def test_what_is_thrown_is_what_a_cpu_throws():
     motion[draws.random((31, 23)) < 0.3] = 0
     time, there = F(0.3), Upload("cpu").tensor
     field = np.zeros((33, 25, 4), F)
-    warp.splat(motion, sure, flow.UNSURE, time, F(-1), F(1) - time, 3, field)
+    moving = warp.moving_of(motion, sure, flow.UNSURE, 3, field)
+    warp.splat(moving, time, F(-1), F(1) - time, 3, field)
     instants = there(np.array([0.9, 0.3], F))[:, None, None]
     sums = warp_tensors.splat(there(motion), there(sure), float(flow.UNSURE), instants, -1.0, 1 - instants)
     assert sums.dtype == torch.int64 and sums.shape == (3, 2, 33, 25), "whole numbers: any order gives the same"

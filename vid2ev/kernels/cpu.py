@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernel_intrinsics import prefetch, put_eight
+from vid2ev.kernel_intrinsics import from_entry, prefetch, put_eight
 from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
@@ -48,15 +48,16 @@ def hits_of(flagged, hits):
 
 @compiled
 def walk_tile(
-    first_block, last_block, light, row, rows, lut, naps, planes, flags, num, floats, ints, ends, work, out, tally
+    first_block, last_block, light, places, lut, naps, planes, flags, num, floats, ints, ends, work, out, tally
 ):
     """Advance blocks first_block ... last_block - 1 through some frames; returns the keys of their events.
 
-    The light [., pixels] of frame k is in row `row` + k `rows`, its interval in row k of floats and ints
-    (`kernels.rows`).  The blocks go in groups, each through all frames before the next one begins, so that its state
-    stays in the cache: ends [groups, frames] becomes how many keys there are after each frame of each.
+    The light of frame k is as long as `light` [pixels], and begins at entry places[k] counted from the first of that;
+    its interval is in row k of floats and ints (`kernels.rows`).  The blocks go in groups, each through all frames
+    before the next one begins, so that its state stays in the cache: ends [groups, frames] becomes how many keys there
+    are after each frame of each.
     """
-    n, pixels = np.int64(0), np.int64(light.shape[1])
+    n, pixels = np.int64(0), np.int64(light.size)
     groups, blocks = ends.shape[0], last_block - first_block
     for group in range(groups):
         first, last = first_block + blocks * group // groups, first_block + blocks * (group + 1) // groups
@@ -65,8 +66,8 @@ def walk_tile(
                 lift(first, last, pixels, floats[k, RISEN], naps, planes, flags, num, work)
             iv = interval_of_row(floats[k], ints[k])
             out, n = walk_blocks(
-                first, last, pixels, light[row + k * rows], lut, of_frame(naps, k), planes, flags, num, iv, work, out,
-                n, tally,
+                first, last, pixels, from_entry(light, places[k]), lut, of_frame(naps, k), planes, flags, num, iv, work,
+                out, n, tally,
             )  # fmt: skip
             ends[group, k] = n
     return out

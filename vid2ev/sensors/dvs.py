@@ -110,7 +110,7 @@ class Dvs:
             return self.restart(light, t_ns)
         self._intake.check(np.shape(light))
         flat, table = self._light(light)
-        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to([t_ns]), told_of([still], [self._seen]))
+        sent = self._pixels.walk(flat, table, self._steps_to([t_ns]), told_of([still], [self._seen]))
         self._seen = light
         return self._in_order(sent, [t_ns])[0]
 
@@ -296,11 +296,11 @@ class Dvs:
             self.restart(light[0, clip], t_ns[0])
             light, t_ns = light[1:], t_ns[1:]
         flat, table = self._light(light)
-        clips = light.shape[1]
+        of_clip = flat[clip :: light.shape[1]]
         for first in range(0, len(t_ns), AT_ONCE):
             times = t_ns[first : first + AT_ONCE]
             steps, told = self._steps_to(times), nothing_told(len(times))
-            yield self._pixels.walk(flat, first * clips + clip, clips, table, steps, told), times
+            yield self._pixels.walk(of_clip[first : first + AT_ONCE], table, steps, told), times
         self._seen = None
 
     def _see_shot(self, frames: Sequence[Frame]) -> list[Events]:
@@ -308,9 +308,9 @@ class Dvs:
         lights, t_ns = [frame.light for frame in frames], [frame.t_ns for frame in frames]
         for light in lights:
             self._intake.check(np.shape(light))
-        flat, table = self._light(np.array(lights))
+        seen = [self._light(light) for light in lights]
         told = told_of([frame.still for frame in frames], [self._seen, *lights[:-1]])
-        sent = self._pixels.walk(flat, 0, 1, table, self._steps_to(t_ns), told)
+        sent = self._pixels.walk([flat[0] for flat, _ in seen], seen[0][1], self._steps_to(t_ns), told)
         self._seen = lights[-1]
         return self._in_order(sent, t_ns)
 

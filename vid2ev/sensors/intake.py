@@ -37,7 +37,7 @@ class Intake:
         pixels = self.size[0] * self.size[1]
         if light.dtype.kind == "f":
             with np.errstate(over="ignore"):  # (what is beyond float32 becomes infinite, and is mended)
-                flat = np.ascontiguousarray(light, np.float32)
+                flat = np.require(light, np.float32, ["C", "A"])
             return flat.reshape(-1, pixels), np.empty(0, np.float32)
         codes = light.dtype.newbyteorder("=")
         if codes not in (np.uint8, np.uint16) or self.transfer is None:
@@ -47,7 +47,7 @@ class Intake:
             )
         if codes not in self._tables:
             self._tables[codes] = _table(self.transfer, 8 * codes.itemsize)
-        return np.ascontiguousarray(light, codes).reshape(-1, pixels), self._tables[codes]
+        return np.require(light, codes, ["C", "A"]).reshape(-1, pixels), self._tables[codes]
 
 
 def _table(transfer: str, bits: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,12 @@ def only_read(light: np.ndarray) -> np.ndarray:
     view = light.view()
     view.flags.writeable = False
     return view
+
+
+def places_of(lights: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
+    """Where arrays of one type begin: int64, in entries from the first one's first entry on."""
+    addresses = [light.__array_interface__["data"][0] for light in lights]
+    return (np.array(addresses, np.int64) - addresses[0]) // lights[0].itemsize
 
 
 class Pixels:
@@ -65,7 +72,7 @@ class Pixels:
         light = only_read(flat[0])
         if self._threads > 1:  # (a core for the walk, by far the longest of the kernels)
             none = np.zeros((0, 0)), np.zeros((0, 0), np.int64), np.zeros((0, 0), np.int64)
-            self._elsewhere = Elsewhere(walk_tile, self._of_walk(0, 0, 0, only_read(flat), 0, 1, table, *none))
+            self._elsewhere = Elsewhere(walk_tile, self._of_walk(0, 0, 0, light, np.zeros(0, np.int64), table, *none))
 
         def settle(k: int, first: int, last: int) -> None:
             settle_tile(
@@ -78,18 +85,19 @@ class Pixels:
         self.tiles.each_blocks(settle)
         self.planes.t_last[...] = max(t_ns - self.numbers.refractory_ns - 1, np.iinfo(np.int64).min)
 
-    def walk(self, light: np.ndarray, row: int, rows: int, table: np.ndarray, steps: list[Step], told: Any) -> Sent:
-        """Through the frames of these steps, whose light is in rows `row`, `row` + `rows` ...; `told`: see `Naps`."""
+    def walk(self, lights: np.ndarray | Sequence[np.ndarray], table: np.ndarray, steps: list[Step], told: Any) -> Sent:
+        """Through the frames of these steps, of each of which the light [pixels] is one of `lights`, wherever in memory
+        it is; `told`: see `Naps`."""
         intervals = [interval for interval, _ in steps]
         self.sleep.begin(intervals, told)
         floats, ints = interval_rows(steps)
-        light = only_read(light)
+        light, places = only_read(lights[0]), places_of(lights)
         if self._elsewhere:
             self._wait_for_walk(self._elsewhere, intervals)
 
         def walk(k: int, first: int, last: int) -> Keys:
             ends = np.zeros((-(-(last - first) // GROUP) if len(steps) > 1 else 1, len(steps)), np.int64)
-            self._buffers[k] = walk_tile(*self._of_walk(k, first, last, light, row, rows, table, floats, ints, ends))
+            self._buffers[k] = walk_tile(*self._of_walk(k, first, last, light, places, table, floats, ints, ends))
             return Keys(self._buffers[k], ends)
 
         parts = self.tiles.each_blocks(walk)
@@ -97,12 +105,12 @@ class Pixels:
         return self._sent(parts, intervals)
 
     def _of_walk(
-        self, k: int, first: int, last: int, light: np.ndarray, row: int, rows: int, table: np.ndarray,
+        self, k: int, first: int, last: int, light: np.ndarray, places: np.ndarray, table: np.ndarray,
         floats: np.ndarray, ints: np.ndarray, ends: np.ndarray,
     ) -> tuple:  # fmt: skip
         """What the walk is called with for tile k."""
         return (
-            first, last, light, row, rows, table, self.sleep.naps, self.planes, self.flags, self.numbers, floats, ints,
+            first, last, light, places, table, self.sleep.naps, self.planes, self.flags, self.numbers, floats, ints,
             ends, self._work[k], self._buffers[k], self.tallies[k],
         )  # fmt: skip
 

@@ -1,8 +1,9 @@
 """Carrying motion and light to an instant between two frames.
 
-`splat` throws the velocities of a frame forward to where its pixels are at that instant; where several land on one
-place, those on which both directions of flow agree outweigh the rest, so that what is in front wins.  `carry` then
-looks, for every pixel of the instant, back along its velocity into the frame before and forward into the frame after.
+`splat` throws the velocities of what moves in a frame forward to where its pixels are at that instant; where several
+land on one place, those on which both directions of flow agree outweigh the rest, so that what is in front wins.
+`carry` then looks, for every pixel of the instant, back along its velocity into the frame before and forward into the
+frame after.
 """
 
 from __future__ import annotations
@@ -65,39 +66,57 @@ def doubt(flow, gain, least):
 
 
 @compiled
-def splat(flow, sure, unsure, time, direction, share, slot, field):
-    """Add a frame's velocities to `field`, at the places its pixels reach after `time` of the interval.
+def moving_of(flow, sure, unsure, slot, field):
+    """What of a frame moves: float32 [n, 5] place (x, y in `field`), shift and weight; the rest is added to `field`.
 
-    flow       [h, w, 2] shift over the whole interval, px of this grid
-    sure       [h, w] of `proxies.agreement`; `unsure` is added: what a pixel counts on which the flows do not agree
-    direction  1 if flow runs with time, -1 if against
-    share      factor on the weight in the average of velocities
-    slot       2 or 3: where the weights go
-    field      [h + 2, w + 2, 4], a margin of one pixel around: sums of share weight velocity (x, y), of the weights of
-               the frame before, of the weights of the frame after
+    flow    [h, w, 2] shift over the whole interval, px of this grid
+    sure    [h, w] of `proxies.agreement`; `unsure` is added: what a pixel counts on which the flows do not agree
+    slot    2 or 3: where in `field` (of `splat`) the weights go of pixels that stay where they are
     """
     height, width = sure.shape
+    moving, count = np.empty((sure.size, 5), F), 0
     for y in range(height):
         for x in range(width):
             across, down, weight = flow[y, x, 0], flow[y, x, 1], sure[y, x] + unsure
             if across == F(0) and down == F(0):
                 field[y + 1, x + 1, slot] += weight
                 continue
-            to_x, to_y = F(x + 1) + time * across, F(y + 1) + time * down
-            if not (F(0) <= to_x < F(width + 1) and F(0) <= to_y < F(height + 1)):
-                continue
-            column, row = int(to_x), int(to_y)
-            right, lower = to_x - F(column), to_y - F(row)
-            x_sum, y_sum = direction * share * across, direction * share * down
-            for part, place in (
-                ((_ONE - right) * (_ONE - lower) * weight, field[row, column]),
-                (right * (_ONE - lower) * weight, field[row, column + 1]),
-                ((_ONE - right) * lower * weight, field[row + 1, column]),
-                (right * lower * weight, field[row + 1, column + 1]),
-            ):
-                place[0] += part * x_sum
-                place[1] += part * y_sum
-                place[slot] += part
+            pixel = moving[count]
+            pixel[0], pixel[1], pixel[2], pixel[3], pixel[4] = F(x + 1), F(y + 1), across, down, weight
+            count += 1
+    return moving[:count]
+
+
+@compiled
+def splat(moving, time, direction, share, slot, field):
+    """Add the velocities of what moves in a frame to `field`, at the places its pixels reach after `time` of the
+    interval.
+
+    moving     [n, 5] of `moving_of`
+    direction  1 if flow runs with time, -1 if against
+    share      factor on the weight in the average of velocities
+    slot       2 or 3: where the weights go
+    field      [h + 2, w + 2, 4], a margin of one pixel around: sums of share weight velocity (x, y), of the weights of
+               the frame before, of the weights of the frame after
+    """
+    height, width = field.shape[0] - 2, field.shape[1] - 2
+    for i in range(moving.shape[0]):
+        across, down, weight = moving[i, 2], moving[i, 3], moving[i, 4]
+        to_x, to_y = moving[i, 0] + time * across, moving[i, 1] + time * down
+        if not (F(0) <= to_x < F(width + 1) and F(0) <= to_y < F(height + 1)):
+            continue
+        column, row = int(to_x), int(to_y)
+        right, lower = to_x - F(column), to_y - F(row)
+        x_sum, y_sum = direction * share * across, direction * share * down
+        for part, place in (
+            ((_ONE - right) * (_ONE - lower) * weight, field[row, column]),
+            (right * (_ONE - lower) * weight, field[row, column + 1]),
+            ((_ONE - right) * lower * weight, field[row + 1, column]),
+            (right * lower * weight, field[row + 1, column + 1]),
+        ):
+            place[0] += part * x_sum
+            place[1] += part * y_sum
+            place[slot] += part
 
 
 @compiled
