@@ -128,9 +128,11 @@ def convert(
         )
         recorder = _recorded(recipe, planner, folder, make, _Course(piece, report, since_ns, pause))
         said = described(planner.plans if planner else plans)
-        manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
         with folder.writing():
+            began = time.monotonic() - recorder.done.seconds
             recorder.write(folder.whole)
+            recorder.done.seconds = time.monotonic() - began
+            manifests = _manifests(job | recorder.recipe.describe() | said, recorder, _run(video, threads, recorder))
             for within, manifest in manifests.items():
                 write_manifest(folder.whole / within / "manifest.json", manifest)
             folder.publish()
@@ -252,6 +254,7 @@ def _record(recorder: Recorder, planner: Planner | None, course: _Course) -> boo
             return False
         done.looked, done.ended = planner.looked, True
     recorder.finish()
+    done.seconds = time.monotonic() - began
     return True
 
 

@@ -21,7 +21,9 @@ Filter: Blosc with LZ4 and bit-shuffling, about 3 bytes per event; Zstandard sav
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +33,7 @@ from vid2ev.errors import DataError
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
+from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.untrusted import check_bytes
 
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
 
 VERSION = 1
 CHUNK = 1 << 16  # events per compressed chunk
+BLOCKS_AHEAD = 1  # read and looked at while those before them are compressed
 MS_US = 1000
 BESIDE = ("events/label", "frames/t", "frames/to_idx", "ms_to_idx", "t_offset")  # the events
 
@@ -96,18 +100,16 @@ def write_events(path: Path, recording: Recording) -> None:
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
         frames = None if recording.frame_us is None else FrameIndex(recording.frame_us - offset_us)
         indexed = start = last_us = 0
-        for block in recording.blocks():
-            t = block.t - offset_us
-            if len(t) and (t[0] < last_us or np.any(t[1:] < t[:-1])):
-                raise ValueError(f"events out of order of time after event {start}")
-            last_us = int(t[-1]) if len(t) else last_us
-            for name, dataset in columns.items():
-                dataset[start : start + len(t)] = t if name == "t" else getattr(block, name)
-            indexed = _index(index, indexed, last_us // MS_US + 1, t, start)
-            if frames is not None:
-                frames.add(t, start)
-            start += len(t)
-            raw.check()
+        with closing(ahead(_since(recording), BLOCKS_AHEAD)) as blocks:
+            for block in blocks:
+                last_us = int(block.t[-1]) if len(block) else last_us
+                for name, dataset in columns.items():
+                    dataset[start : start + len(block)] = getattr(block, name)
+                indexed = _index(index, indexed, last_us // MS_US + 1, block.t, start)
+                if frames is not None:
+                    frames.add(block.t, start)
+                start += len(block)
+                raw.check()
         if start != recording.count:
             raise ValueError(f"{start} events, {recording.count} announced")
         _index(index, indexed, len(index), np.empty(0, np.int64), start)
@@ -116,6 +118,18 @@ def write_events(path: Path, recording: Recording) -> None:
                 dataset = _dataset(file, f"frames/{name}", len(values), dtype)
                 dataset[...] = values
                 dataset.flush()  # (now, and not when nobody holds it any more: its place in the file goes by that)
+
+
+def _since(recording: Recording) -> Generator[Events]:
+    """The events in blocks, times since the start of the recording.  Raises ValueError for times out of order."""
+    count = last_us = 0
+    for block in recording.blocks():
+        events = replace(block, t=block.t - recording.start_us)
+        if len(events) and (events.t[0] < last_us or np.any(events.t[1:] < events.t[:-1])):
+            raise ValueError(f"events out of order of time after event {count}")
+        last_us = int(events.t[-1]) if len(events) else last_us
+        count += len(events)
+        yield events
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:
