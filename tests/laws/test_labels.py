@@ -55,8 +55,11 @@ def test_events_of_moving_light_are_signal():
     assert (sent.label == Label.SIGNAL).all()
 
 
-def test_hot_pixels_send_only_hot_events():
-    sent = play(noisy(hot_probability=1.0, hot_rate_hz=1000), *moving(), labels=True)
+@pytest.mark.parametrize("refractory", ["quantised", "track"])
+def test_hot_pixels_send_only_hot_events(refractory):
+    """Also once they have been blind."""
+    spec = noisy(hot_probability=1.0, hot_rate_hz=1000, refractory_us=200, refractory=refractory)
+    sent = play(spec, *moving(), labels=True)
     assert (sent.label == Label.HOT).all()
 
 

@@ -218,8 +218,8 @@ def walk_pixel(
     off = lanes[AT] - lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
     piece, s, solved, candidate = 0, 0.0, 0, 0
-    blind_until = -1.0  # end of a refractory period of the kind `track`
-    if len(flags.track):
+    blind_until = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
+    if len(flags.track) and good:
         blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
     rice_s, expected = next_rice(path, knots, s, 0, on, off, pixel, num, iv) if rice else (2.0, 0.0)
     while True:
@@ -258,7 +258,7 @@ def walk_pixel(
             on, off, out, n = force(
                 lanes, pixels, pixel, path, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
             )
-            if len(flags.track):
+            if len(flags.track) and good:
                 blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
             j += 1
         elif stop == rice_s:
