@@ -129,11 +129,12 @@ def test_any_size(shape: tuple[int, int]) -> None:
         np.testing.assert_allclose(between(before, after)[0], (before + after) / 2, atol=1e-6)
 
 
-def test_a_bad_pixel_spoils_no_other() -> None:
+@pytest.mark.parametrize("bad", [(np.nan, np.inf), (3e38, 3e38)])  # (finite; its hundredths are not)
+def test_a_bad_pixel_spoils_no_other(bad: tuple[float, float]) -> None:
     before, after = pan(enlarged(data.gravel()), [(0, 0), (3, 0)])
     whole = between(before, after)[0]
     before, after = before.copy(), after.copy()
-    before[60, 80], after[20, 30] = np.nan, np.inf
+    before[60, 80], after[20, 30] = bad
     spoiled = between(before, after)[0]
     assert np.isfinite(spoiled).all()
     far = np.ones(whole.shape, bool)

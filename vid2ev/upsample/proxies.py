@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from vid2ev.stream.still import BRIGHTEST
 from vid2ev.upsample.warp import miss
 
 F = np.float32
@@ -22,7 +23,7 @@ def log_of(light: np.ndarray, shrink: int) -> np.ndarray:
     height, width = light.shape
     size = (max(1, width // shrink), max(1, height // shrink))
     small = finite(cv2.resize(light, size, interpolation=cv2.INTER_AREA))
-    return np.log1p(np.maximum(small, 0) * F(1 / FLOOR))
+    return np.log1p(np.clip(small, 0, F(BRIGHTEST)) * F(1 / FLOOR))  # (more would not be finite)
 
 
 def codes(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
