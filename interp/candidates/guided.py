@@ -13,7 +13,7 @@ J is free of the noise of events, C right where nothing in the key frames is, an
 of two pictures whose errors have nothing to do with each other, as Wiener's filter is.  c^2 is the mean squared error
 of C, of what the key frames show that events missed (`ramps.in_doubt`); and e^2, of J and C apart, is c^2 + j^2.
 So J counts where C is in doubt, or both agree, and C where it is certain and J is not: flicker, smoke, what comes into
-view.  Motion counts where it explains light better than standing still does (`vid2ev.upsample.flow.convincing`), so
+view.  Motion counts where it explains light better than standing still does (`vid2ev.upsample.motion.convincing`), so
 what stands still stays as it is.
 
 Where a pixel of the event camera looks at k x k pixels of the frames, C has luminance averaged over them and nothing
@@ -47,7 +47,7 @@ from interp.candidates.bridge import coloured, ratios_of
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
 from interp.warp import both_warped
-from vid2ev.upsample.flow import convincing
+from vid2ev.upsample.motion import convincing
 
 SMALLEST = 16  # px: DIS refuses less than 12
 CONVINCED_CODES = 0.5  # by how much motion must be better than none

@@ -29,7 +29,7 @@ from interp.light import Transfer, luminance, to_light
 from interp.precision import in_full_precision
 from interp.representation.carried import carried, over, places_over
 from interp.representation.event_counts import EventCounts
-from vid2ev.upsample.flow import carried_along, convincing
+from vid2ev.upsample.motion import carried_along, convincing
 
 CONVINCED_CODES = 2.0
 EXPLAINED = 0.3

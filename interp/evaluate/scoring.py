@@ -15,7 +15,7 @@ from interp.evaluate.row import Row
 from vid2ev.compare.pictures import highest, lowest, moments, moving, psnr, psnr_of_mean, squared_error
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.stream.frames import LUMINANCE
-from vid2ev.upsample.flow import FlowUpsampling
+from vid2ev.upsample.motion import MotionEstimator
 
 LIGHT = parse_transfer("srgb").to_light(np.arange(256) / 255).astype(np.float32)  # of codes
 LEAST_EXPLAINED = 0.25  # of what changes: of pans that are found 0.87 and more, of others up to 0.12; films 0.4 to 0.9
@@ -60,7 +60,7 @@ def scores_of(made: np.ndarray, true: np.ndarray, keys: np.ndarray) -> dict[str,
 def conditions_of(group: Group) -> dict[str, float]:
     """What makes a group hard, by the names of a row."""
     first, last = (LIGHT[key] @ LUMINANCE for key in group.keys)
-    motion = FlowUpsampling(2).motion(first, last)
+    motion = MotionEstimator().between(first, last)
     moved = motion.shift_px if motion.explained >= LEAST_EXPLAINED else math.nan
     height, width = group.events.off_on.shape[-2:]
     return {

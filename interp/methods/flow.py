@@ -1,4 +1,4 @@
-"""Light carried along the motion between two frames (`vid2ev.upsample.flow`: DIS, forwards and backwards)."""
+"""Light carried along the motion between two frames (`vid2ev.upsample`: DIS, forwards and backwards)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from interp.light import to_codes, to_light
 from interp.methods.gap import Gap
 from interp.methods.tiling import Tiling
 from vid2ev import Frame
-from vid2ev.upsample.flow import FlowUpsampling, carried
+from vid2ev.upsample.flow import carried
+from vid2ev.upsample.motion import MotionEstimator
 
 GAP_NS = 1 << 40  # any, so long that times of 24 bits are whole
 
@@ -20,7 +21,7 @@ def flow(gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.T
     made = {0: first.light, GAP_NS: last.light}
     times_ns = [round(time * GAP_NS) for time in times.tolist()]
     if inner := sorted({t_ns for t_ns in times_ns if 0 < t_ns < GAP_NS}):
-        motion = FlowUpsampling(len(inner) + 1).motion(first.luminance, last.luminance)
+        motion = MotionEstimator().between(first.luminance, last.luminance)
         made |= {frame.t_ns: frame.light for frame in carried(first, last, motion, inner)}
     light = torch.stack([torch.from_numpy(made[t_ns]) for t_ns in times_ns])
     channels = light[:, None] if light.ndim == 3 else light.permute(0, 3, 1, 2)

@@ -15,7 +15,8 @@ from vid2ev.plan.subframes import Subframes
 from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.stream import Frame
-from vid2ev.upsample.flow import FEWEST, FlowUpsampling
+from vid2ev.upsample.flow import FlowUpsampling
+from vid2ev.upsample.motion import FEWEST
 from vid2ev.upsample.subframes import KAPPA_PER_PX, TOLERANCE_S, steps_for
 
 INTERVAL_NS = 20_000_000
@@ -80,7 +81,7 @@ def test_a_still_clip_needs_no_subframes_and_no_flow(monkeypatch: pytest.MonkeyP
     def looked(*_: object) -> None:
         raise AssertionError("flow is looked for")
 
-    monkeypatch.setattr(up, "_dis", SimpleNamespace(calc=looked))
+    monkeypatch.setattr(up._estimator, "_dis", SimpleNamespace(calc=looked))
     for each, expected in zip(changed, with_flow, strict=True):
         made = up.between(Frame(light, 0), each)
         assert [*made] == expected == [each] and made.shift_px == 0.0

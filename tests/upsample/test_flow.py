@@ -14,9 +14,10 @@ from skimage import data
 
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import strip_count
-from vid2ev.upsample import make_upsampler
-from vid2ev.upsample.flow import FlowUpsampling, Motion, Moving
+from vid2ev.upsample import flow, make_upsampler
+from vid2ev.upsample.flow import FlowUpsampling, Moving
 from vid2ev.upsample.flow import carried as carried_between
+from vid2ev.upsample.motion import Motion, MotionEstimator, changing_part, convincing
 from vid2ev.upsample.proxies import agreement
 from vid2ev.upsample.subframes import instants, steps_for
 from vid2ev.upsample.warp import AFTER, BEFORE, carry, moving_of, settle, splat
@@ -206,7 +207,7 @@ def carried(
     motion[0], motion[1], motion[2] = velocity[0], velocity[1], weight
     out = np.empty(before.shape, F)
     before, after = (cv2.copyMakeBorder(x, BEFORE, AFTER, BEFORE, AFTER, cv2.BORDER_REPLICATE) for x in (before, after))
-    carry(before, after, motion, F(time), out, np.empty(strip_count(*out.shape[::-1]), np.bool_))
+    carry(before, after, motion, 0, 0, F(time), out, np.empty(strip_count(*out.shape[::-1]), np.bool_))
     return out
 
 
@@ -291,10 +292,62 @@ def test_where_both_frames_see_a_thing_the_nearer_one_counts_more(time: float) -
     flow, back = np.zeros((2, 40, 60, 2), F)
     flow[5:13, 20:40, 1], back[25:33, 20:40, 1] = 20, -20
     sure, other = (F(0.01) + abs(each[..., 1] / 20) for each in (flow, back))
-    _, y, share = Moving(Motion(flow, back, sure, other, 40.0, 1.0), (80, 120)).at(F(time))
-    middle = round(2 * (9 + 20 * time))
-    np.testing.assert_allclose(share[middle - 2 : middle + 2, 50:70], 1 - time, atol=0.02)
-    np.testing.assert_allclose(y[middle - 2 : middle + 2, 50:70], 40, rtol=0.02)
+    moving = Moving(Motion(flow, back, sure, other, 40.0, 1.0), (80, 120))
+    _, y, share = moving.at(F(time))
+    middle = round(2 * (9 + 20 * time)) - moving.top
+    seen = slice(middle - 2, middle + 2), slice(50 - moving.left, 70 - moving.left)
+    np.testing.assert_allclose(share[seen], 1 - time, atol=0.02)
+    np.testing.assert_allclose(y[seen], 40, rtol=0.02)
+
+
+@pytest.mark.parametrize("odd", [0, 1])
+def test_outside_the_part_that_moves_light_is_as_if_the_motion_of_all_were_thrown(odd: int, monkeypatch) -> None:
+    """Up to rounding; a wide frame of which a little moves, at its border too."""
+    card = pan(enlarged(data.camera()), [(0, 0)])[0][20:50, 30:70]
+    wall = pan(enlarged(data.gravel()), [(0, 0)], (240 + odd, 160))[0]
+    before, after = np.stack([wall, wall])
+    before[4:34, 2:42], after[8:38, 6:46] = card, card
+    motion = MotionEstimator().between(before, after)
+    moving = Moving(motion, before.shape)
+    assert moving.height < 100 and (moving.width < 100) != odd
+    times = instants(0, 10**6, 5)
+    frames = Frame(before, 0), Frame(after, 10**6)
+    part = list(carried_between(*frames, motion, times))
+    monkeypatch.setattr(flow, "REACH", 1000)
+    for one, other in zip(part, carried_between(*frames, motion, times), strict=True):
+        np.testing.assert_allclose(one.light, other.light, rtol=3e-7)
+        np.testing.assert_array_equal(one.still.strips, other.still.strips)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(12, 90), st.integers(12, 90))
+@settings(max_examples=50, deadline=None)
+def test_no_flow_convinces_outside_the_part_that_changes(seed: int, height: int, width: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, end = rng.integers(0, 256, (2, height, width), np.uint8)
+    still = np.ones((height, width), bool)
+    still[rng.integers(height) :, rng.integers(width) :] = False
+    end[still] = start[still]
+    flow = rng.normal(0, 5, (height, width, 2)).astype(F)
+    part = changing_part(cv2.absdiff(start, end), 1.0)
+    kept = convincing(flow, start, end, 1.0) != 0
+    kept[part or ...] = False
+    assert not kept.any()
+
+
+@given(st.integers(1, 2000), st.integers(1, 2000), st.integers(0, 1999), st.integers(0, 1999))
+@settings(max_examples=50, deadline=None)
+def test_the_part_that_changes_is_matched_from_as_far_as_the_whole(rows: int, columns: int, y: int, x: int) -> None:
+    """DIS halves pictures while the longer side has some four patches, and the shorter has one."""
+
+    def halvings(height: int, width: int) -> int:
+        longest, shortest = max(height, width), min(height, width)
+        return max(0, min(int(np.log2(longest / 32) + 0.5), int(np.log2(max(1, shortest // 8)))))
+
+    difference = np.zeros((rows, columns), np.uint8)
+    assert changing_part(difference, 1.0) is None
+    difference[y % rows, x % columns] = 255
+    part = difference[changing_part(difference, 1.0)]
+    assert part.max() == 255 and halvings(*part.shape) >= halvings(rows, columns)
 
 
 def test_motion_that_is_hardly_seen_asks_for_no_steps() -> None:
@@ -304,9 +357,8 @@ def test_motion_that_is_hardly_seen_asks_for_no_steps() -> None:
     for k in range(2):
         above, below = pan(near, [(k, 0)])[0], pan(far, [(6 * k, 0)])[0]
         frames.append(np.where(np.arange(120)[:, None] < 60, above, F(0.5) * np.exp(F(0.15) * (below - below.mean()))))
-    upsampler = FlowUpsampling(threshold=0.15)
-    assert 0.5 < upsampler.motion(*frames).shift_px < 2
-    assert FlowUpsampling(threshold=0.01).motion(*frames).shift_px > 4
+    assert 0.5 < MotionEstimator(threshold=0.15).between(*frames).shift_px < 2
+    assert MotionEstimator(threshold=0.01).between(*frames).shift_px > 4
 
 
 # ------------------------------------------------------------------------------------------------------- real clips

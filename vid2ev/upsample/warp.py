@@ -144,41 +144,56 @@ def settle(field, time, enough, motion):
 
 
 @compiled
-def carry(before, after, motion, time, out, still):
-    """Light at `time` (share of the interval gone by) into out [h, w].
+def carry(before, after, motion, top, left, time, out, still):
+    """Light at `time` (share of the interval gone by) into out [H, W].
 
-    before, after   the frames [h + 3, w + 3], with margins of BEFORE and AFTER px that repeat the border
-    motion          [3, h, w] of `settle`, for every pixel of the frames, in px of the frames
+    before, after   the frames [H + 3, W + 3], with margins of BEFORE and AFTER px that repeat the border
+    motion          [3, h, w] of `settle`, in px of the frames, for the part of them that begins at pixel `top`, `left`;
+                    outside of it nothing moves, and a frame counts by its nearness in time
     still           bool [strips of out, as of `stream.still`]: where nothing moves, and both frames are the same
     """
     height, width = out.shape
     pitch, x_last, y_last = before.shape[1], F(width - 1), F(height - 1)
+    bottom, right = top + motion.shape[1], left + motion.shape[2]
     entry, weights = np.empty(width, np.int32), np.empty((8, width), F)
     seen_before, seen_after, flat_weights = np.empty(width, F), np.empty(width, F), weights.reshape(-1)
-    flat_before, flat_after, flat_motion, flat_out = (
-        before.reshape(-1), after.reshape(-1), motion.reshape(-1), out.reshape(-1)
+    none = np.zeros((3, width), F)
+    none[2] = _ONE - time
+    flat_before, flat_after, flat_motion, flat_none, flat_out = (
+        before.reshape(-1), after.reshape(-1), motion.reshape(-1), none.reshape(-1), out.reshape(-1)
     )  # fmt: skip
     still[:] = True
     for y in range(height):
         row_moves, first = False, 0
+        part_row = top <= y < bottom
         while first < width:
-            place = y * width + first
-            count = min(STRIP - place % STRIP, width - first)
-            margined = (y + BEFORE) * pitch + BEFORE + first
-            moves, differs = _fade(flat_before, flat_after, margined, flat_motion, flat_out, place, count)
+            place, margined = y * width + first, (y + BEFORE) * pitch + BEFORE + first
+            in_part = part_row and left <= first < right
+            edge = right if in_part else left if part_row and first < left else width
+            count = min(STRIP - place % STRIP, edge - first)
+            if in_part:
+                there = (y - top) * motion.shape[2] + first - left
+                moves, differs = _fade(
+                    flat_before, flat_after, margined, flat_motion, there, motion[0].size, flat_out, place, count
+                )
+            else:
+                moves, differs = _fade(
+                    flat_before, flat_after, margined, flat_none, first, width, flat_out, place, count
+                )
             still[place // STRIP] &= not (moves or differs)
             row_moves |= moves
             first += count
         last = 0
-        while row_moves and last < width:
-            first, last = _next_moving(motion[0, y], motion[1, y], last)
+        while row_moves and last < motion.shape[2]:
+            across, down, share = motion[0, y - top], motion[1, y - top], motion[2, y - top]
+            first, last = _next_moving(across, down, last)
             if first < last:
-                across, down, share = motion[0, y, first:last], motion[1, y, first:last], motion[2, y, first:last]
-                places(first, F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
+                x, across, down, share = left + first, across[first:last], down[first:last], share[first:last]
+                places(x, F(y), across, down, -time, pitch, x_last, y_last, entry, weights)
                 look_up(flat_before, pitch, entry, flat_weights, width, last - first, seen_before)
-                places(first, F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
+                places(x, F(y), across, down, _ONE - time, pitch, x_last, y_last, entry, weights)
                 look_up(flat_after, pitch, entry, flat_weights, width, last - first, seen_after)
-                _mix(seen_before, seen_after, share, out[y, first:last])
+                _mix(seen_before, seen_after, share, out[y, x : x + last - first])
 
 
 @inner
@@ -211,15 +226,16 @@ def _mix(before, after, share, out):
 
 
 @inner
-def _fade(before, after, margined, motion, out, place, count):
-    """What stands still, of `count` pixels of a row, from `margined` on in the frames and from `place` on elsewhere;
-    returns whether any of them moves, and whether any is not the same in both frames, or not light."""
+def _fade(before, after, margined, motion, there, plane, out, place, count):
+    """What stands still, of `count` pixels of a row, from `margined` on in the frames, from `there` on in the planes of
+    the motion, and from `place` on in `out`; returns whether any of them moves, and whether any is not the same in both
+    frames, or not light."""
     # (offsets that cannot be negative, and no branches: this runs in vectors)
-    k, j, size = np.uintp(margined), np.uintp(place), np.uintp(out.size)
+    k, m, j, size = np.uintp(margined), np.uintp(there), np.uintp(place), np.uintp(plane)
     moves, differs = np.uint32(0), np.uint32(0)
     for i in range(np.uintp(count)):
         p, q = before[k + i], after[k + i]
-        out[j + i] = q + motion[size + size + j + i] * (p - q)  # (in this form equal light stays the same to the bit)
-        moves = np.uint32(moves | np.uint32((motion[j + i] != F(0)) | (motion[size + j + i] != F(0))))
+        out[j + i] = q + motion[size + size + m + i] * (p - q)  # (in this form equal light stays the same to the bit)
+        moves = np.uint32(moves | np.uint32((motion[m + i] != F(0)) | (motion[size + m + i] != F(0))))
         differs = np.uint32(differs | np.uint32(is_kept(p, q) == False))  # noqa: E712 (vectorises, `not` does not)
     return moves != 0, differs != 0
