@@ -21,9 +21,8 @@ Filter: Blosc with LZ4 and bit-shuffling, about 3 bytes per event; Zstandard sav
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,18 +96,19 @@ def write_events(path: Path, recording: Recording) -> None:
         file.attrs.update(width=np.uint16(width), height=np.uint16(height), version=np.uint16(VERSION))
         file["t_offset"] = np.int64(offset_us)
         columns = _columns(file, recording.count, np.uint32 if duration_us < 1 << 32 else np.uint64, recording.labelled)
+        types = {name: dataset.dtype for name, dataset in columns.items()}
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
         frames = None if recording.frame_us is None else FrameIndex(recording.frame_us - offset_us)
         indexed = start = last_us = 0
-        with closing(ahead(_since(recording), BLOCKS_AHEAD)) as blocks:
-            for block in blocks:
-                last_us = int(block.t[-1]) if len(block) else last_us
+        with closing(ahead(_as_stored(recording, types), BLOCKS_AHEAD)) as blocks:
+            for t, stored in blocks:
+                last_us = int(t[-1]) if len(t) else last_us
                 for name, dataset in columns.items():
-                    dataset[start : start + len(block)] = getattr(block, name)
-                indexed = _index(index, indexed, last_us // MS_US + 1, block.t, start)
+                    dataset[start : start + len(t)] = stored[name]
+                indexed = _index(index, indexed, last_us // MS_US + 1, t, start)
                 if frames is not None:
-                    frames.add(block.t, start)
-                start += len(block)
+                    frames.add(t, start)
+                start += len(t)
                 raw.check()
         if start != recording.count:
             raise ValueError(f"{start} events, {recording.count} announced")
@@ -120,16 +120,22 @@ def write_events(path: Path, recording: Recording) -> None:
                 dataset.flush()  # (now, and not when nobody holds it any more: its place in the file goes by that)
 
 
-def _since(recording: Recording) -> Generator[Events]:
-    """The events in blocks, times since the start of the recording.  Raises ValueError for times out of order."""
+def _as_stored(
+    recording: Recording, types: Mapping[str, np.dtype[Any]]
+) -> Generator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """The events in blocks: int64 times since the start of the recording, and columns as the file has them.
+
+    Raises ValueError for times out of order.
+    """
     count = last_us = 0
     for block in recording.blocks():
-        events = replace(block, t=block.t - recording.start_us)
-        if len(events) and (events.t[0] < last_us or np.any(events.t[1:] < events.t[:-1])):
+        t = block.t - recording.start_us
+        if len(t) and (t[0] < last_us or np.any(t[1:] < t[:-1])):
             raise ValueError(f"events out of order of time after event {count}")
-        last_us = int(events.t[-1]) if len(events) else last_us
-        count += len(events)
-        yield events
+        last_us = int(t[-1]) if len(t) else last_us
+        count += len(t)
+        columns = {name: t if name == "t" else getattr(block, name) for name in types}
+        yield t, {name: column.astype(types[name], copy=False) for name, column in columns.items()}
 
 
 def _columns(file: h5py.File, count: int, time: type, labelled: bool) -> dict[str, h5py.Dataset]:

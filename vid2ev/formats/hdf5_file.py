@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError
+from vid2ev.stream.eager import Eager
 from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ class WholeFile(io.FileIO):
 
     def __init__(self, path: Path):
         super().__init__(path, "w+")
+        self._eager = Eager()
 
     def write(self, data: Any) -> int:
         left = memoryview(data).cast("B")
@@ -91,6 +93,7 @@ class WholeFile(io.FileIO):
         try:
             while left and not self.failure:
                 left = left[super().write(left) :]
+            self._eager.wrote(self, size)
         except OSError as error:
             self.failure = error
         return size

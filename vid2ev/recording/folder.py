@@ -20,6 +20,7 @@ import json
 import os
 import re
 import shutil
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -31,6 +32,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
+from vid2ev.stream.eager import Eager
 from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
@@ -69,6 +71,7 @@ class Folder:
         self._growing = tuple(growing)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
         self._files: dict[str, io.BufferedRandom] = {}
+        self._eager: defaultdict[str, Eager] = defaultdict(Eager)
         self._lock: int | None = None
 
     def __enter__(self) -> Self:
@@ -104,6 +107,7 @@ class Folder:
     def write(self, name: str, content: bytes | memoryview) -> None:
         """Add to one of the files that grow; it counts from the next checkpoint on."""
         self._files[name].write(content)
+        self._eager[name].wrote(self._files[name], memoryview(content).nbytes)
 
     def size(self, name: str) -> int:
         """How many bytes a file that grows has."""
