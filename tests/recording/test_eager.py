@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 
 import pytest
 
 from vid2ev.stream import eager
-from vid2ev.stream.eager import Eager
+from vid2ev.stream.eager import EagerFile, beginner
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems begin when they like")
 def test_the_disk_begins_with_all_that_was_written_and_the_system_knows_the_call(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(eager, "ENOUGH", 100)
-    writer, begun = Eager(), []
-    begin = writer._begin
+    begin, begun = beginner(), []
     assert begin is not None
+    monkeypatch.setattr(eager, "ENOUGH", 100)
     monkeypatch.setattr(
-        writer, "_begin", lambda *asked: begun.append((begin(*asked), (tmp_path / "file").stat().st_size))
+        eager, "beginner", lambda: lambda *asked: begun.append((begin(*asked), (tmp_path / "file").stat().st_size))
     )
-    with open(tmp_path / "file", "wb") as file:
+    with EagerFile(tmp_path / "file", "w") as file:
         for _ in range(25):
-            file.write(b"ten bytes.")
-            writer.wrote(file, 10)
+            assert file.write(b"ten bytes.") == 10
     assert begun == [(0, 100), (0, 200)]
     assert (tmp_path / "file").read_bytes() == b"ten bytes." * 25
 
 
 def test_where_the_system_cannot_nothing_happens(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(sys, "platform", "elsewhere")
-    with open(tmp_path / "file", "wb") as file:
+    assert beginner.__wrapped__() is None
+    monkeypatch.setattr(eager, "ENOUGH", 1)
+    monkeypatch.setattr(eager, "beginner", lambda: None)
+    with io.BufferedWriter(EagerFile(tmp_path / "file", "w")) as file:
         file.write(b"here")
-        Eager().wrote(file, 1 << 40)
         assert (tmp_path / "file").stat().st_size == 0, "not even written out"
+    assert (tmp_path / "file").read_bytes() == b"here"

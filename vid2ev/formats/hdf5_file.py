@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError
-from vid2ev.stream.eager import Eager
+from vid2ev.stream.eager import EagerFile
 from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ def is_whole(dataset: h5py.Dataset) -> bool:
     return dataset.id.get_storage_size() >= dataset.size * dataset.dtype.itemsize
 
 
-class WholeFile(io.FileIO):
+class WholeFile(EagerFile):
     """A file that takes all it is given, and says at the end if the disk did not.
 
     HDF5 cannot close a file when the disk is full (the process ends in a crash); so it is never told.
@@ -85,7 +84,6 @@ class WholeFile(io.FileIO):
 
     def __init__(self, path: Path):
         super().__init__(path, "w+")
-        self._eager = Eager()
 
     def write(self, data: Any) -> int:
         left = memoryview(data).cast("B")
@@ -93,7 +91,6 @@ class WholeFile(io.FileIO):
         try:
             while left and not self.failure:
                 left = left[super().write(left) :]
-            self._eager.wrote(self, size)
         except OSError as error:
             self.failure = error
         return size

@@ -20,7 +20,6 @@ import json
 import os
 import re
 import shutil
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -32,7 +31,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
-from vid2ev.stream.eager import Eager
+from vid2ev.stream.eager import EagerFile
 from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
@@ -71,7 +70,6 @@ class Folder:
         self._growing = tuple(growing)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
         self._files: dict[str, io.BufferedRandom] = {}
-        self._eager: defaultdict[str, Eager] = defaultdict(Eager)
         self._lock: int | None = None
 
     def __enter__(self) -> Self:
@@ -107,7 +105,6 @@ class Folder:
     def write(self, name: str, content: bytes | memoryview) -> None:
         """Add to one of the files that grow; it counts from the next checkpoint on."""
         self._files[name].write(content)
-        self._eager[name].wrote(self._files[name], memoryview(content).nbytes)
 
     def size(self, name: str) -> int:
         """How many bytes a file that grows has."""
@@ -212,7 +209,7 @@ class Folder:
         for name in self._growing:
             (self.partial / name).parent.mkdir(exist_ok=True)
             (self.partial / name).touch()
-            self._files[name] = file = open(self.partial / name, "r+b")  # noqa: SIM115 (closed by __exit__)
+            self._files[name] = file = io.BufferedRandom(EagerFile(self.partial / name, "r+"))  # (closed by __exit__)
             file.truncate(sizes.get(name, 0))
             file.seek(0, os.SEEK_END)
 

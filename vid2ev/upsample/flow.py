@@ -87,12 +87,10 @@ class Moving:
         self._still = field[top : bottom + 2, left : right + 2].copy()
         self._sums, self._blurred = np.empty((2, *self._still.shape), np.float32)
         self._settled = np.empty((3, bottom - top, right - left), np.float32)
-        self._px = F(shape[1] / grid[1]), F(shape[0] / grid[0])
+        down, across = shape[0] / grid[0], shape[1] / grid[1]  # px of the frames, of one of the grid
+        self._px = F(across), F(down)
         self.top, self.left = SHRINK * top, SHRINK * left
-        self.height, self.width = (
-            (end - start) * side // cells
-            for start, end, side, cells in ((top, bottom, shape[0], grid[0]), (left, right, shape[1], grid[1]))
-        )
+        self.height, self.width = round((bottom - top) * down), round((right - left) * across)
         self._enlarged = np.empty((3, self.height, self.width), np.float32)
 
     def at(self, time: np.float32) -> np.ndarray:
@@ -114,9 +112,9 @@ class Moving:
     def _reached(self, axis: int, cells: int, side: int) -> tuple[int, int]:
         """First and last of the rows (axis 0) or columns of the grid that anything which moves can change: all or
         none, where their edges are not edges of pixels of the frames."""
-        starts = [moving[:, 1 - axis] - 1 for moving in (self._before, self._after)]
-        ends = [start + moving[:, 3 - axis] for start, moving in zip(starts, (self._before, self._after), strict=True)]
-        places = np.clip(np.concatenate([*starts, *ends]), 0, cells - 1)
+        moving = np.concatenate([self._before, self._after])
+        starts = moving[:, 1 - axis] - 1
+        places = np.clip([starts, starts + moving[:, 3 - axis]], 0, cells - 1)
         if not places.size:
             return 0, 0
         if side != SHRINK * cells:

@@ -171,15 +171,10 @@ def carry(before, after, motion, top, left, time, out, still):
             in_part = part_row and left <= first < right
             edge = right if in_part else left if part_row and first < left else width
             count = min(STRIP - place % STRIP, edge - first)
+            planes, plane, there = flat_none, width, first
             if in_part:
-                there = (y - top) * motion.shape[2] + first - left
-                moves, differs = _fade(
-                    flat_before, flat_after, margined, flat_motion, there, motion[0].size, flat_out, place, count
-                )
-            else:
-                moves, differs = _fade(
-                    flat_before, flat_after, margined, flat_none, first, width, flat_out, place, count
-                )
+                planes, plane, there = flat_motion, motion[0].size, (y - top) * motion.shape[2] + first - left
+            moves, differs = _fade(flat_before, flat_after, margined, planes, plane, there, flat_out, place, count)
             still[place // STRIP] &= not (moves or differs)
             row_moves |= moves
             first += count
@@ -226,10 +221,12 @@ def _mix(before, after, share, out):
 
 
 @inner
-def _fade(before, after, margined, motion, there, plane, out, place, count):
-    """What stands still, of `count` pixels of a row, from `margined` on in the frames, from `there` on in the planes of
-    the motion, and from `place` on in `out`; returns whether any of them moves, and whether any is not the same in both
-    frames, or not light."""
+def _fade(before, after, margined, motion, plane, there, out, place, count):
+    """What stands still, of `count` pixels of a row, from `margined` on in the frames, from `there` on in the planes
+    (each so long) of the motion, and from `place` on in `out`.
+
+    Returns whether any of them moves, and whether any is not the same in both frames, or not light.
+    """
     # (offsets that cannot be negative, and no branches: this runs in vectors)
     k, m, j, size = np.uintp(margined), np.uintp(there), np.uintp(place), np.uintp(plane)
     moves, differs = np.uint32(0), np.uint32(0)
