@@ -9,19 +9,22 @@ NAMED = 3  # sequences that are named where many have the same to be said of the
 
 
 def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
-    """What was not scored: reason and number."""
-    found: dict[str, int] = {}
+    """What was not scored: reason, with its sequences where there are others, and number."""
+    found: dict[str, dict[str, int]] = {}
     for name, of in summary["sequences"].items():
         counts = {f"gaps: {reason}": count for reason, count in of["not_scored"].items()}
         counts |= {f"frames that {method} lacks": count for method, count in of["missing"].items() if count}
         for method, reasons in of["unfit"].items():
             counts |= {
-                f"frames of {method} in {name}: {reason} ({_several(which)})": len(which)
-                for reason, which in reasons.items()
+                f"frames of {method}: {reason} ({_several(which)})": len(which) for reason, which in reasons.items()
             }
         for reason, count in counts.items():
-            found[reason] = found.get(reason, 0) + count
-    return found
+            found.setdefault(reason, {})[name] = count
+    alone = len(summary["sequences"]) == 1
+    return {
+        reason if alone else f"{reason}, in {_several(counts)}": sum(counts.values())
+        for reason, counts in found.items()
+    }
 
 
 def remarks(summary: Mapping[str, Any]) -> list[str]:

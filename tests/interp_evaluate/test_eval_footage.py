@@ -76,6 +76,7 @@ def test_sequences_without_a_rate_and_pictures_of_another_size_do_not_end_the_re
     of = found.summary["sequences"]
     assert {name: about["groups"] for name, about in of.items()} == {"one": 0, "seq": 1, "still": 0, "two": 1}
     assert of["still"]["not_scored"] == {"times of the frames do not increase": 1}
+    assert left_out(found.summary)["gaps: times of the frames do not increase, in still"] == 1
     assert [(*of["two"]["not_scored"],)[0].split(";")[0]] == [
         f"{picture}: 16x12 pixels, expected 40x24 as the first picture has"
     ]
@@ -324,12 +325,12 @@ def test_predictions_that_are_missing_or_cannot_be_used_are_named_and_counted(tm
     assert [len(which) for which in of["b"]["unfit"]["odd"].values()] == [9]
     assert of["a"]["missing"] == of["b"]["missing"] == {"odd": 0} and len(found.rows) == 9 - 3
     said = left_out(found.summary)
-    assert said["frames of odd in a: 40x12 pixels, expected a picture of 40x24 (frame2.png, frame3.png)"] == 2
+    assert said["frames of odd: 40x12 pixels, expected a picture of 40x24 (frame2.png, frame3.png), in a"] == 2
     assert sum(said.values()) == 3 + 9
     assert "frame5.png" in (tmp_path / "other" / "report.md").read_text()
     write_predictions(tmp_path / "wrong" / "a", truth[:, :12])
     options["predictions"] = [tmp_path / "wrong"]
-    with pytest.raises(DataError, match=r"no frame could be scored: a: 9 x frames of wrong in a: 40x12 pixels"):
+    with pytest.raises(DataError, match=r"no frame could be scored: a: 9 x frames of wrong: 40x12 pixels"):
         evaluate([str(tmp_path / "data")], tmp_path / "third", **options)
     with pytest.raises(UsageError, match="no predictions in it"):
         predictions_in(tmp_path / "data" / "a" / "events_aligned")

@@ -91,7 +91,8 @@ def order_later_digits(keys, last_us):
         count(keys, shift, places[0, 0])
         lay_out(places, np.empty(1, np.int64))
         put(keys, shift, places[0, 0], target)
-        keys[:] = target
+        for i in range(keys.size):  # (a slice would be checked, and the message of that takes a second to compile)
+            keys[i] = target[i]
         shift, left = shift + _PASS, left >> np.int64(_PASS)
 
 
