@@ -20,6 +20,7 @@ from click.testing import CliRunner, Result
 
 from vid2ev import UsageError, conversion, instants
 from vid2ev.commands import main
+from vid2ev.commands.summary import of_the_clip
 from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
 
@@ -418,3 +419,10 @@ def test_a_terminal_shows_progress_and_a_file_does_not() -> None:
     assert child.returncode == 0
     for fact in (b"frames", b"left", b"events/s", b"x the length of the clip"):
         assert fact in shown
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.0, "0"), (0.634, "0.63"), (9.94, "9.9"), (9.96, "10"), (12.3, "12"), (1776.0, "1,776")]
+)
+def test_times_are_multiples_of_the_clip_without_powers_of_ten(seconds: float, text: str) -> None:
+    assert of_the_clip(2 * seconds, 2.0) == f"{text} x the length of the clip"

@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from vid2ev.commands import INTERRUPTED
+from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
             total, first = recipe.source.frames_expected, done.frames - 1
             shown = tqdm(total=total, initial=first, bar_format=FRAMES, leave=False, disable=quiet or None)
         seconds, video_s = done.seconds or 1.0, max(done.end_ns - done.start_ns, 1) / 1e9
-        text = f"{done.events / seconds:,.0f} events/s, {seconds / video_s:.2g} x the length of the clip"
+        text = f"{done.events / seconds:,.0f} events/s, {of_the_clip(seconds, video_s)}"
         shown.set_postfix_str(text, refresh=False)
         shown.update(done.frames - shown.n)
         return check()

@@ -99,7 +99,7 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Time taken, and the share of the event sensors that slept through still light, from a manifest."""
     result = next(iter(manifest["results"].values())) if "results" in manifest else manifest
     seconds, video_s = manifest["run"]["seconds"], result["duration_us"] / 1e6
-    ratio = f", {seconds / video_s:.2g} x the length of the clip" if seconds and video_s else ""
+    ratio = f", {of_the_clip(seconds, video_s)}" if seconds and video_s else ""
     threads = manifest["run"]["threads"]
     took = f"{seconds:.1f} s{ratio}, {threads} sensor thread{'s' * (threads > 1)}"
     slept, of = map(sum, zip((0, 0), *manifest["run"].get("strips_slept", {}).values(), strict=True))
@@ -109,6 +109,12 @@ def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
         *device,
         *([("slept", f"{100 * slept / of:.0f} % of the pixels' intervals")] if slept else []),
     ]
+
+
+def of_the_clip(seconds: float, video_s: float) -> str:
+    """How long something takes, in multiples of how long the clip is."""
+    ratio = seconds / video_s
+    return f"{f'{ratio:.2g}' if ratio < 10 else f'{ratio:,.0f}'} x the length of the clip"
 
 
 def device_facts(device: Mapping[str, str]) -> list[tuple[str, str]]:

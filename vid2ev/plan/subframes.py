@@ -18,7 +18,7 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.scene import Omission
 from vid2ev.upsample.subframes import KAPPA_PER_PX
 
-NS_PER_PIXEL = 20.0  # of a sub-frame that is carried along the motion, of one thread; 60 for the motion, an interval
+NS_PER_PIXEL = 8.0  # of a sub-frame that is carried along the motion, of one thread; 26 for the motion, an interval
 
 
 class Subframes:
