@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from click.testing import CliRunner, Result
 
 from vid2ev import Events, UsageError, read_events
 from vid2ev.commands import main
-from vid2ev.formats import FORMATS, format_named, open_events
-from vid2ev.formats.event_file import Recording
+from vid2ev.formats import FORMATS, format_named, open_events, survey
+from vid2ev.formats.event_file import Picture, Recording
 from vid2ev.reformat import format_of_suffix, reformat, writable
 
 SIZE = (320, 240)
@@ -75,6 +76,25 @@ def test_a_part(recording: Path) -> None:
     t = np.array(columns(recording)[0])
     kept = t[(t >= START_US + 500_000) & (t <= START_US + 1_500_000)]
     assert columns(Path("part.csv"))[0] == kept.tolist()
+
+
+def test_a_part_has_the_frames_of_its_time_and_ends_with_it(recording: Path) -> None:
+    frame_us = START_US + np.arange(0, 2_500_001, 250_000)
+    pictures = [Picture(int(t_us), np.full((240, 320), k, np.uint8)) for k, t_us in enumerate(frame_us)]
+    whole = survey(open_events(recording))
+    for name in ("hdf5", "aedat4"):
+        write = format_named(name).write
+        assert write is not None
+        frames = (lambda: iter(pictures)) if name == "aedat4" else None
+        write(Path(f"framed-{name}"), replace(whole, frames=frames, frame_us=frame_us, labelled=False))
+        part = Path(f"part{format_named(name).suffix}")
+        made = reformat(f"framed-{name}", part, start_s=0.5, stop_s=1.2)
+        assert 1_190_000 - 500_000 < made["duration_us"] <= 700_000
+        assert made["start_us"] == START_US + 500_000
+    known = open_events("part.h5").frame_us  # type: ignore[attr-defined]
+    there = [(picture.t_us, int(picture.pixels[0, 0])) for picture in open_events("part.aedat4").frames()]
+    assert known.tolist() == frame_us[2:5].tolist() == [t_us for t_us, _ in there]
+    assert [level for _, level in there] == [2, 3, 4]
 
 
 def test_times_since_1970_are_no_recording_of_half_a_century(recording: Path) -> None:

@@ -257,6 +257,15 @@ def test_frames_are_beside_the_events_from_when_they_are_there(filmed: Filmed) -
         assert lit(shown[:, :640], 20) == {(2, 3): 1}
 
 
+@pytest.mark.parametrize("filmed", [((32, 24), False)], indirect=True)
+def test_a_window_begins_with_the_frame_that_was_there_and_ends_before_later_ones(filmed: Filmed) -> None:
+    made = render("davis.aedat4", "-o", "a", "--start", "0.11", "--stop", "0.16", "--by", "duration:10ms", "--no-stamp")
+    assert (made["slices"], made["start_us"], made["duration_us"]) == (5, 110_000, 50_000)
+    assert [picture(f"a/{k:06d}.png")[240, 900].tolist() for k in (0, 2, 4)] == [[80] * 3, [80] * 3, [120] * 3]
+    made = render("davis.aedat4", "-o", "b", "--start", "0.11", "--stop", "0.14", "--by", "duration:10ms", "--no-stamp")
+    assert made["slices"] == 3 and picture("b/000002.png")[240, 900].tolist() == [80] * 3
+
+
 @pytest.mark.parametrize("filmed", [((64, 24), False)], indirect=True)
 def test_frames_are_under_wide_events(filmed: Filmed) -> None:
     made = render("davis.aedat4", "-o", "a.png", "--by", "source", "--view", "accumulated", "--no-stamp")

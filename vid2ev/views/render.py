@@ -156,7 +156,7 @@ def _recording(
     if frames and not file.has_frames:
         raise UsageError(f"{file.path} holds no frames beside its events; leave out --with-frames")
     start_us, stop_us = (None if s is None else zero_us + round(s * 1e6) for s in (start_s, stop_s))
-    recording = window(file, zero_us if start_us is None else start_us, stop_us)
+    recording = window(file, zero_us if start_us is None else start_us, stop_us, as_seen=True)
     if not recording.count and (start_s, stop_s) != (None, None):
         raise UsageError(f"{file.path}: no events from {start_s or 0:g} s to {_end(stop_s)}; choose another window")
     return replace(recording, frames=None) if frames is False else recording

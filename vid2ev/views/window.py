@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from vid2ev.formats import survey
-from vid2ev.formats.event_file import BLOCK, EventFile, Recording
+from vid2ev.formats.event_file import BLOCK, EventFile, Picture, Recording
 from vid2ev.stream.events import Events
 
 LONG_US = 1_000_000  # a silence that says that a file counts from another instant than it begins
@@ -23,12 +24,14 @@ def beginning_us(file: EventFile) -> int:
     return first if first - file.start_us > LONG_US else min(first, file.start_us)
 
 
-def window(file: EventFile, start_us: int, stop_us: int | None = None) -> Recording:
-    """The events with start_us <= t <= stop_us, and the frames of the file.
+def window(file: EventFile, start_us: int, stop_us: int | None = None, *, as_seen: bool = False) -> Recording:
+    """The events and frames with start_us <= t <= stop_us.
 
-    It ends with the last of these events.  Reads all of them once; raises as `survey` does.
+    It ends with the last of these.  Reads all of the events once; raises as `survey` does.
+
+    as_seen   with the last frame before them, too: it is what is seen as they begin
     """
-    return survey(_Window(file, start_us, stop_us))
+    return survey(_Window(file, start_us, stop_us, as_seen))
 
 
 def with_frame_times(recording: Recording) -> Recording:
@@ -41,12 +44,31 @@ def with_frame_times(recording: Recording) -> Recording:
 class _Window:
     """An event file of which only a part is there."""
 
-    def __init__(self, file: EventFile, start_us: int, stop_us: int | None):
-        self._file, self.start_us, self._stop_us = file, start_us, stop_us
+    def __init__(self, file: EventFile, start_us: int, stop_us: int | None, as_seen: bool):
+        self._file, self.start_us, self._stop_us, self._as_seen = file, start_us, stop_us, as_seen
         self.path, self.size, self.labelled, self.has_frames = file.path, file.size, file.labelled, file.has_frames
-        self.warnings, self.frame_us = file.warnings, getattr(file, "frame_us", None)
-        self.describe, self.frames = file.describe, file.frames
+        self.warnings, self.describe = file.warnings, file.describe
+        known: np.ndarray | None = getattr(file, "frame_us", None)
+        self.frame_us = None if known is None else known[(known >= start_us) & ~self._is_later(known)]
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
         assert start_us is None and stop_us is None
         return self._file.events(self.start_us, None if self._stop_us is None else self._stop_us + 1, block)
+
+    def frames(self) -> Iterator[Picture]:
+        before: Picture | None = None
+        for picture in self._file.frames():
+            if self._is_later(picture.t_us):
+                break
+            if picture.t_us < self.start_us:
+                before = picture
+                continue
+            if before is not None and self._as_seen:
+                yield before
+            before = None
+            yield picture
+        if before is not None and self._as_seen:
+            yield before
+
+    def _is_later(self, t_us: Any) -> Any:
+        return t_us > (np.inf if self._stop_us is None else self._stop_us)
