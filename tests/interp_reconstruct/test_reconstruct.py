@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -245,3 +246,22 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     assert "a_seen.mp4: 30 pictures of 40x24 as mp4, 30 per second" in result.output
     again = CliRunner().invoke(command, ["a.npz", "--resume", "--json"])
     assert json.loads(again.output)["events"] == 5000
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is another")
+def test_memory_of_pictures_is_taken_again() -> None:
+    """Pages that were cleared once are not cleared again; in processes of their own, as this one goes on as it was."""
+    program = (
+        "import resource, sys; import numpy as np; from interp.commands.reconstruct import keep_memory\n"
+        "assert sys.argv[1] == 'no' or keep_memory()\n"
+        "def faults(): return resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "for _ in range(3): np.ones(10**7)\n"
+        "before = faults()\n"
+        "for _ in range(10): np.ones(10**7)\n"
+        "print(faults() - before)"
+    )
+    kept, given_back = (
+        int(subprocess.run([sys.executable, "-c", program, word], capture_output=True, check=True).stdout)
+        for word in ("yes", "no")
+    )
+    assert 10 * kept < given_back
