@@ -37,6 +37,7 @@ GUESSES = 9 * LANE_PITCH
 # turning point.
 ENOUGH = 2e-3
 ROUNDED, TRACE = 1e-15, 1e-30
+POLISHES = 3  # steps in float64, at the most
 
 
 @inner
@@ -186,10 +187,10 @@ def batch_times(levels, when, steps, jobs, guesses, who, count, lanes, b, flags,
     """Times `when` of a batch of crossings at `levels` [nat] of the lanes `who`."""
     to_signals(levels, count, flags, num)
     gather_jobs(jobs, who, count, lanes)
-    approach(levels, when, steps, jobs, guesses, count, b, flags)
+    left = approach(levels, when, steps, jobs, guesses, count, b, flags)
     for k in range(count):
         if not steps[k] < ENOUGH:
-            when[k] = settle(levels[k], jobs, when[k], k, b)
+            when[k] = finish(levels, jobs, when[k], k, b, flags, left)
 
 
 @inner
@@ -202,27 +203,38 @@ def lane_times(levels, when, steps, guesses, live, alive, count, lanes, b, flags
     for j in range(count):
         levels[j] = levels[j] if lanes[REACHED + j] > 0.0 else 0.5 * (lanes[F0 + j] + lanes[F1 + j])
     jobs = lanes[Y0:]
-    approach(levels, when, steps, jobs, guesses, count, b, flags)
+    left = approach(levels, when, steps, jobs, guesses, count, b, flags)
     for k in range(alive):
         j = live[k]
-        when[k] = when[j] if steps[j] < ENOUGH else settle(levels[j], jobs, when[j], j, b)
+        when[k] = when[j] if steps[j] < ENOUGH else finish(levels, jobs, when[j], j, b, flags, left)
 
 
 @inner
 def approach(levels, when, steps, jobs, guesses, count, b, flags):
-    """Times `when` at which the jobs are at `levels`, and how far off they may be."""
+    """Times `when` at which the jobs are at `levels`, and how far off they may be; returns how many of the steps in
+    float64 are left to those that are not near enough.
+
+    A job takes as many steps as it needs, whatever the others of its batch do: a batch decides only whether they are
+    taken by all at once or (`finish`) by one after the other, so times do not depend on who is in it.
+    """
     guess(levels, jobs, guesses, count)
     for _ in range(4):
         improve(guesses, count, F(b), flags)
     for k in range(count):
-        when[k] = guesses[G_S + k]
-    for _ in range(3):
-        polish(levels, jobs, when, steps, count, b, flags)
+        when[k], steps[k] = guesses[G_S + k], np.inf
+    left = POLISHES
+    while left > 0:
+        left -= 1
+        for k in range(count):
+            there, step = polished(levels, jobs, when[k], k, b, flags)
+            near = steps[k] < ENOUGH
+            when[k], steps[k] = when[k] if near else there, steps[k] if near else step
         rough = np.int32(0)
         for k in range(count):
             rough = np.int32(rough + np.int32(0 if steps[k] < ENOUGH else 1))
         if 16 * rough <= count:
             break
+    return left
 
 
 @inner
@@ -260,22 +272,33 @@ def improve(guesses, count, b, flags):
 
 
 @inner
-def polish(levels, jobs, when, steps, count, b, flags):
-    """One step of Halley's method in float64; `steps` is what is left, in units of the faster time constant."""
+def polished(levels, jobs, s, k, b, flags):
+    """One step of Halley's method in float64 for job k at s: the time, and what is left, in units of the faster time
+    constant."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
-    for k in range(count):
-        s, rise, c1, c2, a = when[k], jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
-        m1 = expm1_64(-a * s) if poles else 0.0
-        m2 = expm1_64(-b * s) if two else 0.0
-        f = (jobs[JOB_Y0 + k] - levels[k]) + (rise * s + (c1 * m1 + c2 * m2))
-        k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
-        d = rise - k1 - k2
-        step = -(f * d) / (d * d - 0.5 * f * (a * k1 + b * k2))
-        there = s + step
-        inside = (there >= jobs[FROM_S + k]) & (there <= jobs[TO_S + k])
-        when[k] = there if inside else s
-        # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-        steps[k] = max(abs(step), abs(f / d)) * max(1.0, max(a, b)) if inside else np.inf
+    rise, c1, c2, a = jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
+    m1 = expm1_64(-a * s) if poles else 0.0
+    m2 = expm1_64(-b * s) if two else 0.0
+    f = (jobs[JOB_Y0 + k] - levels[k]) + (rise * s + (c1 * m1 + c2 * m2))
+    k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
+    d = rise - k1 - k2
+    step = -(f * d) / (d * d - 0.5 * f * (a * k1 + b * k2))
+    there = s + step
+    inside = (there >= jobs[FROM_S + k]) & (there <= jobs[TO_S + k])
+    # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
+    left = max(abs(step), abs(f / d)) * max(1.0, max(a, b))
+    return there if inside else s, left if inside else np.inf
+
+
+@inner
+def finish(levels, jobs, s, k, b, flags, left):
+    """The root of job k, from what `approach` left of its steps on."""
+    while left > 0:
+        left -= 1
+        s, step = polished(levels, jobs, s, k, b, flags)
+        if step < ENOUGH:
+            return s
+    return settle(levels[k], jobs, s, k, b)
 
 
 @inner
