@@ -75,9 +75,9 @@ def reconstruct(
 def keep_memory() -> bool:
     """Let the C library keep the memory of a picture for the next one; returns whether it can be told so.
 
-    glibc gives back at once what is larger than 32 MB, and each page that is taken anew has to be cleared: of 1280x720
-    pixels that took longer than the network (0.34 and 0.82 pictures per second).  This is of the whole process, so a
-    command may do it, and a library may not.
+    glibc gives back at once what is larger than 32 MB, and each page that is taken anew has to be cleared: at 1280x720
+    half of the processors' time went there.  This is of the whole process, so a command may do it, and a library may
+    not.
     """
     if sys.platform == "win32" or not hasattr(library := ctypes.CDLL(None), "mallopt"):
         return False
