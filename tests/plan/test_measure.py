@@ -85,6 +85,28 @@ def test_smoothed_slopes_are_those_of_the_low_pass() -> None:
     assert 0.15 < slow < 0.26 and QUARTER_EDGES[np.flatnonzero(travel)[-1]] <= 20
 
 
+@pytest.mark.parametrize("dark", [0.0, 0.003, 0.1])
+@pytest.mark.parametrize("falls", [False, True])
+def test_no_more_travel_is_steep_than_is_said(dark: float, falls: bool) -> None:
+    """Light that goes between dark and bright at once: behind the pole it is steepest soon after it has begun, or as it
+    ends; and it is not said to be much steeper than it is."""
+    tau_s, gap_s, floor = 3e-4, 1 / 30, 1e-3
+    lights = [1.0, dark] if falls else [dark, 1.0]
+    frames = [Frame(np.full(SIZE[::-1], light, np.float32), k * 33_333_333) for k, light in enumerate(lights[:1] * 2)]
+    frames.append(Frame(np.full(SIZE[::-1], lights[1], np.float32), 2 * 33_333_333))
+    spec = clean(filter="before", photoreceptor_tau_us=1e6 * tau_s, dark_level=floor)
+    travel = scene_of(spec, SIZE, frames).by_slope[0]
+    t = np.concatenate([[0.0], np.geomspace(1e-7, gap_s, 400_001)])
+    rate = (lights[1] - lights[0]) / gap_s
+    signal = np.log(lights[0] + rate * (t + tau_s * np.expm1(-t / tau_s)) + floor)
+    gone = np.abs(np.diff(signal))
+    slopes = gone / np.diff(t)
+    for quarter in range(40, len(QUARTER_EDGES) - 1):
+        steep = travel[quarter:].sum() / travel.sum()
+        assert gone[slopes >= QUARTER_EDGES[quarter]].sum() / gone.sum() <= steep + 0.03, QUARTER_EDGES[quarter]
+        assert gone[slopes >= QUARTER_EDGES[quarter] / 1.5].sum() / gone.sum() >= steep - 0.03, QUARTER_EDGES[quarter]
+
+
 def test_dense_events_are_counted() -> None:
     """On a ramp each event has 2 tau slope / theta others around it, as they weigh."""
     frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 40_000_000, 1_000_000)]

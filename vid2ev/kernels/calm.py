@@ -12,9 +12,8 @@ import numpy as np
 
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
-from vid2ev.kernels.play import BENDS, LIGHT, SEEN, SMOOTH, STEPS
+from vid2ev.kernels.measured import BENDS, LIGHT, SEEN, SMOOTH, first_tau, left_of
 from vid2ev.kernels.scan import BRIGHTEST
-from vid2ev.physics.elementary import expm1_32
 
 F = np.float32
 STRIPS = BLOCK // STRIP
@@ -38,18 +37,6 @@ def take(light, shade, scratch):
 
 
 @inner
-def left_of(dt_s, tau_s):
-    """What is left of an exponential after a time; nothing if it has no time constant."""
-    return F(1.0) + expm1_32(-dt_s / tau_s) if tau_s > F(0.0) else F(0.0)
-
-
-@inner
-def first_tau(light, num):
-    """Time constant of the first pole at a light [s], where it depends on that."""
-    return F(num.tau1_s) * (F(1.0) + F(num.dark)) / (light + F(num.dark))
-
-
-@inner
 def rest(light, told, shade, num, own, scratch, calm, owed):
     """Light of a block into scratch, of the strips that cannot be left alone; these get what they are owed.  Returns
     whether there are others.  told [strips or none]: those that are known to be still."""
@@ -64,7 +51,7 @@ def rest(light, told, shade, num, own, scratch, calm, owed):
         if same and calm[strip] != CHANGES:
             calm[strip], left = LEFT, True
             owed[strip, 0] += F(num.dt_s)
-            owed[strip, 1] *= F(num.decays[STEPS])
+            owed[strip, 1] *= F(num.kept)
             continue
         if calm[strip] == LEFT:
             give(own[begin:], owed[strip], num)

@@ -16,11 +16,11 @@ import numpy as np
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.kernel_intrinsics import bits_32, float_32
-from vid2ev.kernels.calm import CALM, arriving, first_tau, left_of, next_run, rest
+from vid2ev.kernels.calm import CALM, arriving, next_run, rest
 from vid2ev.kernels.cpu import hits_of
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
 from vid2ev.kernels.measure_bare import Bare, beside, settle_bare
-from vid2ev.kernels.play import (
+from vid2ev.kernels.measured import (
     BEFORE,
     BENDS,
     BENT,
@@ -28,6 +28,7 @@ from vid2ev.kernels.play import (
     IF_TURNED,
     LEVEL,
     LIGHT,
+    LIT,
     PLANES,
     PLAY,
     SEEN,
@@ -35,11 +36,13 @@ from vid2ev.kernels.play import (
     SMOOTH,
     SMOOTHED,
     STEEPER,
-    STEPS,
+    UNBENT,
     WAY,
     WIDE,
-    follow,
+    first_tau,
+    left_of,
 )
+from vid2ev.kernels.play import follow
 from vid2ev.physics.log_curve import light_per_nat_32, log_level_32
 
 F = np.float32
@@ -61,7 +64,7 @@ class Pace(NamedTuple):
     by_light     (0,) if the first pole's time constant is tau1_s (1 + dark) / (light + dark), else (): compiled for one
     tracks       (0,) if pixels are blind for blind_s, and then their memories jump to the signal, else (): likewise
     smooth_s     time constant that slopes are smoothed with
-    decays       float32 [STEPS + 1], what is left of a smoothed slope at each step of the interval
+    kept         what is left of a smoothed slope after the interval
     tau_s        of the distance
     at_once      whether all events of an interval come at its end
     """
@@ -81,7 +84,7 @@ class Pace(NamedTuple):
     tracks: tuple
     blind_s: float
     smooth_s: float
-    decays: np.ndarray
+    kept: float
     tau_s: float
     at_once: bool
 
@@ -93,7 +96,7 @@ class Seen(NamedTuple):
     calm    uint8 [blocks, STRIPS]
     owed    float32 [blocks, STRIPS, 2], a time for bends [s], and a factor on smoothed slopes
     tiles   float64 [blocks, FIGURES]
-    spread  float64 [blocks, 4 or with memories that jump 7, QUARTERS, 2] (`play`)
+    spread  float64 [blocks, 5 or with memories that jump 8, QUARTERS, 2] (`measured`)
     bare    (Bare,) with a lens shading, else ()
     """
 
@@ -160,7 +163,7 @@ def look(own, scratch, flagged, halves, n, curve, num):
     """What each of n pixels has, into state and scratch, and which ones are pushed or were; returns least and most
     light and the greatest slope."""
     least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
-    before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.decays[STEPS])
+    before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.kept)
     tau2, longest_back, longest_ahead = F(num.tau2_s), F(num.before_s), F(num.dt_s)
     slow, keep = F(num.tau1_s), left_of(longest_ahead, max(F(num.tau1_s), tau2))
     for i in range(n):
@@ -184,7 +187,9 @@ def look(own, scratch, flagged, halves, n, curve, num):
         own[LIGHT * PITCH + i], own[SLOPE * PITCH + i], own[BENDS * PITCH + i] = seen, slope, (bends + bend) * keep
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
         own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend
-        scratch[SMOOTHED + i], scratch[IF_TURNED + i], scratch[FELT + i] = smooth, bends + turned, bends + bend
+        scratch[UNBENT + i] = abs(slope0) * per
+        scratch[SMOOTHED + i] = smooth if num.smooth_s > 0.0 else slope
+        scratch[LIT + i], scratch[IF_TURNED + i], scratch[FELT + i] = old, bends + turned, bends + bend
         if len(num.tracks):
             scratch[STEEPER + i] = max(abs(slope), abs(slope0)) * per
         flagged[i] = np.uint8((level - half > play) | (level + half < play) | (own[WAY * PITCH + i] != F(0.0)))

@@ -19,7 +19,8 @@ from vid2ev.kernel_compiler import compiled, inner
 from vid2ev.kernels.calm import arriving, next_run
 from vid2ev.kernels.cpu import hits_of
 from vid2ev.kernels.layout import BLOCK, PITCH
-from vid2ev.kernels.play import BARE_BEFORE, BEFORE, GONE, LEVEL, LOST, PLANES, PLAY, WAY, apart, note
+from vid2ev.kernels.measured import BARE_BEFORE, BEFORE, GONE, LEVEL, LOST, PLANES, PLAY, WAY, note
+from vid2ev.kernels.pace import apart
 from vid2ev.physics.log_curve import log_level_32
 
 F = np.float32
@@ -36,7 +37,7 @@ class Bare(NamedTuple):
 
     state   float32, block by block and in it plane by plane
     tiles   float64 [blocks, BARE_FIGURES]
-    spread  float64 [blocks, 1, QUARTERS, 2] (`play.note`)
+    spread  float64 [blocks, 1, QUARTERS, 2] (`measured.note`)
     """
 
     state: np.ndarray

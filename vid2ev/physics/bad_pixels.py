@@ -23,7 +23,8 @@ from pydantic import BaseModel, Field
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.omission import kind_of, light_events, sent_share, trembling
 from vid2ev.physics.random import HOT_MAP, philox, unit
-from vid2ev.stream.bounds import added, at_most, surely, together
+from vid2ev.stream.bounds import added, together
+from vid2ev.stream.chances import at_most, surely
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
@@ -54,7 +55,7 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
     """
     extra = at_most(at_most(spec.hot_probability * scene.pixels) * spec.hot_rate_hz * scene.seconds)
     share = added(light_events(scene, spec), extra, 0.0)
-    of_light = min(surely(scene, spec.hot_probability, sent_share(scene, spec)), 1.0)
+    of_light = min(surely(scene, spec.hot_probability, sent_share(scene, spec), whole=True), 1.0)
     of_light *= 0.0 if scene.still else 0.5 * scene.bunched
     distance = share + together(share * 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S, of_light)
     figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
@@ -63,7 +64,7 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
 
 def omission_of_cold(scene: Scene, spec: Any) -> Omission:
     """The cold pixels."""
-    share = surely(scene, spec.cold_probability, sent_share(scene, spec))
+    share = surely(scene, spec.cold_probability, sent_share(scene, spec), whole=True)
     noisy = spec.leak_rate_hz > 0 or spec.shot_rate_hz > 0 or spec.photoreceptor_noise > 0
     if noisy:
         share = max(share, at_most(spec.cold_probability * scene.pixels) / scene.pixels)

@@ -19,7 +19,8 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.physics.omission import late_noise
-from vid2ev.stream.bounds import surely, unlike
+from vid2ev.stream.bounds import unlike
+from vid2ev.stream.chances import surely
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import events_of
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene

@@ -28,7 +28,8 @@ from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.omission import light_events, trembling
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
-from vid2ev.stream.bounds import added, surely, unlike
+from vid2ev.stream.bounds import added, unlike
+from vid2ev.stream.chances import surely
 from vid2ev.stream.scene import Omission, Scene
 
 RESOLVED = 8.0

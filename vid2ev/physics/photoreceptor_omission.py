@@ -8,10 +8,9 @@ of the shifted line, over an area of r variance / 2 (`stream/bounds.py: delayed`
     reach = E (D - E D)+ = tau/e for one,   <= sqrt(variance)/2 for two
 
 At a turn from slope r to -r' the peaks differ by no more than sqrt(r r') sqrt(variance), whatever the distribution (H.
-Scarf, "A min-max solution of an inventory problem", 1958), nor by more than r + r' times reach.  A first pole that
-stays rounds off what the second does by reach <= tau2^2 / (2 tau1), and where the peak is still at the bend, r << r',
-by 0.27 sqrt(tau1 / tau2) of that (found by trying all ratios; the tests do so again).  Before the log, bends are
-relative to the light where they are.
+Scarf, "A min-max solution of an inventory problem", 1958), nor by more than r + r' times reach; by what the second pole
+takes from the peaks of a first that stays, `peaks.py` has the law.  Before the log, bends are relative to the light
+where they are.
 """
 
 from __future__ import annotations
@@ -35,16 +34,18 @@ BOTH_OFF: dict[str, Any] = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0,
 def omission_of_follower(scene: Scene, spec: Any) -> Omission:
     """The second pole alone, replaced by its mean delay."""
     square_s2 = (spec.follower_tau_us * 1e-6) ** 2
-    variance_s2, reach_s = np.full(len(scene.travel), square_s2), reach_of_follower(scene, spec)
-    return _delay_instead(scene, spec, spec.follower_tau_us, variance_s2, reach_s, 0.0, FOLLOWER_OFF, stir_s2=square_s2)
+    variance_s2 = np.full(len(scene.travel), square_s2)
+    at_turns = scene.off_peaks, scene.by_peaks
+    return _delay_instead(
+        scene, spec, spec.follower_tau_us, variance_s2, at_turns, 0.0, FOLLOWER_OFF, stir_s2=square_s2
+    )
 
 
-def reach_of_follower(scene: Scene, spec: Any) -> np.ndarray:
-    """By how much the second pole rounds off a bend of the slope by 1, at most, behind the first [tiles, s]."""
-    fastest_s, tau2_s = 1e-6 * taus_of(scene, spec)[0], spec.follower_tau_us * 1e-6
-    ratio = tau2_s / np.maximum(fastest_s, 1e-30)
-    smoothed_s = 0.5 * tau2_s * ratio * np.maximum(1.0, 0.27 / np.sqrt(ratio))
-    return np.asarray(np.minimum(smoothed_s, tau2_s / math.e))
+def _rounded_off(scene: Scene, reach_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By how much signals differ at turns, where bends are rounded off within reach [tiles, nat]; the travel that
+    counts, by the sum of that before it."""
+    travel, bends = scene.by_bends
+    return reach_s * scene.bend_at_turns, np.stack([travel, float(reach_s.max()) * bends])
 
 
 def omission(scene: Scene, spec: Any) -> Omission:
@@ -56,9 +57,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     usual_us, late_us = delay_at_events(scene, spec)
     late_us += _changing_us(scene, spec)
     stir_s2 = float(variance_s2.max()) + _left_by_light(spec, slowest_s)
-    return _delay_instead(
-        scene, spec, usual_us + spec.follower_tau_us, variance_s2, reach_s, late_us, BOTH_OFF, stir_s2=stir_s2
-    )
+    poles_us, at_turns = usual_us + spec.follower_tau_us, _rounded_off(scene, reach_s)
+    return _delay_instead(scene, spec, poles_us, variance_s2, at_turns, late_us, BOTH_OFF, stir_s2=stir_s2)
 
 
 def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
@@ -97,7 +97,8 @@ def _late(scene: Scene, spec: Any, late_us: float) -> float:
     """Bound on the mean distance where a first pole is faster or slower, by so much at the events on average."""
     _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
     stir_s2 = _left_by_light(spec, slowest_s)
-    rounded = delayed(scene, 0.0 * slowest_s, slowest_s / math.e, echoes=echoes(spec), stir_s2=stir_s2)
+    frozen_nat, after_turns = _rounded_off(scene, slowest_s / math.e)
+    rounded = delayed(scene, 0.0 * slowest_s, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
     return rounded + later(scene, 1e-6 * late_us)
 
 
@@ -128,7 +129,7 @@ def _delay_instead(
     spec: Any,
     poles_us: float,
     variance_s2: np.ndarray,
-    reach_s: np.ndarray,
+    at_turns: tuple[np.ndarray, np.ndarray],
     late_us: float,
     off: dict[str, Any],
     *,
@@ -141,7 +142,8 @@ def _delay_instead(
         return Omission(0.0, "99.9 % bound", spread, "nothing moves")
     delay_us = float(f"{spec.delay_us + poles_us:.6g}")
     rounded_us = abs(delay_us - math.floor(delay_us + 0.5))
-    mean = delayed(scene, variance_s2, reach_s, echoes=echoes(spec), stir_s2=stir_s2)
+    frozen_nat, after_turns = at_turns
+    mean = delayed(scene, variance_s2, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
     mean += later(scene, 1e-6 * late_us) + 1e-6 * rounded_us / DISTANCE_TAU_S
     why = f"a delay of {delay_us:g} us instead; what is left are rounded bends"
     if late_us > 0.0:

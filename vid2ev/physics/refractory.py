@@ -24,7 +24,7 @@ from pydantic import BaseModel, Field
 from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
 from vid2ev.physics.slopes import most_too_soon, slopes_of, steepest
 from vid2ev.physics.thresholds import soon
-from vid2ev.stream.bounds import at_most
+from vid2ev.stream.chances import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 

@@ -27,7 +27,8 @@ from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.omission import echoes, light_events, omitted, reset, set_anew
 from vid2ev.physics.photoreceptor_omission import lag_s, otherwise_late
-from vid2ev.stream.bounds import added, at_most, bare
+from vid2ev.stream.bounds import added, bare
+from vid2ev.stream.chances import at_most
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 from vid2ev.stream.scene import Omission, Scene
 

@@ -22,7 +22,8 @@ from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.physics.omission import kind_of, light_events, set_anew
-from vid2ev.stream.bounds import added, at_most
+from vid2ev.stream.bounds import added
+from vid2ev.stream.chances import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 CELL_NS, CELL_PIXELS = 1_000_000, 2048

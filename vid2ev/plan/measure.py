@@ -12,7 +12,7 @@ from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
 from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
-from vid2ev.kernels.play import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, STEPS, TRAVEL
+from vid2ev.kernels.measured import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, TRAVEL
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import tracks
@@ -31,7 +31,7 @@ LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 49 bytes a pixel, for a
+    The light that is measured is that behind the sensor's lens shading.  Memory is 53 bytes a pixel, for a
     shading 33 more, for memories that jump to the signal 12.  What frames say of what is still (`Frame.still`) is taken
     for granted where it is about the last one.  `threads` change nothing but the time it takes.
     """
@@ -105,7 +105,6 @@ class Measure:
 
     def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
-        steps = np.arange(STEPS + 1) * (dt_s / STEPS)
         pace = Pace(
             halves=self._halves,
             half=self._half,
@@ -122,7 +121,7 @@ class Measure:
             tracks=(0,) if self._blind_s else (),
             blind_s=self._blind_s,
             smooth_s=smooth_s,
-            decays=np.exp(-steps / smooth_s).astype(np.float32) if smooth_s else np.zeros(STEPS + 1, np.float32),
+            kept=math.exp(-dt_s / smooth_s) if smooth_s else 0.0,
             tau_s=DISTANCE_TAU_S,
             at_once=self.spec.timing == "frame",
         )

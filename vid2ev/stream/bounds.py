@@ -8,7 +8,6 @@ import numpy as np
 
 from vid2ev.stream.scene import DISTANCE_TAU_S, Scene
 
-RARE = math.log(1000)  # a chance of 1 in 1000: what a 99.9 % bound leaves
 PIXELS_DIFFER = 4.0  # how much more than the mean of its tile a pixel's signals may differ for, where that counts
 
 
@@ -33,20 +32,23 @@ def _sides(share: np.ndarray) -> np.ndarray:
     return 1.0 + np.minimum(2.0 * share, 1.0)
 
 
-def delayed(scene: Scene, variance_s2: np.ndarray, reach_s: np.ndarray, *, echoes: bool, stir_s2: float = 0.0) -> float:
+def delayed(
+    scene: Scene, variance_s2: np.ndarray, frozen_nat: np.ndarray, after_turns: np.ndarray, *, stir_s2: float = 0.0
+) -> float:
     """Bound on the mean distance where a low-pass gives way to its mean delay.
 
-    A bend of the slope by r is rounded off: the area between the two signals is r variance / 2, and their greatest
-    difference r reach, reach = E (D - E D)+ for a delay D that is distributed as the low-pass responds; of each tile.
-    Where memories jump to the signal, a bend leaves up to r slope stir_s2 / theta in them (`Scene`).
+    A bend of the slope by r is rounded off: the area between the two signals is r variance / 2.  At turns they differ
+    by frozen_nat, the sum of each tile; after_turns [2, quarters] is the travel that counts by the sum of that before
+    it, none where recordings that disagree go on alike.  Where memories jump to the signal, a bend leaves up to
+    r slope stir_s2 / theta in them (`Scene`).
     """
     if scene.still:
         return 0.0
-    area, frozen = 0.5 * variance_s2 * scene.bend, reach_s * scene.bend_at_turns
-    often = (area / np.maximum(scene.pushed_s, 1e-30) + frozen / np.maximum(scene.turns, 1.0)) / scene.threshold
-    change = _sides(PIXELS_DIFFER * often) * (area / DISTANCE_TAU_S + frozen)
+    area = 0.5 * variance_s2 * scene.bend
+    often = (area / np.maximum(scene.pushed_s, 1e-30) + frozen_nat / np.maximum(scene.turns, 1.0)) / scene.threshold
+    change = _sides(PIXELS_DIFFER * often) * (area / DISTANCE_TAU_S + frozen_nat)
     mean = float(change.sum() / scene.travel.sum()) + _stirred(scene, stir_s2)
-    return mean + _echo(scene, scene.by_bends, float(reach_s.max())) if echoes else mean
+    return mean + _echo(scene, after_turns, 1.0)
 
 
 def later(scene: Scene, late_s: float) -> float:
@@ -103,40 +105,10 @@ def elsewhere(scene: Scene) -> float:
     return float(scene.by_turns[0].sum() / scene.travel.sum()) if not scene.still else 0.0
 
 
-def surely(scene: Scene, mean: float, share: float = 1.0) -> float:
-    """The 99.9 % bound on a distance of this mean (Chernoff): pixels are independent, each event of light is as likely
-    to be the first that changes as any other, and what follows in its pixel changes with it.  Of all pixels a share
-    sends what is expected of it, the others nothing; infinite if that may be none.
-
-    For independent X_i, even on [0, m_i] with the chance 2 mu_i / m_i and else 0, and all l > 0,
-
-        P(sum X > t) <= exp(sum 2 mu_i ((exp(l m_i) - 1) / (l m_i) - 1) / m_i - l t)
-    """
-    if scene.still or mean == 0.0:
-        return mean
-    if share <= 0.0:
-        return math.inf
-    most = np.arange(len(scene.by_pixel)) + 2.0  # events
-    means = share * mean * scene.by_pixel / scene.threshold  # [events]
-    tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
-    sums = (2.0 * means * (np.expm1(tries * most) / (tries * most) - 1.0) / most).sum(axis=1)
-    return float(((sums + RARE) / tries[:, 0]).min()) / (share * scene.events)
-
-
 def added(events: float, extra: float, touched: float) -> float:
     """Bound on the distance where up to `extra` events of noise [number] come or go beside at least so many others, and
     up to a share `touched` of these comes after one of them in its pixel, and so from other levels."""
     return touched + extra / (2.0 * events + extra) if extra > 0.0 else 0.0
-
-
-def at_most(mean: float) -> float:
-    """A number that one of Poisson's exceeds in less than 1 of 1000 cases."""
-    return mean + math.sqrt(2.0 * RARE * mean) + RARE / 1.5 if mean > 0 else 0.0
-
-
-def at_least(mean: float) -> float:
-    """A number that one of Poisson's falls short of in less than 1 of 1000 cases."""
-    return max(mean - math.sqrt(2.0 * RARE * mean), 0.0)
 
 
 def together(*distances: float) -> float:

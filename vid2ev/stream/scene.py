@@ -72,6 +72,7 @@ OF_TILES = (
     "turns",
     "bend",
     "bend_at_turns",
+    "off_peaks",
     "dense",
 )
 OF_BARE = ("bare_apart", "bare_frozen", "bare_travel")
@@ -79,6 +80,7 @@ SPREAD = (
     "by_slope",
     "by_turns",
     "by_bends",
+    "by_peaks",
     "by_light",
     "by_stirs",
     "by_stirs_before",
@@ -124,10 +126,12 @@ class Scene:
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
+    off_peaks                 [tiles] what the second pole takes from peaks [nat]
     dense                     [tiles] travel x travel of the same pixel within tau [nat^2]
     by_slope                  [2, quarters of octaves] travel, and travel x slope, by the slope there [nat/s]
-    by_turns, by_bends        the same by the number of turns before it, and by the sum of the bends at these; of travel
-                              that which counts if levels are no longer the same
+    by_turns, by_bends, by_peaks   the same by the number of turns before it, by the sum of the bends at these, and of
+                              what the second pole takes there [nat]; of travel that which counts if levels are no
+                              longer the same
     by_light                  the same by the light there
     by_stirs ...              of memories that jump to the signal, the same by what bends have left in them, the sum of
                               bend x slope / threshold [nat/ms^2]: by it times the time that a nat takes; of the travel
@@ -155,10 +159,12 @@ class Scene:
     turns: np.ndarray
     bend: np.ndarray
     bend_at_turns: np.ndarray
+    off_peaks: np.ndarray
     dense: np.ndarray
     by_slope: np.ndarray
     by_turns: np.ndarray
     by_bends: np.ndarray
+    by_peaks: np.ndarray
     by_light: np.ndarray
     by_stirs: np.ndarray
     by_stirs_before: np.ndarray

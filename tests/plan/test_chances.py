@@ -1,0 +1,62 @@
+"""Bounds that chance exceeds in 1 of 1000 cases are those, and not much more than those."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from vid2ev.plan.measure import scene_of
+from vid2ev.sensors.spec import DvsSpec
+from vid2ev.stream.chances import surely
+from vid2ev.stream.scene import Scene
+
+from .clips import clip
+
+CASES = 40_000
+
+
+def scene(by_pixel: np.ndarray) -> Scene:
+    """A scene of so many pixels of 0, 1, ... events; they are no more than that."""
+    size, frames = clip("edge")
+    seen = scene_of(DvsSpec(), size, frames)
+    travel = seen.threshold * by_pixel * np.arange(len(by_pixel))
+    of_all = seen.travel / seen.travel.sum() * travel.sum()
+    return dataclasses.replace(seen, by_pixel=travel, travel=of_all)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize(
+    ("by_pixel", "mean"),
+    [
+        (np.array([0, 400, 300, 200]), 0.03),
+        (np.array([0, 5000, 0, 100, *[0] * 40, 5]), 0.001),
+        (np.array([0, 500, *[0] * 60, 300]), 0.004),
+        (np.array([0, 30, 20]), 0.3),
+        (np.array([0, *[100] * 80]), 0.01),
+    ],
+)
+def test_sums_exceed_the_bound_in_one_of_a_thousand_cases(by_pixel: np.ndarray, mean: float, whole: bool) -> None:
+    """Of pixels that change from any of their events on, or all together, with the mean that was asked for."""
+    draws, seen = np.random.default_rng(1), scene(by_pixel)
+    sums = np.zeros(CASES)
+    for events, pixels in enumerate(by_pixel):
+        most = events + 2.0
+        chance = (1.0 if whole else 2.0) * mean * events / most
+        many = draws.binomial(pixels, chance, CASES)
+        parts = most * (np.ones(many.sum()) if whole else draws.random(many.sum()))
+        sums += np.bincount(np.repeat(np.arange(CASES), many), parts, CASES)
+    assert sums.mean() == pytest.approx(mean * seen.events, rel=0.03)
+    bound = surely(seen, mean, whole=whole) * seen.events
+    assert np.mean(sums > bound) < 1.6e-3  # (1e-3, and four standard errors)
+    assert bound < (1.12 if mean < 0.1 else 1.3) * np.quantile(sums, 0.999)  # (of what is often, less is known)
+
+
+def test_what_is_often_is_bounded_too() -> None:
+    seen = scene(np.array([0, 400, 300, 200]))
+    assert surely(seen, 0.0) == 0.0 and np.isinf(surely(seen, 0.1, 0.0))
+    bounds = [surely(seen, mean) for mean in np.geomspace(1e-5, 2.0, 60)]
+    assert bounds == sorted(bounds)
+    assert all(bound > mean for bound, mean in zip(bounds, np.geomspace(1e-5, 2.0, 60), strict=True))
+    assert surely(seen, 0.01, 0.5) > surely(seen, 0.01)

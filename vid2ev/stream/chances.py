@@ -1,0 +1,82 @@
+"""What chance makes of a mean: numbers that are exceeded in less than 1 of 1000 cases, as 99.9 % bounds are.
+
+What changes in one pixel is independent of what does in another.  A pixel changes from one of its events on, each as
+likely to be the first as any other, or is another one from the beginning (`whole`).  So of m events it adds a number
+that is even on 0 to m, with the chance 2 mu / m, or m with the chance mu / m, where mu is the mean.  For the sum of all
+there are two bounds, of which the lesser counts:
+
+    P(sum X > t) <= exp(sum log E exp(l X) - l t)   for all l > 0 (H. Chernoff), with
+    log E exp(l X) <= 2 mu ((exp(l m) - 1) / (l m) - 1) / m   and   mu (exp(l m) - 1) / m
+
+and where changes are rare their distribution: X is no more than the sum of as many numbers as one of Poisson's says, of
+mean -log(1 - chance); numbers are rounded up to a grid, and their sum is had by Fourier's transform.  The grid wraps
+around, and so all is weighed by exp(-20 x) before, which leaves 2e-9 of what comes round.
+
+Sources: H. Chernoff, Annals of Mathematical Statistics 23, 1952; P. Embrechts and M. Frei, "Panjer recursion versus FFT
+for compound distributions", Mathematical Methods of Operations Research 69, 2009, for weights by exponentials.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vid2ev.stream.scene import Scene
+
+RARE = math.log(1000)  # a chance of 1 in 1000
+CELLS = 1 << 14
+WEIGHED = 20.0
+OFTEN = 0.4  # a pixel may change with a chance of this at most for the distribution to be looked at
+
+
+def surely(scene: Scene, mean: float, share: float = 1.0, *, whole: bool = False) -> float:
+    """The 99.9 % bound on a distance of this mean.  Of all pixels a share sends what is expected of it, the others
+    nothing; infinite if that may be none."""
+    if scene.still or mean == 0.0:
+        return mean
+    if share <= 0.0:
+        return math.inf
+    most = np.arange(len(scene.by_pixel)) + 2.0  # events
+    means = share * mean * scene.by_pixel / scene.threshold  # [events]
+    events = _chernoff(most, means, whole)
+    chance = mean if whole else 2.0 * mean
+    if chance < OFTEN:
+        events = _counted(most, means * (-math.log1p(-chance) / chance), whole, events)
+    return events / (share * scene.events)
+
+
+def _chernoff(most: np.ndarray, means: np.ndarray, whole: bool) -> float:
+    """A sum that is exceeded by a chance of 1 in 1000 at most [events]."""
+    tries = np.geomspace(1e-6, 20.0, 300)[:, None] / most.max()
+    grown = np.expm1(tries * most)
+    each = grown if whole else 2.0 * (grown / (tries * most) - 1.0)
+    return float((((means / most * each).sum(axis=1) + RARE) / tries[:, 0]).min())
+
+
+def _counted(most: np.ndarray, means: np.ndarray, whole: bool, limit: float) -> float:
+    """The same by the distribution on a grid, if that is less than the limit."""
+    cell = 2.0 * limit / CELLS
+    far = np.minimum(np.ceil(most / cell), CELLS - 1).astype(np.int64)
+    rates = np.zeros(CELLS + 1)
+    if whole:
+        np.add.at(rates, far, means / most)
+    else:
+        each = 2.0 * means / most * np.minimum(cell / most, 1.0)  # of the cells before the last
+        rates[1] = each.sum()
+        np.subtract.at(rates, far, each)
+        rates = np.cumsum(rates)
+        np.add.at(rates, far, 2.0 * means / most - each * (far - 1))
+    rates, weights = rates[:CELLS], np.exp(-WEIGHED / CELLS * np.arange(CELLS))
+    chances = np.fft.irfft(np.exp(np.fft.rfft(rates * weights) - rates.sum()), CELLS) / weights
+    return min(cell * float(np.searchsorted(np.cumsum(chances), 1.0 - math.exp(-RARE))), limit)
+
+
+def at_most(mean: float) -> float:
+    """A number that one of Poisson's exceeds in less than 1 of 1000 cases."""
+    return mean + math.sqrt(2.0 * RARE * mean) + RARE / 1.5 if mean > 0 else 0.0
+
+
+def at_least(mean: float) -> float:
+    """A number that one of Poisson's falls short of in less than 1 of 1000 cases."""
+    return max(mean - math.sqrt(2.0 * RARE * mean), 0.0)
