@@ -235,13 +235,13 @@ def omitted(
 
     Where memories jump to the signal, it is an estimate (`kind_of`), unless it is how dense events are that counts.
     """
-    kind: Kind = "99.9 % bound"
     spread = spread_of(spec)
     if scene.still and not spec.leak_rate_hz and not spec.photoreceptor_noise:
         return Omission(0.0, "99.9 % bound", figure, why, replace)
     noise, most = noise_events(scene, spec)
     unforced = _unforced(scene, spec)
-    light = min(crowding(spec, scene), 1e9) * scene.events
+    crowded = min(crowding(spec, scene), 1e9)
+    light = crowded * scene.events
     swallowed = light * spec.refractory_us * 1e-6 * (most - unforced) / max(scene.pixels * scene.seconds, 1e-9)
     many = light + unforced + min(swallowed, noise)
     share = many / (many + noise)
@@ -249,10 +249,11 @@ def omitted(
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
         sent = 1.0 - unsent(scene, spec)
-        near = mean + (1.0 - sent) * unlike(scene, lag_s)
-        near *= light / max(sent * max(scene.events - _missing(scene, spec), 0.0) + noise, 1e-9)
-        distance, kind = (near, kind_of(spec)) if near < distance else (distance, kind)
-    return Omission(surely(scene, distance / share) * share, kind, figure, why, replace)
+        near = (mean + (1.0 - sent) * unlike(scene, lag_s)) * crowded
+        per_event = scene.events / max(sent * max(scene.events - _missing(scene, spec), 0.0) + noise, 1e-9)
+        if near * per_event < distance:
+            return Omission(surely(scene, near) * per_event, kind_of(spec), figure, why, replace)
+    return Omission(surely(scene, distance / share) * share, "99.9 % bound", figure, why, replace)
 
 
 def displaced(scene: Scene, spec: Any, rms_nat: float) -> float:

@@ -8,9 +8,10 @@ there are two bounds, of which the lesser counts:
     P(sum X > t) <= exp(sum log E exp(l X) - l t)   for all l > 0 (H. Chernoff), with
     log E exp(l X) <= 2 mu ((exp(l m) - 1) / (l m) - 1) / m   and   mu (exp(l m) - 1) / m
 
-and where changes are rare their distribution: X is no more than the sum of as many numbers as one of Poisson's says, of
-mean -log(1 - chance); numbers are rounded up to a grid, and their sum is had by Fourier's transform.  The grid wraps
-around, and so all is weighed by exp(-20 x) before, which leaves 2e-9 of what comes round.
+and, of pixels that change from one of their events on, where that is rare, their distribution: X is no more than the
+sum of as many numbers as one of Poisson's says, of mean -log(1 - chance); numbers are rounded up to a grid, and their
+sum is had by Fourier's transform.  The grid wraps around, and so all is weighed by exp(-20 x) before, which leaves 2e-9
+of what comes round.
 
 Sources: H. Chernoff, Annals of Mathematical Statistics 23, 1952; P. Embrechts and M. Frei, "Panjer recursion versus FFT
 for compound distributions", Mathematical Methods of Operations Research 69, 2009, for weights by exponentials.
@@ -31,18 +32,18 @@ OFTEN = 0.4  # a pixel may change with a chance of this at most for the distribu
 
 
 def surely(scene: Scene, mean: float, share: float = 1.0, *, whole: bool = False) -> float:
-    """The 99.9 % bound on a distance of this mean.  Of all pixels a share sends what is expected of it, the others
-    nothing; infinite if that may be none."""
+    """The 99.9 % bound on a distance of this mean.  Of all pixels a share, or more, sends what is expected of it, the
+    others nothing; infinite if that may be none."""
     if scene.still or mean == 0.0:
         return mean
     if share <= 0.0:
         return math.inf
     most = np.arange(len(scene.by_pixel)) + 2.0  # events
-    means = share * mean * scene.by_pixel / scene.threshold  # [events]
-    events = _chernoff(most, means, whole)
-    chance = mean if whole else 2.0 * mean
-    if chance < OFTEN:
-        events = _counted(most, means * (-math.log1p(-chance) / chance), whole, events)
+    means = mean * scene.by_pixel / scene.threshold  # [events]
+    events, chance = _chernoff(most, share * means, whole), 2.0 * mean
+    if chance < OFTEN and not whole:
+        of_all = _chernoff(most, means, whole)  # (of fewer pixels no more change)
+        events = min(events, _counted(most, means * (-math.log1p(-chance) / chance), of_all), of_all)
     return events / (share * scene.events)
 
 
@@ -54,22 +55,20 @@ def _chernoff(most: np.ndarray, means: np.ndarray, whole: bool) -> float:
     return float((((means / most * each).sum(axis=1) + RARE) / tries[:, 0]).min())
 
 
-def _counted(most: np.ndarray, means: np.ndarray, whole: bool, limit: float) -> float:
-    """The same by the distribution on a grid, if that is less than the limit."""
+def _counted(most: np.ndarray, means: np.ndarray, limit: float) -> float:
+    """The same by the distribution on a grid that reaches beyond a limit."""
     cell = 2.0 * limit / CELLS
-    far = np.minimum(np.ceil(most / cell), CELLS - 1).astype(np.int64)
-    rates = np.zeros(CELLS + 1)
-    if whole:
-        np.add.at(rates, far, means / most)
-    else:
-        each = 2.0 * means / most * np.minimum(cell / most, 1.0)  # of the cells before the last
-        rates[1] = each.sum()
-        np.subtract.at(rates, far, each)
-        rates = np.cumsum(rates)
-        np.add.at(rates, far, 2.0 * means / most - each * (far - 1))
-    rates, weights = rates[:CELLS], np.exp(-WEIGHED / CELLS * np.arange(CELLS))
-    chances = np.fft.irfft(np.exp(np.fft.rfft(rates * weights) - rates.sum()), CELLS) / weights
-    return min(cell * float(np.searchsorted(np.cumsum(chances), 1.0 - math.exp(-RARE))), limit)
+    last = np.minimum(np.ceil(most / cell), CELLS - 1).astype(np.int64)
+    rates = 2.0 * means / most
+    each = rates * np.minimum(cell / most, 1.0)  # of the cells before the last
+    by_cell = np.zeros(CELLS + 1)
+    by_cell[1] = each.sum()
+    np.subtract.at(by_cell, last, each)
+    by_cell = np.cumsum(by_cell)
+    np.add.at(by_cell, last, rates - each * (last - 1))
+    by_cell, weights = by_cell[:CELLS], np.exp(-WEIGHED / CELLS * np.arange(CELLS))
+    chances = np.fft.irfft(np.exp(np.fft.rfft(by_cell * weights) - by_cell.sum()), CELLS) / weights
+    return cell * float(np.searchsorted(np.cumsum(chances), 1.0 - math.exp(-RARE)))
 
 
 def at_most(mean: float) -> float:
