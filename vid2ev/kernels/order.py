@@ -4,6 +4,7 @@ A stable counting sort of the keys on their microsecond, in passes of 16 bits (o
 an insertion sort on the pixel within each microsecond: keys come part by part, block by block and each pixel's in order
 of time, so it finds them nearly sorted.  A place is counted for each microsecond and row; parts that are put at the
 same time have a row each, as what is of the first goes before what is of the second, and else one row does for all.
+Keys that are few beside the microseconds are taken as they come, and put in order in passes of 8 bits.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from vid2ev.kernel_compiler import compiled, inner
 
 _TIME, _PIXEL = np.uint64(28), np.uint64(3)
-_PASS, _MASK = np.uint64(16), np.uint64(0xFFFF)
+_PASS, _SHORT_PASS = np.uint64(16), np.uint64(8)
 LAST_OF_PASS = 0xFFFF  # the last microsecond that one pass can tell from all others
 
 
@@ -32,7 +33,7 @@ def count_keys(keys, ends, first, last, places):
     for k in range(first, last):
         for group in range(ends.shape[0]):
             begin, end = run_of(ends, group, k)
-            count(keys[begin:end], _TIME, places[k - first])
+            count(keys[begin:end], _TIME, _PASS, places[k - first])
 
 
 @compiled
@@ -54,7 +55,20 @@ def put_keys(keys, ends, first, last, places, ordered):
     for k in range(first, last):
         for group in range(ends.shape[0]):
             begin, end = run_of(ends, group, k)
-            put(keys[begin:end], _TIME, places[k - first], ordered)
+            put(keys[begin:end], _TIME, _PASS, places[k - first], ordered)
+
+
+@compiled
+def take_keys(keys, ends, first, last, filled, taken):
+    """Those of a part in frames first ... last - 1 as they are to `taken`, from where each is filled to [frames]."""
+    for k in range(first, last):
+        place = filled[k - first]
+        for group in range(ends.shape[0]):
+            begin, end = run_of(ends, group, k)
+            for i in range(begin, end):
+                taken[place] = keys[i]
+                place += 1
+        filled[k - first] = place
 
 
 @inner
@@ -66,34 +80,39 @@ def run_of(ends, group, frame):
 
 
 @inner
-def count(keys, shift, places):
-    """Count keys by a digit."""
-    for i in range(keys.size):
-        places[np.int64((keys[i] >> shift) & _MASK)] += 1
+def digit_of(key, shift, bits):
+    """A digit of so many bits."""
+    return np.int64((key >> shift) & ((np.uint64(1) << bits) - np.uint64(1)))
 
 
 @inner
-def put(keys, shift, places, target):
+def count(keys, shift, bits, places):
+    """Count keys by a digit."""
+    for i in range(keys.size):
+        places[digit_of(keys[i], shift, bits)] += 1
+
+
+@inner
+def put(keys, shift, bits, places, target):
     """Each key to the next place of its digit."""
     for i in range(keys.size):
-        k = np.int64((keys[i] >> shift) & _MASK)
+        k = digit_of(keys[i], shift, bits)
         target[places[k]] = keys[i]
         places[k] += 1
 
 
 @inner
-def order_later_digits(keys, last_us):
-    """What is in order of the first digit of its microsecond in order of all, up to last_us."""
-    shift, left = _TIME + _PASS, last_us >> np.int64(_PASS)
+def order_digits(keys, shift, bits, most):
+    """Put keys in order of the digits from a shift on, which are numbers up to `most`; stable."""
     target = np.empty(keys.size, np.uint64)
-    while left > 0:
-        places = np.zeros((1, 1, min(left, np.int64(_MASK)) + 1), np.int64)
-        count(keys, shift, places[0, 0])
+    while most > 0:
+        places = np.zeros((1, 1, min(most, (np.int64(1) << np.int64(bits)) - 1) + 1), np.int64)
+        count(keys, shift, bits, places[0, 0])
         lay_out(places, np.empty(1, np.int64))
-        put(keys, shift, places[0, 0], target)
+        put(keys, shift, bits, places[0, 0], target)
         for i in range(keys.size):  # (a slice would be checked, and the message of that takes a second to compile)
             keys[i] = target[i]
-        shift, left = shift + _PASS, left >> np.int64(_PASS)
+        shift, most = shift + bits, most >> np.int64(bits)
 
 
 @inner
@@ -110,17 +129,19 @@ def order_pixels(keys):
 
 
 @compiled
-def unpack(keys, stops, first_us, last_us, share, shares, width, t, x, y, p, label):
+def unpack(keys, taken, stops, first_us, last_us, share, shares, width, t, x, y, p, label):
     """A share of the keys of each frame, which end at stops [frames], to the arrays of `Events`.
 
-    Keys of a frame count their times from first_us [frames], at the most to last_us; above `LAST_OF_PASS`, the share is
-    all.  `label` has length 0 where none are wanted.
+    Keys of a frame count their times from first_us [frames], at the most to last_us; above `LAST_OF_PASS`, or where
+    they are as they were `taken`, the share is all.  `label` has length 0 where none are wanted.
     """
     begin = np.int64(0)
     for k in range(stops.size):
         frame = keys[begin : stops[k]]
-        if last_us[k] > np.int64(_MASK):
-            order_later_digits(frame, last_us[k])
+        if taken:
+            order_digits(frame, _TIME, _SHORT_PASS, last_us[k])
+        elif last_us[k] > LAST_OF_PASS:
+            order_digits(frame, _TIME + _PASS, _PASS, last_us[k] >> np.int64(_PASS))
         i, j = cut_of(frame, share, shares), cut_of(frame, share + 1, shares)
         mine, first, last = frame[i:j], begin + i, begin + j
         order_pixels(mine)

@@ -11,7 +11,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vid2ev.kernels.order import LAST_OF_PASS, count_keys, lay_out, put_keys, sizes_of, unpack, unpack_frames
+from vid2ev.kernels.order import (
+    LAST_OF_PASS,
+    count_keys,
+    lay_out,
+    put_keys,
+    sizes_of,
+    take_keys,
+    unpack,
+    unpack_frames,
+)
 from vid2ev.stream.events import Events
 
 Each = Callable[[Callable[[int], None]], Any]
@@ -19,6 +28,7 @@ Each = Callable[[Callable[[int], None]], Any]
 # Events that take longer to put in order than threads take to wake: once, for frames beside each other, or three times
 WORTH_WAKING, WORTH_WAKING_THRICE = 1 << 16, 1 << 18
 IN_CACHE = 1 << 16  # events whose keys stay in a cache between the steps of putting them in order
+FEW = 4  # microseconds for each event, or more, where to count events for each microsecond takes longer than without
 
 
 class Keys(NamedTuple):
@@ -70,18 +80,38 @@ class Sent:
         if len(keys) == 0:
             return [Events.empty(self.labels)] * (last - first)
         first_us, last_us = self.first_us[first:last], self.last_us[first:last]
-        longest_us, parts = max(last_us.tolist()), len(self.parts)
-        rows = parts if each and longest_us <= LAST_OF_PASS else 1
-        of_parts, of_rows = (each, each) if each and rows > 1 else (in_turn(parts), in_turn(1))
-        places = np.zeros((rows, last - first, min(longest_us, LAST_OF_PASS) + 1), np.int64)
-        stops = np.empty(last - first, np.int64)
+        microseconds = min(max(last_us.tolist()), LAST_OF_PASS) + 1
+        few = not each and len(keys) * FEW <= microseconds * (last - first)
+        rows = len(self.parts) if each and microseconds <= LAST_OF_PASS else 1
+        stops = self._taken(first, last, keys) if few else self._counted(first, last, keys, microseconds, rows, each)
+        t, x, y, p, label = self._room(len(keys))
+        of_rows = each if each and rows > 1 else in_turn(1)
+        of_rows(lambda k: unpack(keys, few, stops, first_us, last_us, k, rows, self.width, t, x, y, p, label))
+        events = Events(t, x, y, p, label if self.labels else None)
+        return [events.stretch(*frame) for frame in pairwise((0, *stops.tolist()))]
+
+    def _taken(self, first: int, last: int, keys: np.ndarray) -> np.ndarray:
+        """Keys of frames, one after the other; returns where each ends."""
+        sizes = np.zeros(len(self.first_us), np.int64)
+        for _, ends in self.parts:
+            sizes_of(ends, sizes)
+        stops = np.cumsum(sizes[first:last])
+        filled = stops - sizes[first:last]
+        for part in self.parts:
+            take_keys(*part, first, last, filled, keys)
+        return stops
+
+    def _counted(
+        self, first: int, last: int, keys: np.ndarray, microseconds: int, rows: int, each: Each | None
+    ) -> np.ndarray:
+        """Keys of frames in order of the microseconds, as far as one pass can tell them; returns where each ends."""
+        parts = len(self.parts)
+        of_parts = each if each and rows > 1 else in_turn(parts)
+        places, stops = np.zeros((rows, last - first, microseconds), np.int64), np.empty(last - first, np.int64)
         of_parts(lambda k: count_keys(*self.parts[k], first, last, places[k % rows]))
         lay_out(places, stops)
         of_parts(lambda k: put_keys(*self.parts[k], first, last, places[k % rows], keys))
-        t, x, y, p, label = self._room(len(keys))
-        of_rows(lambda k: unpack(keys, stops, first_us, last_us, k, rows, self.width, t, x, y, p, label))
-        events = Events(t, x, y, p, label if self.labels else None)
-        return [events.stretch(*frame) for frame in pairwise((0, *stops.tolist()))]
+        return stops
 
     def unordered(self) -> Iterator[Events]:
         """The events of all frames, part by part; in order of time are those of a pixel alone."""
