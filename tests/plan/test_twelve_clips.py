@@ -64,9 +64,8 @@ def test_a_shading_stays_within_a_bound_that_is_near(name: str) -> None:
 @pytest.mark.timeout(3600)
 def test_all_clips() -> None:
     """Bounds hold; where the effect matters they are within a factor of 10, in the median, of sensors whose levels lie
-    anywhere; and `auto` leaves out what changes next to nothing on three clips of five of the paper's sensor (two of
-    three, but for one that flickers: of light that trembles nobody can count on events).  Of one whose memory jumps to
-    the signal there are estimates only, which hold, too."""
+    anywhere; and `auto` leaves out what changes next to nothing on two clips of three of the paper's sensor and of
+    v2e's noisy one.  Of one whose memory jumps to the signal there are estimates only, which hold, too."""
     outcomes = [tried(name, sensor, SENSORS[sensor]) for sensor, names in CLIPS.items() for name in names]
     ratios = table(outcomes)
     for outcome in outcomes:
@@ -78,7 +77,7 @@ def test_all_clips() -> None:
     for sensor in CLIPS:
         clean = [not any(trial.in_vain for trial in each.trials) for each in outcomes if each.sensor == sensor]
         print(f"{sensor:10}nothing kept in vain on {sum(clean)} of {len(clean)} clips")
-        assert sensor != "paper" or sum(clean) >= 3 / 5 * len(clean)
+        assert sensor not in ("paper", "v2e-noisy") or sum(clean) >= 2 / 3 * len(clean)
 
 
 def _known(sensor: str, ratios: list[float]) -> list[float]:
