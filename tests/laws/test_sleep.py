@@ -298,3 +298,14 @@ def test_strips_that_change_now_and_then_are_asked_as_often_as_it_pays():
             still = Still(frames[k - 1], still_strips(frames[k - 1], frames[k])) if told else None
             dvs.step(frames[k], 1_000_000 * k, still)
         assert dvs.slept[0] == 27 * slept
+
+
+def test_where_many_shots_are_expected_none_sleeps():
+    """Those would stir so many pixels of it that to walk a strip takes less; until intervals are short again."""
+    dvs, light = Dvs(SENSORS["v2e-noisy"], SIZE), np.full(SIZE[::-1], 0.5, np.float32)
+    t_ns, slept = 0, []
+    for dt_ns in [1_000_000] * 20 + [33_000_000] * 5 + [1_000_000] * 20:
+        before, t_ns = dvs.slept[0], t_ns + dt_ns
+        dvs.step(light, t_ns)
+        slept.append(dvs.slept[0] - before)
+    assert slept[19] > 20 and slept[20:25] == [0] * 5 and slept[-1] > 20  # (of 27 strips)

@@ -11,7 +11,8 @@ before, by what its frame says or by looking, it
 Events that are forced in such a strip go the usual way, their pixels alone: a shot takes the signal as the new memory,
 and a threshold is never so small that what is left of the hull or some leak would reach it (`stir`).
 
-To ask takes time where everything changes.  A strip that was asked in vain, as its light had changed or it was not at
+To ask takes time where everything changes, and so do events in strips that sleep: where many shots are expected in an
+interval, all strips are awake.  A strip that was asked in vain, as its light had changed or it was not at
 rest, is not asked in the next interval; after that not in the next three, and from then on only in every eighth.  What
 frames say costs nothing.
 
@@ -47,6 +48,7 @@ SLACK, ROUNDING = F(1e-4), F(3e-7)  # of the larger lag, and of the input
 NATS = F(4e-6)  # what rounding may be in a level of some nats
 ROOM = NOISE0  # a plane of the scratch: where pixels sleep there is no noise
 FEW = 32  # pixels
+STIRRED = 3.0  # shots expected in a strip: with more, to walk it takes less than to stir what sleeps
 PATIENCE = np.uint8(7)  # intervals
 TINY, LEAST = F(1e-30), F(1e-12)  # lags that a signal of at least LEAST does not have in float64
 
@@ -58,8 +60,12 @@ def doze(block, scratch, p0, size, theta, naps, flags, num, iv):
     the scratch, mended, and stays there.
     """
     asleep, at = 0, last_light(flags) if len(flags.light_bandwidth) else np.int64(INPUT * PITCH)
+    stirred = len(flags.forced) > 0 and num.shot_rate_hz * iv.dt_ns * 1e-9 * STRIP > STIRRED
     for first in range(0, size, STRIP):
         strip, n = (p0 + first) // STRIP, min(STRIP, size - first)
+        if stirred:
+            rouse(block[first:], scratch[first:], strip, n, naps, flags, num)
+            continue
         if naps.unasked[strip] > 0:  # (awake, and up to date)
             naps.unasked[strip] -= np.uint8(1)
             continue
@@ -69,14 +75,20 @@ def doze(block, scratch, p0, size, theta, naps, flags, num, iv):
             if not sleeps_on(naps.state[strip], naps.until[strip], naps.since[strip], naps.tick, iv.leak1):
                 settle_down(block[first:], scratch[first:], strip, n, theta, naps, flags, num, iv)
         else:
-            naps.state[strip] = AWAKE
-            if naps.since[strip] >= 0:
-                catch_up(block[first:], scratch[first:], strip, n, naps, flags, num)
+            rouse(block[first:], scratch[first:], strip, n, naps, flags, num)
         wakes = naps.state[strip] == AWAKE
         asleep += np.int64(not wakes)
         leave_alone(naps.unasked, naps.patience, strip, wakes and (same or not told))
     naps.slept[p0 // BLOCK] += asleep
     return asleep
+
+
+@inner
+def rouse(block, scratch, strip, n, naps, flags, num):
+    """Let a strip be awake; `block` and `scratch` begin at it."""
+    naps.state[strip] = AWAKE
+    if naps.since[strip] >= 0:
+        catch_up(block, scratch, strip, n, naps, flags, num)
 
 
 @inner
