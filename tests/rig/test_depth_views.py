@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kornia.geometry.depth import warp_frame_depth
 from view_rigs import Texture, pinhole, psnr
@@ -196,6 +196,10 @@ lenses = st.sampled_from([SOURCE, BENT, FISHEYE])
 
 
 @settings(deadline=None, max_examples=80)
+@example(  # (a pixel just beyond an edge, one corner of which is near the camera's plane)
+    seed=225, values=[0.0] * 6, turn=(0.0, 1.5, 1.0), way=(0.96875, 0.0, 1.662109375), source=SOURCE, camera=SOURCE,
+    size=(5, 9),
+)  # fmt: skip
 @given(
     seed=st.integers(0, 2**32 - 1),
     values=st.lists(numbers, min_size=6, max_size=6),

@@ -93,7 +93,9 @@ def _draw(u, v, q, w, columns, rows, begin, end, x, y, inverse):
                 if e0 >= slack and e1 >= slack and e2 >= slack:
                     depth = (e0 * w[0] + e1 * w[1] + e2 * w[2]) / area
                     if depth > inverse[row, column]:
-                        e0, e1, e2 = e0 * q[0], e1 * q[1], e2 * q[2]
+                        # (beyond an edge, by rounding, the place is on it: a corner near the camera's plane has a
+                        # q that takes it far out)
+                        e0, e1, e2 = max(e0, _ZERO) * q[0], max(e1, _ZERO) * q[1], max(e2, _ZERO) * q[2]
                         share = _ONE / (e0 + e1 + e2)
                         inverse[row, column] = depth
                         x[row, column] = (e0 * columns[0] + e1 * columns[1] + e2 * columns[2]) * share
