@@ -14,7 +14,7 @@ pytestmark = pytest.mark.long
 
 CLIP = "synthetic:moving-edge,size=640x32,fps=100,duration_s=0.12"
 OPTIONS = {
-    "overrides": ["shot_rate_hz=2"],
+    "overrides": ["shot_rate_hz=1"],  # (with more than three in a strip and interval none sleeps)
     "upsample": "none",
     "labels": True,
     "piece": 1 << 15,

@@ -226,6 +226,21 @@ def test_light_that_is_no_light_leaves_the_scene_finite() -> None:
     assert np.isfinite(scene.travel).all() and np.isfinite(scene.slope_max).all() and np.isfinite(scene.bend).all()
 
 
+@pytest.mark.parametrize("more", MORE)
+@pytest.mark.parametrize("curve", ["offset", "toe"])
+def test_no_number_of_any_light_is_negative_or_none(curve: str, more: dict[str, Any]) -> None:
+    draws = np.random.default_rng(8)
+    for _ in range(25):
+        lights = 10.0 ** draws.uniform(-9, 4, (6, 8, 8))
+        lights[draws.random(lights.shape) < 0.1] = draws.choice([0.0, np.nan, -1.0, 1e4])
+        t_ns = np.cumsum(draws.integers(10_000, int(10 ** draws.uniform(4.1, 10)), 6))
+        taus = {f"{pole}_tau_us": draws.choice([1e-3, 1.0, 300.0, 1e6]) for pole in ("photoreceptor", "follower")}
+        spec = clean(log_curve=curve, **taus, **{"dark_level": 10 ** draws.uniform(-6, 0)} | more)
+        frames = [Frame(light.astype(np.float32), int(t)) for light, t in zip(lights, t_ns, strict=True)]
+        for name, value in fields(scene_of(spec, (8, 8), frames)).items():
+            assert np.isfinite(value).all() and (value >= 0).all(), name
+
+
 def test_memories_that_jump_have_the_fewer_events() -> None:
     """Travel is the threshold times the events of a pixel that is blind in between, too."""
     frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 400_000_000, 1_000_000)]

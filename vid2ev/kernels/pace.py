@@ -129,7 +129,7 @@ def paced(i, moved, gone, curve, num, own, spread, scratch):
             per *= times
             share = F(step) / F(count) if even else (per - per0) / (per1 - per0)
             fast = faster(share * F(num.dt_s), scratch[SMOOTHED + i], slope, num)
-            light = old + share * (new - old)
+            light = max(old + share * (new - old), F(0.0))
             lit, near = smoothed(light, fast, num), near_at(light, fast, curve, num)
             way = abs(lit - lit0) / (near + near0) if num.before_log else abs(fast0) + abs(fast)
             if turn == 0:
