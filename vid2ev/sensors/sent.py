@@ -58,10 +58,11 @@ class Sent:
         starts = [0, *accumulate(sizes.tolist())]
         most = max(map(sub, starts[1:], starts))
         if starts[-1] <= WORTH_WAKING or (frames < parts and most <= WORTH_WAKING_THRICE):
-            return self._ordered(0, frames, np.empty(starts[-1], np.uint64))
+            return self._ordered(starts, 0, frames, np.empty(starts[-1], np.uint64))
         if frames < parts:
             room = np.empty(most, np.uint64)
-            return list(chain.from_iterable(self._ordered(k, k + 1, room[: sizes[k]], each) for k in range(frames)))
+            alone = (self._ordered(starts, k, k + 1, room[: sizes[k]], each) for k in range(frames))
+            return list(chain.from_iterable(alone))
         cuts = even_cuts(starts, parts * -(-starts[-1] // (parts * IN_CACHE)))
         made: dict[int, list[Events]] = {}
         waiting = iter(pairwise(cuts))
@@ -69,49 +70,49 @@ class Sent:
         def some(_: int) -> None:
             keys = np.empty(IN_CACHE + most, np.uint64)
             for first, last in waiting:  # (of all: each takes a run that none has taken)
-                made[first] = self._ordered(first, last, keys[: starts[last] - starts[first]])
+                made[first] = self._ordered(starts, first, last, keys[: starts[last] - starts[first]])
 
         each(some)
         return list(chain.from_iterable(made[first] for first in cuts[:-1]))
 
-    def _ordered(self, first: int, last: int, keys: np.ndarray, each: Each | None = None) -> list[Events]:
-        """The events of frames first ... last - 1, in whose `keys` there is room for theirs; if `each` is given, by
-        all threads."""
+    def _ordered(
+        self, starts: list[int], first: int, last: int, keys: np.ndarray, each: Each | None = None
+    ) -> list[Events]:
+        """The events of frames first ... last - 1, in whose `keys` there is room for theirs; `starts` [frames + 1] of
+        all keys are where those of a frame begin.  If `each` is given, by all threads."""
         if len(keys) == 0:
             return [Events.empty(self.labels)] * (last - first)
         first_us, last_us = self.first_us[first:last], self.last_us[first:last]
         microseconds = min(max(last_us.tolist()), LAST_OF_PASS) + 1
         few = not each and len(keys) * FEW <= microseconds * (last - first)
         rows = len(self.parts) if each and microseconds <= LAST_OF_PASS else 1
-        stops = self._taken(first, last, keys) if few else self._counted(first, last, keys, microseconds, rows, each)
+        stops = np.array(starts[first + 1 : last + 1]) - starts[first]
+        if few:
+            self._take(first, last, keys, np.array(starts[first:last]) - starts[first])
+        else:
+            self._count(first, last, keys, stops, microseconds, rows, each)
         t, x, y, p, label = self._room(len(keys))
         of_rows = each if each and rows > 1 else in_turn(1)
         of_rows(lambda k: unpack(keys, few, stops, first_us, last_us, k, rows, self.width, t, x, y, p, label))
         events = Events(t, x, y, p, label if self.labels else None)
         return [events.stretch(*frame) for frame in pairwise((0, *stops.tolist()))]
 
-    def _taken(self, first: int, last: int, keys: np.ndarray) -> np.ndarray:
-        """Keys of frames, one after the other; returns where each ends."""
-        sizes = np.zeros(len(self.first_us), np.int64)
-        for _, ends in self.parts:
-            sizes_of(ends, sizes)
-        stops = np.cumsum(sizes[first:last])
-        filled = stops - sizes[first:last]
+    def _take(self, first: int, last: int, keys: np.ndarray, filled: np.ndarray) -> None:
+        """Keys of frames, each from where it is filled to [frames]."""
         for part in self.parts:
             take_keys(*part, first, last, filled, keys)
-        return stops
 
-    def _counted(
-        self, first: int, last: int, keys: np.ndarray, microseconds: int, rows: int, each: Each | None
-    ) -> np.ndarray:
-        """Keys of frames in order of the microseconds, as far as one pass can tell them; returns where each ends."""
+    def _count(
+        self, first: int, last: int, keys: np.ndarray, stops: np.ndarray, microseconds: int, rows: int,
+        each: Each | None,
+    ) -> None:  # fmt: skip
+        """Keys of frames, which end at stops [frames], in order of the microseconds, as far as one pass can tell."""
         parts = len(self.parts)
         of_parts = each if each and rows > 1 else in_turn(parts)
-        places, stops = np.zeros((rows, last - first, microseconds), np.int64), np.empty(last - first, np.int64)
+        places = np.zeros((rows, last - first, microseconds), np.int64)
         of_parts(lambda k: count_keys(*self.parts[k], first, last, places[k % rows]))
         lay_out(places, stops)
         of_parts(lambda k: put_keys(*self.parts[k], first, last, places[k % rows], keys))
-        return stops
 
     def unordered(self) -> Iterator[Events]:
         """The events of all frames, part by part; in order of time are those of a pixel alone."""
