@@ -208,36 +208,61 @@ class Pipe(io.RawIOBase):
 
 
 @pytest.fixture
-def piped(clip: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
-    """Puts the clip into standard input, as Y4M."""
+def film(clip: Path, tmp_path: Path) -> Path:
+    """The clip as Y4M."""
     pictures = (np.minimum(np.load(clip), 1.0) * 255).astype(np.uint8)
     head = f"YUV4MPEG2 W{SIZE[0]} H{SIZE[1]} F200:1 Ip A1:1 Cmono\n".encode()
-    data = head + b"".join(b"FRAME\n" + picture.tobytes() for picture in pictures)
-    return lambda piece: monkeypatch.setattr(sys, "stdin", Pipe(data, piece))
+    path = tmp_path / "clip.y4m"
+    path.write_bytes(head + b"".join(b"FRAME\n" + picture.tobytes() for picture in pictures))
+    return path
 
 
-@pytest.mark.parametrize("count", [SOME, planning.HELD])
-def test_a_pipe_is_planned_if_it_ends_while_it_is_held(
-    piped: Callable[[int], None], tmp_path: Path, held: Callable[[int], None], count: int
+FILM: dict[str, Any] = {"fps": None, "transfer": "linear"}
+
+
+@pytest.mark.parametrize("count", [1, SOME, planning.HELD])
+@pytest.mark.parametrize("tolerance", [0.02, 0.1, 0.5])
+def test_a_pipe_is_planned_as_a_file_is(
+    film: Path, tmp_path: Path, held: Callable[[int], None], count: int, tolerance: float, monkeypatch: Any
 ) -> None:
-    """Whatever the pieces that it comes in."""
+    """Whatever the pieces that it comes in, and where it begins again, too."""
     held(count)
-    options: dict[str, Any] = {"fps": None, "transfer": "linear", "tolerance": 0.5}
-    manifests = []
+    of_file = made(film, tmp_path / "file", tolerance=tolerance, **FILM)
     for piece in (1 << 20, 997):
-        piped(piece)
-        manifests.append(made(Path("-"), tmp_path / f"{piece}", **options))
-    piped(1 << 20)
-    made(Path("-"), tmp_path / "all", **options | {"effects": "all"})
-    assert same_events(tmp_path / f"{1 << 20}", tmp_path / "997")
-    assert manifests[0]["plan"] == manifests[1]["plan"]
-    if count == SOME:
-        assert gone(manifests[0]) == [] and same_events(tmp_path / "997", tmp_path / "all")
-        assert "passes once" in manifests[0]["plan"][""]["rows"][0]["why"]
-    else:
-        assert gone(manifests[0]) == ["photoreceptor", "follower"]
-        sides = [events_of(tmp_path / name) for name in ("997", "all")]
-        assert 0 < distance(*sides, SIZE) <= manifests[0]["plan"][""]["distance"] <= 0.5
+        monkeypatch.setattr(sys, "stdin", Pipe(film.read_bytes(), piece))
+        of_pipe = made(Path("-"), tmp_path / f"{piece}", tolerance=tolerance, **FILM)
+        assert of_pipe["plan"] == of_file["plan"] and same_events(tmp_path / "file", tmp_path / f"{piece}")
+
+
+@pytest.mark.parametrize("kept", [0, 50 * (SIZE[0] * SIZE[1] + 6), 1 << 32])
+def test_of_a_pipe_longer_than_what_is_kept_all_effects_are(
+    film: Path, tmp_path: Path, held: Callable[[int], None], kept: int, monkeypatch: Any
+) -> None:
+    """The light is so that the plan would never change."""
+    held(SOME)
+    monkeypatch.setattr(planning, "KEPT", kept)
+    monkeypatch.setattr(sys, "stdin", Pipe(film.read_bytes(), 997))
+    manifest = made(Path("-"), tmp_path / "pipe", tolerance=1.0, **FILM)
+    made(film, tmp_path / "all", effects="all", **FILM)
+    assert same_events(tmp_path / "pipe", tmp_path / "all") == (kept < 1 << 32) == (gone(manifest) == [])
+    assert (planning.LONG in manifest["plan"][""]["rows"][0]["why"]) == (kept < 1 << 32)
+
+
+@pytest.mark.parametrize(
+    ("count", "tolerance", "wanted"), [(SOME, 1.0, True), (SOME, 0.0, False), (1 << 26, 0.5, False)]
+)
+def test_a_pipe_is_kept_while_the_recording_may_begin_again(
+    film: Path, held: Callable[[int], None], count: int, tolerance: float, wanted: bool, monkeypatch: Any
+) -> None:
+    held(count)
+    monkeypatch.setattr(sys, "stdin", Pipe(film.read_bytes(), 997))
+    planner = Planner(Recipe.of("-", SPEC, upsample="none", cuts="keep", transfer="linear"), tolerance)
+    planner.begin()
+    coming = planner.instants()
+    next(coming)
+    kept = planner.recipe.source.kept
+    assert kept and kept.wanted == wanted
+    coming.close()
 
 
 def test_an_array_that_passes_once_is_read_once(

@@ -104,6 +104,20 @@ def test_a_second_time_is_refused(pipe) -> None:
         next(source.frames())
 
 
+def test_a_pipe_is_read_again_by_who_wants_it_in_time(pipe) -> None:
+    pipe(y4m(noise(30)))
+    source = open_source("-", transfer="linear", start=0.2, crop="32x24")
+    assert source.kept
+    source.kept.wanted = True
+    first, again = list(source.frames()), list(source.frames())
+    source.kept.wanted = False
+    last = list(source.frames(3))
+    assert len(first) == 25 and len(last) == 22
+    for one, other in [*zip(first, again, strict=True), *zip(first[3:], last, strict=True)]:
+        assert one.t_ns == other.t_ns
+        np.testing.assert_array_equal(one.light, other.light)
+
+
 def test_a_pipe_is_read_no_faster_than_its_frames_are_taken(pipe) -> None:
     pictures = noise(400, (120, 160))
     data = y4m(pictures)

@@ -190,7 +190,7 @@ def _said(omission: Omission, scene: Scene, spec: DvsSpec) -> Omission:
 def plan_unseen(spec: DvsSpec, why: str, tolerance: float = TOLERANCE, effects: str | Sequence[str] = "auto") -> Plan:
     """The plan for what was not measured, and `why`: "auto" keeps all.
 
-    So it is with what passes once and goes on for longer than light is held (`plan.planner` says why).
+    So it is with what cannot be kept to begin again (`plan.planner` says why).
     Raises UsageError as `plan_of` does.
     """
     check_tolerance(tolerance)

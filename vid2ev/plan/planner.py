@@ -20,15 +20,16 @@ for the scene of the whole clip, as if it had been looked at first.
 **It can be repeated**: what is decided, and where, follows from the light alone.  `looked` says how far; of a recording
 that is taken up again, so much is looked at again, and the decisions are the same.
 
-**Sources that pass once** are planned only if they end while they are held; else all is kept.  Effects cannot come
-and go while a recording is made, not even if each chunk of light is measured before the sensors see it.  Where
-thresholds differ from pixel to pixel or crossing to crossing, as in all real sensors, two recordings of a pixel that
-disagree about one event go on with other levels, and an effect that comes back does not bring them together
-(`stream.scene`: echo).  Let the chance of that be q > 0 in some pixel, however few events it has had: if from then on
-that pixel alone sees light that changes, the distance of the whole tends, with probability q, to that of recordings
-with nothing in common, though nothing is left out any more.  So no bound on what was is one on the whole, unless q is 0
-in every pixel.  Of an effect that costs something a chunk can show that of the refractory period alone, which costs
-less than measuring does.
+**Sources that pass once.** Standard input is planned as a file is: what it gives is kept, as it comes, for as long as
+the recording may have to begin again, and beyond `KEPT` all effects are.  A camera waits for nobody: it is planned if
+it ends while it is held, else all is kept.  Effects cannot come and go while a recording is made, not even if each
+chunk of light is measured before the sensors see it.  Where thresholds differ from pixel to pixel or crossing to
+crossing, as in all real sensors, two recordings of a pixel that disagree about one event go on with other levels, and
+an effect that comes back does not bring them together (`stream.scene`: echo).  Let the chance of that be q > 0 in
+some pixel, however few events it has had: if from then on that pixel alone sees light that changes, the distance of
+the whole tends, with probability q, to that of recordings with nothing in common, though nothing is left out any
+more.  So no bound on what was is one on the whole, unless q is 0 in every pixel.  Of an effect that costs something a
+chunk can show that of the refractory period alone, which costs less than measuring does.
 """
 
 from __future__ import annotations
@@ -45,8 +46,10 @@ from vid2ev.recipe import Recipe
 from vid2ev.sensors.devices import CPU, Device
 
 HELD = 1 << 26  # bytes of light, at least an instant
+KEPT = 1 << 32  # bytes of standard input
 SPARE = 0.5  # share of the tolerance for the first plans, and again each time: what comes may be worse yet
 SPARED = "kept, as some of the tolerance was spared for what was still to come"
+LONG = "the source passes once, and more than 4 GiB of it are not kept to begin again"
 REVISIONS = 2  # after so many all is kept: each costs the recording so far
 
 
@@ -63,6 +66,7 @@ class Planner:
         self.recipe, self.tolerance, self.device = recipe, tolerance, device
         self.plans: dict[str, Plan] = {}
         self.looked, self.ended = 0, False  # instants, from the first on; and whether the last of them was the last
+        self._kept = recipe.source.kept
         self._look, self._looking = Look(recipe, threads), {mount.name for mount in recipe.mounts}
         self._bytes, self._due, self._revisions = 0, 2 * HELD, 0
         self._spared: dict[str, frozenset[str]] = {}
@@ -78,13 +82,16 @@ class Planner:
         """Make the first plans; those at which another planner was that had looked so far."""
         if self.plans:
             return
+        if self._kept:
+            self._kept.wanted = True
         self._rest = instants(self.recipe, device=self.device)
         more = self._hold(self._rest)
-        if not self.looked or (more and not self.recipe.source.rewindable):
+        once = self._kept is None and not self.recipe.source.rewindable
+        if not self.looked or (more and once):
             self.plans = plans_unseen(self.recipe, PASSES, "auto", self.tolerance)
         else:
             self._take(self._decided(more))
-        if not more or not self.recipe.source.rewindable:
+        if not more or once:
             self._looking.clear()
         if self._looking and looked > self.looked:
             self._catch_up(self._rest, looked)
@@ -96,6 +103,8 @@ class Planner:
         """What the cameras see at source frame `frame`, and after it."""
         if frame > 0:
             self._let_go()
+        if self._kept and not self._looking:
+            self._kept.wanted = False
         held, rest, self._held, self._rest = self._held, self._rest, deque(), None
         rest = rest or instants(self.recipe, frame, self.device)
         with closing(rest):
@@ -108,6 +117,8 @@ class Planner:
         if not self._looking or index < self.looked:
             return False
         self._measure(instant)
+        if self._kept and self._kept.size > KEPT:
+            return self._keep_all()
         if self._bytes < self._due:
             return False
         self._due *= 2
@@ -169,6 +180,13 @@ class Planner:
             found |= {name: decided[name] for name in new}
         self._take(found)
         return bool(new)
+
+    def _keep_all(self) -> bool:
+        """Leave nothing out any more, and look no further; returns that there are new plans."""
+        kept = plans_unseen(self.recipe, LONG, "auto", self.tolerance)
+        self.plans |= {name: kept[name] for name in self._looking}
+        self._looking.clear()
+        return True
 
     def _take(self, found: dict[str, Plan]) -> None:
         """Go by these plans, and look only at what cameras see of which something is left out."""

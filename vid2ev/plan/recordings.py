@@ -17,6 +17,7 @@ from vid2ev.plan.subframes import Subframes
 from vid2ev.plan.views import DepthRange, view_row
 from vid2ev.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
+from vid2ev.sources import Source
 
 Plans = Mapping[str, Plan]  # by the name of the camera, "" for the only one
 PASSES = "the source passes once: what is to come is not known"
@@ -29,10 +30,10 @@ def plans_of(
     """The plan of each camera, from a look at the whole source, made denser in time as for a recording, which does
     without (`plan.planner`).  `threads` measure, and change nothing but the time it takes.
 
-    A source that passes once is not read: all that auto keeps of it is all.  Raises UsageError as `plan_of` does.
+    A camera that goes on and on is not looked at, and auto keeps all of it.  Raises UsageError as `plan_of` does.
     """
     check_effects(recipe, effects, tolerance)
-    if not recipe.source.rewindable:
+    if _is_endless(recipe.source):
         return plans_unseen(recipe, PASSES, effects, tolerance)
     look = Look(recipe, threads)
     with closing(instants(recipe)) as seen:
@@ -91,6 +92,11 @@ def plans_unseen(recipe: Recipe, why: str, effects: str | Sequence[str], toleran
         else:
             plans[mount.name] = frame_plan_unseen(spec, why, tolerance, effects)
     return plans
+
+
+def _is_endless(source: Source) -> bool:
+    """Whether a source may never end: a camera that is not told when to stop."""
+    return not source.rewindable and source.kept is None and source.duration_expected_s is None
 
 
 def _measure(mount: Mount, threads: int) -> Measure | Expose:

@@ -45,6 +45,7 @@ class SceneSource:
     """
 
     rewindable = True
+    kept = None
     dense = True  # in time: light is a straight line between two frames, as near as it was asked for
 
     def __init__(

@@ -31,6 +31,7 @@ class ArrayStack:
     """
 
     rewindable = True
+    kept = None
     dense = False
 
     def __init__(

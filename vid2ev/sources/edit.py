@@ -11,6 +11,7 @@ import numpy as np
 from vid2ev.stream.frames import Frame
 
 if TYPE_CHECKING:
+    from vid2ev.sources.kept import Kept
     from vid2ev.sources.source import Source
 
 
@@ -39,6 +40,11 @@ class Edit:
     def rewindable(self) -> bool:
         """Whether it can be read again."""
         return self.source.rewindable
+
+    @property
+    def kept(self) -> Kept | None:
+        """What was read of standard input."""
+        return self.source.kept
 
     @property
     def dense(self) -> bool:

@@ -1,4 +1,4 @@
-"""Where decoded pictures come from: a video file, which can be read again, or a stream, which passes once.
+"""Where decoded pictures come from: a video file, a pipe, whose bytes are kept, or a camera, which passes once.
 
 Both give PyAV's pictures in order of presentation, and what is damaged costs no more than it has to.
 """
@@ -17,8 +17,10 @@ import av
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.recognise import recognise
+from vid2ev.sources.kept import Kept
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
+STREAMS = "Y4M, Matroska, MPEG-TS or fragmented MP4"
 SEEKABLE = ("mp4", "matroska")  # containers with an index, and a presentation time for every picture
 STEPS_BACK_S = (0, 2, 10)  # how far before the place a key frame is looked for
 
@@ -36,6 +38,10 @@ class Footage(Protocol):
     end_s: Fraction | None  # by the header, on the clock of the pictures
     first: Any  # the first picture
 
+    @property
+    def kept(self) -> Kept | None:
+        """What was read of what passes once."""
+
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
         """The pictures; some of those before `since_s` may be left out.  `remarks` is told what could not be read."""
 
@@ -45,15 +51,14 @@ class VideoFile:
 
     kind = "video"
     rewindable = True
+    kept = None
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self.name = str(path)
         with self._opened() as (container, stream):
-            self.rate = stream.average_rate or stream.guessed_rate
-            self.pixel_shape = stream.sample_aspect_ratio or Fraction(1)
+            self.rate, self.pixel_shape, self.codec = _said_of(stream)
             self.planned: int = stream.frames
-            self.codec: str = stream.codec_context.name
             self._indexed = any(name in container.format.name.split(",") for name in SEEKABLE)
             self.first = next(_decoded(container, stream, self.planned, []), None)
             if self.first is None:
@@ -94,31 +99,68 @@ class VideoFile:
             yield container, video_stream(container, self.name)
 
 
-class LiveStream:
-    """A video that passes once: an open container (standard input, a camera), read only as its pictures are taken."""
+class Piped:
+    """A video in a stream of bytes that passes once, read only as its pictures are taken.  It can be read again where
+    `kept.wanted` was set before the first time."""
 
+    kind = "pipe"
     rewindable = False
     planned = 0
     end_s: Fraction | None = None
 
-    def __init__(self, container: Any, name: str, kind: str):
-        self.name, self.kind = name, kind
+    def __init__(self, kept: Kept):
+        self.name, self.kept = kept.name, kept
+        with self._opened() as (container, stream):
+            self.rate, self.pixel_shape, self.codec = _said_of(stream)
+            self.first = next(_decoded(container, stream, 0, []), None)
+        kept.wanted = False
+        if self.first is None:
+            raise DataError(f"{self.name}: no frame in it can be decoded; pipe {STREAMS} into it")
+
+    def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
+        """The pictures from the first one on.  Raises UsageError if they are not kept any more."""
+        with self._opened() as (container, stream):
+            yield from _decoded(container, stream, 0, remarks)
+
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[Any, Any]]:
+        reader = self.kept.reader()
+        try:
+            container = av.open(reader, options={"protocol_whitelist": ""})
+        except (av.FFmpegError, ValueError) as error:
+            raise DataError(
+                f"{self.name}: not a video that can be read from a pipe ({reason(error)}); pipe {STREAMS} in, or give"
+                " the file"
+            ) from error
+        with container:
+            yield container, video_stream(container, self.name)
+
+
+class LiveStream:
+    """A video that passes once: an open container (of a camera), read only as its pictures are taken."""
+
+    kind = "camera"
+    rewindable = False
+    kept = None
+    planned = 0
+    end_s: Fraction | None = None
+
+    def __init__(self, container: Any, name: str):
+        self.name = name
         stream = video_stream(container, name)
-        self.rate = stream.average_rate or stream.guessed_rate
-        self.pixel_shape = stream.sample_aspect_ratio or Fraction(1)
-        self.codec: str = stream.codec_context.name
+        self.rate, self.pixel_shape, self.codec = _said_of(stream)
         self._remarks: list[str] = []
         self._coming: Iterator[Any] | None = _decoded(container, stream, 0, self._remarks)
         self._container = container  # (closed with the last reference to it)
         self.first = next(self._coming, None)
         if self.first is None:
-            raise DataError(f"{name}: no frame in it can be decoded; pipe a video into it, such as Y4M, MKV or MPEG-TS")
+            raise DataError(f"{name}: gives no picture that can be decoded; look whether it works elsewhere")
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
         """The pictures, the first one too; a second time raises UsageError."""
         coming, self._coming = self._coming, None
         if coming is None:
-            raise UsageError(f"{self.name}: can be read once only; save it as a file to read it again")
+            raise UsageError(f"{self.name}: can be read once only; save what it gives as a file to read it again")
         yield from chain([self.first], coming)
         remarks += self._remarks
 
@@ -132,6 +174,15 @@ def video_stream(container: Any, name: str) -> Any:
         raise DataError(f"{name}: its video is in a codec that is not known; convert it to H.264 or FFV1")
     streams[0].thread_type = "AUTO"
     return streams[0]
+
+
+def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str]:
+    """What a stream says of itself: nominal frames per second, width of a pixel by its height, and its codec."""
+    return (
+        stream.average_rate or stream.guessed_rate,
+        stream.sample_aspect_ratio or Fraction(1),
+        stream.codec_context.name,
+    )
 
 
 def stamp_of(picture: Any) -> Fraction | None:

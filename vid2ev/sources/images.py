@@ -35,6 +35,7 @@ class Images:
     """
 
     rewindable = True
+    kept = None
     dense = False
 
     def __init__(

@@ -1,12 +1,13 @@
-"""Videos that pass once: standard input, and cameras.
+"""Videos that are live: standard input, and cameras.
 
     -            a video on standard input, in any container that can be read from its start on: Y4M, Matroska, MPEG-TS,
                  fragmented MP4
     camera:0     the first camera; on Linux /dev/video0, on macOS the first of AVFoundation; on Windows its name after
                  the colon
 
-They are read only as their frames are taken, so that what writes into a pipe waits.  A camera counts its time from its
-first frame, and goes on until it is told to stop.
+They are read only as their frames are taken, so that what writes into a pipe waits.  What a pipe gives is kept for
+whoever wants to read it again (`kept.py`).  A camera counts its time from its first frame, and goes on until it is told
+to stop.
 """
 
 from __future__ import annotations
@@ -17,22 +18,16 @@ from typing import Any
 import av
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources.footage import LiveStream, reason
+from vid2ev.sources.footage import LiveStream, Piped, reason
+from vid2ev.sources.kept import Kept
 
 
-def open_standard_input() -> LiveStream:
+def open_standard_input() -> Piped:
     """The video on standard input.  Raises UsageError if nothing is piped in, DataError if it is no video."""
     stdin = getattr(sys.stdin, "buffer", None)
     if stdin is None or sys.stdin.isatty():
         raise UsageError("-: nothing is piped in; write `... | vid2ev convert -`, or give a file")
-    try:
-        container = av.open(stdin, options={"protocol_whitelist": ""})
-    except (av.FFmpegError, ValueError) as error:
-        raise DataError(
-            f"standard input: not a video that can be read from a pipe ({reason(error)}); pipe Y4M, Matroska, MPEG-TS"
-            " or fragmented MP4 in, or give the file"
-        ) from error
-    return LiveStream(container, "standard input", "pipe")
+    return Piped(Kept(stdin, "standard input"))
 
 
 def open_camera(text: str) -> LiveStream:
@@ -45,7 +40,7 @@ def open_camera(text: str) -> LiveStream:
             f"camera:{text}: no camera that can be opened as {device} ({reason(error)}); connect one, close what"
             " else uses it, or give another number"
         ) from error
-    return LiveStream(container, f"camera:{text}", "camera")
+    return LiveStream(container, f"camera:{text}")
 
 
 def device_of(text: str, platform: str) -> tuple[str, dict[str, Any]]:

@@ -48,6 +48,7 @@ class Photograph:
     """
 
     rewindable = True
+    kept = None
     dense = False
 
     def __init__(

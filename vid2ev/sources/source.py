@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Protocol
 
+from vid2ev.sources.kept import Kept
 from vid2ev.stream.frames import Frame
 
 
@@ -29,6 +30,10 @@ class Source(Protocol):
     @property
     def rewindable(self) -> bool:
         """Whether it can be read again; standard input and cameras cannot, and a second `frames` raises UsageError."""
+
+    @property
+    def kept(self) -> Kept | None:
+        """Of standard input what was read: it can be read again by whoever wants that in time."""
 
     @property
     def dense(self) -> bool:

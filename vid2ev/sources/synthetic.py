@@ -26,6 +26,7 @@ class SyntheticClip(ABC):
     """A clip of `size` (width, height) with frames at k / fps from 0 to duration_s [s], both ends included."""
 
     name: ClassVar[str]
+    kept: ClassVar[None] = None
     size: tuple[int, int] = (320, 240)
     fps: float = 240.0
     duration_s: float = 1.0

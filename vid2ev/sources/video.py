@@ -55,7 +55,7 @@ class Video:
         if transfer != "auto":
             parse_transfer(transfer)
         self._footage, self._colour = footage, colour
-        self.path, self.rewindable = footage.name, footage.rewindable
+        self.path, self.rewindable, self.kept = footage.name, footage.rewindable, footage.kept
         first = footage.first
         self.frames_expected = footage.planned or self._estimate()
         self._transfer = transfer_of(first.color_trc, transfer)
