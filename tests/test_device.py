@@ -7,6 +7,7 @@ is, many at a time; two slow ones make all with a card that is simulated, whose 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -296,6 +297,25 @@ def no_card(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def a_card(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "missing_for_cuda", lambda: "")
+
+
+@pytest.mark.parametrize(
+    ("there", "driver", "compilers", "said"),
+    [
+        (True, (13, 0), "13.5.0", ""),
+        (True, (13, 2), "12.9.1", ""),
+        (True, (12, 8), "13.5.0", "driver is for CUDA 12.8, and numba-cuda's compilers are for CUDA 13 .*cuda12"),
+        (False, (13, 0), "13.5.0", "no compilers .*, or no driver"),
+    ],
+)
+def test_a_card_is_one_that_kernels_can_be_compiled_for(monkeypatch, there, driver, compilers, said):
+    from numba import cuda
+
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(cuda, "is_available", lambda: there)
+    monkeypatch.setattr("numba.cuda.cudadrv.driver.driver.get_version", lambda: driver)
+    monkeypatch.setattr(devices, "version", lambda name: compilers)
+    assert re.search(said, devices.missing_for_cuda()) if said else devices.missing_for_cuda() == ""
 
 
 def vid2ev(*arguments: str) -> Any:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -159,7 +160,7 @@ def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(name, memory):
         alone = Dvs(spec, SIZE, seed, camera=k, labels=labels)
         each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(7)][1:]
         assert sum(map(len, each)) > 50
-        assert_same(each, [part.of(k, j) for part in parts for j in range(3)])
+        assert_same(each, [events for part in parts for events in part.of(k)])
 
 
 @memories
@@ -175,7 +176,7 @@ def test_a_batch_of_clips_that_differ_in_light_and_seed_alone(name, memory):
         alone = Dvs(spec, SIZE, 8 + k, labels=labels)
         each = [alone.step(frames[j, k], int(t_ns[j, k])) for j in range(5)][1:]
         assert sum(map(len, each)) > 50
-        assert_same(each, [part.of(k, j) for part in parts for j in range(2)])
+        assert_same(each, [events for part in parts for events in part.of(k)])
 
 
 @memories
@@ -221,6 +222,20 @@ def test_events_that_find_no_room_are_walked_again(memory):
     assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
     assert len(card._card._sent.keys) > 7 and cpu.counts == card.counts
     assert_same_state(cpu, card)
+
+
+@memories
+def test_light_is_taken_however_it_lies(memory):
+    """Upside down, of another byte order, read-only, of twice the digits; tensors of a network that learns."""
+    light = np.random.default_rng(3).random((4, 5), dtype=np.float32)
+    fixed = light.copy()
+    fixed.flags.writeable = False
+    learnt = torch.from_numpy(light.copy()).requires_grad_()
+    others = [light.astype(">f4"), light.astype(np.float64), fixed, np.asfortranarray(light), light.tolist()]
+    for given_light in (light, *others, learnt, 1.0 * learnt):
+        np.testing.assert_array_equal(memory.get(memory.light(given_light)), light)
+    np.testing.assert_array_equal(memory.get(memory.light(light[::-1])), light[::-1])
+    assert np.isinf(memory.get(memory.light(np.array([[1e300]])))).all()
 
 
 def test_what_cannot_be_is_said():

@@ -290,3 +290,15 @@ def test_rates_add_up_with_everything_on():
     poisson(totals[0][1], 20 * 0.85 * 0.5 * PIXELS * 0.98)
     assert totals[1][1] == pytest.approx(totals[0][1], rel=1e-3)
     assert totals[1][2] == pytest.approx(totals[0][2], rel=1e-3)
+
+
+@pytest.mark.parametrize("rate_hz", [1e-100, 1e-20, 1e-16, 1e-12])
+def test_a_rate_of_next_to_nothing_is_none(rate_hz):
+    """However far off its next event is."""
+    quiet = noisy(random_phase=True, hot_probability=0.5)
+    faint = noisy(
+        random_phase=True, leak_rate_hz=rate_hz, shot_rate_hz=rate_hz, hot_probability=0.5, hot_rate_hz=rate_hz
+    )
+    t_ns = np.arange(0, 50_000_001, 10_000_000)
+    frames = np.random.default_rng(4).random((len(t_ns), *SHAPE)).astype(np.float32) + 0.1
+    same_within_1_us(play(quiet, t_ns, frames), play(faint, t_ns, frames))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vid2ev import Cis, CisSpec, Dvs, DvsSpec, UsageError, events_of, load_sensor
+from vid2ev import Cis, CisSpec, Dvs, DvsSpec, UsageError, events_of, load_cis, load_sensor
 
 
 @pytest.mark.parametrize(
@@ -52,6 +52,13 @@ def test_what_is_not_the_parameters_of_a_sensor_is_refused(spec: Any) -> None:
         Dvs(spec, (2, 2))
     with pytest.raises(UsageError, match=r"expected a CisSpec, such as load_cis\('ideal'\) gives"):
         Cis(spec, (2, 2))
+
+
+@pytest.mark.parametrize(("load", "override"), [(load_sensor, "follower_tau_us=1e-320"), (load_cis, "white_e=5e-324")])
+def test_what_is_nearer_to_nothing_than_any_measure_is_refused(load: Any, override: str) -> None:
+    with pytest.raises(UsageError, match=f"{override.partition('=')[0]} .*: expected 0, or at least 1e-100"):
+        load("paper", [override])
+    assert load("paper", [override.replace("e-3", "e-0")])
 
 
 @pytest.mark.parametrize("transfer", ["x", "gamma:0", 3])

@@ -39,9 +39,9 @@ def shot_of_cell(keys, chance, n, p0, pixels, cell, num, iv):
     while True:
         words = philox(num.seed, SHOT + 256 * num.camera, np.int64(p0 // CELL_PIXELS) | (k << 15), cell)
         place -= log64(unit(words[0])) / per_block
-        local = np.int64(place * CELL_PIXELS)
-        if local >= pixels:
+        if place * CELL_PIXELS >= pixels:  # (and however far beyond)
             return n
+        local = np.int64(place * CELL_PIXELS)
         if n == keys.size:
             return -1
         t_ns = cell * CELL_NS + 1 + np.int64(unit(words[1]) * CELL_NS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -70,13 +71,14 @@ class CardEvents:
     frames: int
     memory: Any
 
-    def of(self, clip: int, frame: int) -> Events:
-        """Those of one interval, on the host."""
-        k = clip * self.frames + frame
-        part, get = slice(int(self.ends[k]), int(self.ends[k + 1])), self.memory.get
+    def of(self, clip: int) -> list[Events]:
+        """Those of each interval of a clip, on the host."""
+        ends = self.ends[clip * self.frames : (clip + 1) * self.frames + 1]
+        part, get = slice(int(ends[0]), int(ends[-1])), self.memory.get
         x, y = get(self.x[part]).astype(np.uint16), get(self.y[part]).astype(np.uint16)
         label = get(self.label[part]) if self.label is not None else None
-        return Events(get(self.t[part]), x, y, get(self.p[part]), label)
+        events = Events(get(self.t[part]), x, y, get(self.p[part]), label)
+        return [events.stretch(*each) for each in pairwise((ends - ends[0]).tolist())]
 
     def __len__(self) -> int:
         return len(self.t)

@@ -40,7 +40,7 @@ class CardWalk:
         self._hot = planes.hot
         self._totals, self._of_walk = (Totals(memory.zeros(TALLIES, np.int64)) for _ in range(2))
         self.upload(planes, np.zeros(TALLIES, np.int64))
-        self._saved = Planes(*(memory.put(plane) for plane in self._padded(planes)))
+        self._saved = Planes(*(memory.zeros(plane.shape, plane.dtype) for plane in self._padded(planes)))
         self._listed = Listed(
             memory.zeros(self._total, np.int64), memory.zeros(self._total, np.int32), memory.zeros(1, np.int64)
         )

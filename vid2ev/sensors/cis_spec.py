@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.physics.adc import Adc
@@ -13,6 +13,7 @@ from vid2ev.physics.electrons import Electrons
 from vid2ev.physics.fixed_pattern import FixedPattern
 from vid2ev.physics.shading import Shading
 from vid2ev.physics.shutter import Shutter
+from vid2ev.sensors.record import Record
 
 NOISELESS = {"noise_lsb": 0.0, "shot_noise": False, "read_noise_e": 0.0, "prnu": 0.0, "dsnu": 0.0}
 EFFECTS = (  # in the order of the path of light
@@ -22,15 +23,13 @@ INSTANT = {"exposure_us": 0.0, "line_us": 0.0}
 
 
 class CisSpec(  # the order of the bases, last to first, is the order of the fields: the path of light
-    Adc, Electrons, FixedPattern, Shading, Shutter, frozen=True, extra="forbid"
+    Adc, Electrons, FixedPattern, Shading, Shutter, Record, frozen=True, extra="forbid"
 ):
     """Parameters of a frame camera; the defaults are the paper's (section IV), where it gives a number.
 
     Raises `pydantic.ValidationError` for an unknown key or a value outside its limits; `vid2ev.load_cis` turns
     that into one sentence.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="constants")
 
     colour: bool = Field(True, description="true: red, green and blue in each pixel; false: luminance")
 

@@ -11,6 +11,8 @@ What is done on the CPU in both cases counts in neither: decoding, motion, pictu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -40,7 +42,11 @@ class Device:
     @property
     def light(self) -> str | None:
         """The device of torch's that light is on; None: light is in arrays."""
-        return {"cuda": "cuda", SIMULATED: "cpu"}.get(self.name)
+        if self.name == "cuda":  # (that of this thread, whichever thread takes light there)
+            import torch
+
+            return f"cuda:{torch.cuda.current_device()}"
+        return "cpu" if self.name == SIMULATED else None
 
     @property
     def memory(self) -> Any:
@@ -97,7 +103,18 @@ def missing_for_cuda() -> str:
         return "torch sees no GPU"
     if find_spec("numba_cuda") is None:
         return "numba-cuda is not installed (pip install 'vid2ev[cuda]')"
-    return ""
+    if not import_module("numba.cuda").is_available():
+        return "numba-cuda finds no compilers (pip install 'vid2ev[cuda]'), or no driver"
+    return _too_new(import_module("numba.cuda.cudadrv.driver").driver.get_version(), version("cuda-bindings"))
+
+
+def _too_new(driver: tuple[int, int], compilers: str) -> str:
+    """What is wrong with a driver of a release of CUDA, and compilers of one; nothing if it can load what they make."""
+    major = int(compilers.partition(".")[0])
+    if driver[0] >= major:
+        return ""
+    said = f"the GPU's driver is for CUDA {driver[0]}.{driver[1]}, and numba-cuda's compilers are for CUDA {major}"
+    return f"{said} (pip install 'vid2ev[cuda12]', or a newer driver)"
 
 
 def memory_of(device: str) -> Any:

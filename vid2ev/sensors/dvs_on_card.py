@@ -89,7 +89,7 @@ class DvsOnCard(Dvs):
     def _some(self, light: Any, t_ns: list[int]) -> list[Events]:
         seen, _ = self._light(light)
         sent = self._card.walk(seen, [self._steps_to(t_ns)])
-        return [self._readout.push(sent.of(0, k), t) for k, t in enumerate(t_ns)]
+        return [self._readout.push(*each) for each in zip(sent.of(0), t_ns, strict=True)]
 
     def state(self) -> dict[str, np.ndarray]:
         """`Dvs.state`: a sensor on a CPU can take it up."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pydantic import ConfigDict, model_validator
+from pydantic import model_validator
 
 from vid2ev.physics.bad_pixels import BadPixels
 from vid2ev.physics.comparator import Comparator
@@ -19,6 +19,7 @@ from vid2ev.physics.photoreceptor_noise import PhotoreceptorNoise
 from vid2ev.physics.refractory import Refractory
 from vid2ev.physics.shading import Shading
 from vid2ev.physics.shot import Shot
+from vid2ev.sensors.record import Record
 
 
 class DvsSpec(  # the order of the bases, last to first, is the order of the fields: the path of light
@@ -35,6 +36,7 @@ class DvsSpec(  # the order of the bases, last to first, is the order of the fie
     PhotoreceptorNoise,
     Photoreceptor,
     Shading,
+    Record,
     frozen=True,
     extra="forbid",
 ):
@@ -43,8 +45,6 @@ class DvsSpec(  # the order of the bases, last to first, is the order of the fie
     Raises `pydantic.ValidationError` for an unknown key or a value outside its limits; `vid2ev.load_sensor` turns
     that into one sentence.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="constants")
 
     @model_validator(mode="after")
     def _noise_needs_two_poles(self) -> DvsSpec:

@@ -42,7 +42,7 @@ class Upload:
 
 def as_array(light: Any) -> np.ndarray:
     """Light, or whatever a device holds, as an array; the very array if it is one."""
-    return light if isinstance(light, np.ndarray) else light.cpu().numpy()  # type: ignore[no-any-return]
+    return light if isinstance(light, np.ndarray) else light.detach().cpu().numpy()  # type: ignore[no-any-return]
 
 
 def downloaded(frame: Frame) -> Frame:

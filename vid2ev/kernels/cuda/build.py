@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import builtins
 import importlib.util
+import threading
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -37,18 +38,23 @@ class Build:
     def __init__(self, exchanged: dict[str, str], parts: tuple[str, ...] = PARTS):
         self._exchanged, self._parts = exchanged, parts
         self._modules: dict[str, Any] = {}
+        self._lock = threading.RLock()  # (a module is there before all of it has been executed)
 
     def module(self, name: str) -> Any:
         """A module of this build."""
-        if name not in self._modules:
-            spec = importlib.util.find_spec(self._exchanged.get(name, name))
-            assert spec is not None and spec.origin is not None and spec.loader is not None
-            module = self._modules[name] = ModuleType(name)
-            module.__dict__.update(
-                __file__=spec.origin, __builtins__=vars(builtins) | {"__import__": self._import}, __spec__=spec
-            )
-            exec(spec.loader.get_code(spec.name), module.__dict__)  # type: ignore[attr-defined]
-        return self._modules[name]
+        with self._lock:
+            if name not in self._modules:
+                self._execute(name)
+            return self._modules[name]
+
+    def _execute(self, name: str) -> None:
+        spec = importlib.util.find_spec(self._exchanged.get(name, name))
+        assert spec is not None and spec.origin is not None and spec.loader is not None
+        module = self._modules[name] = ModuleType(name)
+        module.__dict__.update(
+            __file__=spec.origin, __builtins__=vars(builtins) | {"__import__": self._import}, __spec__=spec
+        )
+        exec(spec.loader.get_code(spec.name), module.__dict__)  # type: ignore[attr-defined]
 
     def _import(self, name: str, globals: Any = None, locals: Any = None, fromlist: Any = (), level: int = 0) -> Any:
         """`from name import ...`: ours, where it is ours."""

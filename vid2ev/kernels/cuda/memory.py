@@ -37,9 +37,8 @@ class Simulated:
         return np.array(array)
 
     def light(self, light: Any) -> Any:
-        """Light as contiguous float32."""
-        with np.errstate(over="ignore"):  # (beyond float32 is infinite, and mended)
-            return np.ascontiguousarray(light, np.float32)
+        """Light, an array or a tensor, as contiguous float32."""
+        return _linear(light.detach().numpy() if hasattr(light, "detach") else light)
 
     def count_to(self, n: int) -> Any:
         """0, 1, ... n - 1."""
@@ -92,6 +91,8 @@ class Card:
         import torch
 
         self.torch, self.device = torch, torch.device(device)
+        if device == "cuda":  # (that of this thread, whichever thread asks next)
+            self.device = torch.device("cuda", torch.cuda.current_device())
 
     def zeros(self, shape: Any, dtype: Any) -> Any:
         return self.put(np.zeros(0, dtype)).new_zeros(shape)
@@ -103,7 +104,8 @@ class Card:
         return array.to("cpu", copy=True).numpy()
 
     def light(self, light: Any) -> Any:
-        return self.torch.as_tensor(light).to(self.device, self.torch.float32).contiguous()
+        light = light.detach() if hasattr(light, "detach") else self.torch.from_numpy(_linear(light))
+        return light.to(self.device, self.torch.float32).contiguous()
 
     def count_to(self, n: int) -> Any:
         return self.torch.arange(n, device=self.device)
@@ -128,14 +130,16 @@ class Card:
 
     def launch(self, kernel: Any, threads: int, *arguments: Any) -> None:
         from numba import cuda
+        from numba.cuda.core import config
 
         from vid2ev.kernels.cuda.strict import strict
 
         if threads == 0:
             return
-        ours = self.torch.cuda.current_stream().cuda_stream
-        stream = cuda.external_stream(ours) if ours else 0
-        with strict():  # (the first launch compiles)
+        config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # (small sensors have few pixels)
+        with strict(), self.torch.cuda.device(self.device):  # (the first launch compiles)
+            ours = self.torch.cuda.current_stream().cuda_stream
+            stream = cuda.external_stream(ours) if ours else 0
             kernel[-(-threads // THREADS), THREADS, stream](*(_seen(argument) for argument in arguments))
 
     def kernels(self, flags: Flags) -> Any:
@@ -143,6 +147,12 @@ class Card:
 
     def module(self, name: str) -> Any:
         return _build("cuda").module(name)
+
+
+def _linear(light: Any) -> np.ndarray:
+    """An array as one of float32 that a tensor can share."""
+    with np.errstate(over="ignore"):  # (beyond float32 is infinite, and mended)
+        return np.require(light, np.float32, ["C", "W"])
 
 
 def _seen(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
