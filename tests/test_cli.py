@@ -16,6 +16,7 @@ import av
 import click
 import numpy as np
 import pytest
+import torch
 from click.testing import CliRunner, Result
 
 from vid2ev import UsageError, conversion, instants
@@ -332,6 +333,16 @@ def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Recipe, "of", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         vid2ev("convert", CLIP)
+
+
+def test_a_full_memory_of_a_gpu_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.\nGPU 0 has ...")
+
+    monkeypatch.setattr(Recipe, "of", full)
+    result = vid2ev("convert", CLIP)
+    assert result.exit_code == 1 and result.stderr.startswith("error: the GPU's memory is full; take smaller")
+    assert result.stderr.count("\n") == 1
 
 
 def test_every_error_raised_on_purpose_has_its_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:

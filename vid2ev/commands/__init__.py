@@ -17,6 +17,7 @@ import click
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
+MEMORY_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or --device cpu"
 
 
 class Commands(click.Group):
@@ -52,6 +53,11 @@ class Commands(click.Group):
             said = DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
             click.echo(f"error: {said}", err=True)
             sys.exit(said.exit_code)
+        except RuntimeError as error:
+            if type(error).__name__ != "OutOfMemoryError":  # (torch's: to import it takes a second)
+                raise
+            click.echo(f"error: {MEMORY_FULL}", err=True)
+            sys.exit(DataError.exit_code)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
