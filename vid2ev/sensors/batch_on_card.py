@@ -13,9 +13,9 @@ from vid2ev.sensors.batch import cameras_of
 from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
 from vid2ev.sensors.clock import Clock, Step, first_count, pace_of
-from vid2ev.sensors.compiled import flags_of, numbers_of, planes_of
+from vid2ev.sensors.compiled import flags_of, numbers_of
 from vid2ev.sensors.limits import check_sensor, check_spec
-from vid2ev.sensors.pixel_planes import pixel_planes
+from vid2ev.sensors.pixel_planes import blank_planes
 from vid2ev.sensors.spec import DvsSpec
 
 
@@ -56,9 +56,7 @@ class DvsBatchOnCard:
         if any(spec.delay_us > 0 or spec.frame_rate_hz > 0 for spec in specs):
             raise UsageError("a batch of sensors with delay or fixed rate: expected neither; use a DvsBatch")
         self._numbers = [numbers_of(*each) for each in zip(specs, seeds, cameras, strict=True)]
-        each = [planes_of(spec, self._flags, num, *size) for spec, num in zip(specs, self._numbers, strict=True)]
-        planes = pixel_planes([planes for planes, _ in each], self._flags, size[0] * size[1])
-        bad = np.concatenate([bad for _, bad in each])
+        planes, bad = blank_planes(self._memory, specs, self._flags, self._numbers, size)
         phases = [spec.random_phase for spec in specs]
         self._walk = CardWalk(self._memory, self._flags, self._numbers, size, planes, bad, phases, self.labels)
         self._clocks: list[Clock] = []

@@ -18,7 +18,8 @@ from vid2ev.sensors.proposed import none_proposed, proposed
 class CardWalk:
     """State of the pixels of some sensors of size (width, height) on a device.
 
-    `planes` is their state pixel by pixel, one sensor after the other (`vid2ev.sensors.pixel_planes`).
+    `planes` is their state, on the device, pixel by pixel, one sensor after the other (`vid2ev.sensors.pixel_planes`),
+    and `bad` their maps of bad pixels, on the host.
     """
 
     def __init__(
@@ -37,10 +38,10 @@ class CardWalk:
         self._pixels, self._total = size[0] * size[1], size[0] * size[1] * len(self._numbers)
         self._kernels = memory.kernels(flags)
         self._bad, self._phase = memory.put(bad), memory.put(np.array(random_phase, np.uint8))
-        self._hot = planes.hot
-        self._totals, self._of_walk = (Totals(memory.zeros(TALLIES, np.int64)) for _ in range(2))
-        self.upload(planes, np.zeros(TALLIES, np.int64))
-        self._saved = Planes(*(memory.zeros(plane.shape, plane.dtype) for plane in self._padded(planes)))
+        self._hot = np.flatnonzero(bad == 1)
+        self._of_walk = Totals(memory.zeros(TALLIES, np.int64))
+        self.be(planes, np.zeros(TALLIES, np.int64))
+        self._saved = Planes(*(memory.like(plane) for plane in planes))
         self._listed = Listed(
             memory.zeros(self._total, np.int64), memory.zeros(self._total, np.int32), memory.zeros(1, np.int64)
         )
@@ -49,10 +50,9 @@ class CardWalk:
         self._floats = memory.put(np.array([floats for floats, _ in rows]))
         self._ints = memory.put(np.array([ints for _, ints in rows]))
 
-    def upload(self, planes: Planes, tallies: np.ndarray) -> None:
+    def be(self, planes: Planes, tallies: np.ndarray) -> None:
         """Take up a state, and what has been counted until then."""
-        self._totals = Totals(self.memory.put(tallies))
-        self._planes = Planes(*(self.memory.put(plane) for plane in self._padded(planes)))
+        self._planes, self._totals = planes, Totals(self.memory.put(tallies))
 
     def download(self) -> dict[str, np.ndarray]:
         """The state, by the names of the planes."""
@@ -131,6 +131,3 @@ class CardWalk:
         t0_ns = [row[0][0].t0_ns for row in steps]
         t1_ns = [row[-1][0].t0_ns + int(row[-1][0].dt_ns) for row in steps]
         return proposed(self.memory, self._kernels.propose, seen, self._hot, self._numbers, t0_ns, t1_ns)
-
-    def _padded(self, planes: Planes) -> Planes:
-        return Planes(*(plane if plane.size else np.zeros(1, plane.dtype) for plane in planes))

@@ -18,6 +18,14 @@ from vid2ev.sensors.spec import DvsSpec
 
 F = np.float32
 UNUSED = 2  # (a single entry is never spread out)
+RECORDS: dict[str, tuple[type, tuple[int, ...]]] = {  # the planes that only the slow path touches
+    "memory": (np.float64, ()),
+    "theta": (np.float32, (2,)),
+    "drawn": (np.float32, (2,)),
+    "t_last": (np.int64, ()),
+    "t_reset": (np.int64, ()),
+    "count": (np.uint32, ()),
+}
 
 
 def flags_of(spec: DvsSpec, labels: bool) -> Flags:
@@ -92,19 +100,25 @@ def planes_of(
     `old` planes of the same size and flags are used again.
     """
     pixels = width * height
-    if spec.hot_probability > 0 or spec.cold_probability > 0:
-        bad = bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
-    else:
-        bad = np.zeros(pixels, np.uint8)
-    wanted = kept_of(flags, num)
+    bad, wanted = bad_of(spec, num, pixels), kept_of(flags, num)
     if old is None or any(len(getattr(old, name)) != (pixels if kept else UNUSED) for name, kept in wanted.items()):
         old = blank_planes(pixels, flags, wanted)
     old.rest[...], old.count[...] = 0, 0
     if wanted["theta"]:
         fill_thresholds(old.theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
-    hot = np.flatnonzero(bad == 1).astype(np.int32)
-    shade = shading_map(spec.shading, width, height).ravel() if spec.shading else np.ones(1, np.float32)
-    return old._replace(hot=hot, shade=shade), bad
+    return old._replace(hot=np.flatnonzero(bad == 1).astype(np.int32), shade=shade_of(spec, width, height)), bad
+
+
+def bad_of(spec: DvsSpec, num: Numbers, pixels: int) -> np.ndarray:
+    """The map of bad pixels [uint8]: 1 hot, 2 cold."""
+    if spec.hot_probability > 0 or spec.cold_probability > 0:
+        return bad_pixel_map(pixels, num.seed, num.camera, spec.hot_probability, spec.cold_probability)
+    return np.zeros(pixels, np.uint8)
+
+
+def shade_of(spec: DvsSpec, width: int, height: int) -> np.ndarray:
+    """The optical gain of the pixels [float32]; of all together, where it is that of none."""
+    return shading_map(spec.shading, width, height).ravel() if spec.shading else np.ones(1, np.float32)
 
 
 def kept_of(flags: Flags, num: Numbers) -> dict[str, bool]:
@@ -137,20 +151,12 @@ def records_of(pixels: int, wanted: dict[str, bool]) -> dict[str, np.ndarray]:
     All planes are spread out in memory, used or not, so that their types are the same; a memory alone is not, which
     would take twice the room.
     """
-    fields: dict[str, tuple[type, tuple[int, ...]]] = {
-        "memory": (np.float64, ()),
-        "theta": (np.float32, (2,)),
-        "drawn": (np.float32, (2,)),
-        "t_last": (np.int64, ()),
-        "t_reset": (np.int64, ()),
-        "count": (np.uint32, ()),
-    }
-    used = [(name, *field) for name, field in fields.items() if wanted[name]]
+    used = [(name, *field) for name, field in RECORDS.items() if wanted[name]]
     record = np.dtype(used, align=True)
     records = aligned(pixels * record.itemsize, np.uint8).view(record)
     return {
         name: records[name] if wanted[name] else np.zeros((2 * UNUSED, *shape), kind)[::2]
-        for name, (kind, shape) in fields.items()
+        for name, (kind, shape) in RECORDS.items()
     }
 
 

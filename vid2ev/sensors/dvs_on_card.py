@@ -12,7 +12,7 @@ from vid2ev.kernels.layout import PITCH, stride_of
 from vid2ev.sensors.card_walk import CardWalk
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.inside import Inside
-from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes
+from vid2ev.sensors.pixel_planes import by_block, fast_by_block, pixel_planes, uploaded
 from vid2ev.sensors.pixels import STATE_PLANES
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
@@ -99,7 +99,7 @@ class DvsOnCard(Dvs):
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """`Dvs.restore`: also of what a sensor on a CPU gave."""
         super().restore(state)
-        self._card.upload(self._planes_of_pixels(), self._pixels.tallies[0])
+        self._card.be(self._planes_of_pixels(), self._pixels.tallies[0])
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """`Dvs.inside`."""
@@ -131,7 +131,8 @@ class DvsOnCard(Dvs):
         self._card.settle(flat, [t_ns], [count])
 
     def _planes_of_pixels(self) -> Any:
-        return pixel_planes([self._pixels.planes], self._pixels.flags, self._pixels.bad.size)
+        planes = pixel_planes(self._pixels.planes, self._pixels.flags, self._pixels.bad.size)
+        return uploaded(self._memory, planes)
 
     def _download(self) -> None:
         """The state of the device into the planes of the walk on a CPU."""

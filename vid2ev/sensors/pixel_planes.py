@@ -3,30 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from vid2ev.kernels.layout import BLOCK, HIGH, LOW, PITCH, Flags, Planes, stride_of
+from vid2ev.kernels.layout import BLOCK, HIGH, LOW, PITCH, Flags, Numbers, Planes, stride_of
+from vid2ev.physics.mismatch import fill_thresholds
+from vid2ev.sensors.compiled import RECORDS, UNUSED, bad_of, kept_of, shade_of
+from vid2ev.sensors.spec import DvsSpec
 
 
-def pixel_planes(each: Sequence[Planes], flags: Flags, pixels: int) -> Planes:
-    """The planes of some sensors of so many pixels and the same effects, one after the other."""
+def pixel_planes(planes: Planes, flags: Flags, pixels: int) -> Planes:
+    """The planes of a sensor of so many pixels."""
     count = int(stride_of(flags)) // PITCH
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in Planes._fields}
-    for k, planes in enumerate(each):
-        parts["fast"].append(by_pixel(planes.fast, pixels, count).reshape(-1))
-        parts["rest"].append(by_pixel(planes.rest, pixels, 2).reshape(-1) if planes.rest.size else planes.rest)
-        parts["hot"].append(k * pixels + planes.hot.astype(np.int64))
-    for name in ("memory", "theta", "drawn", "t_last", "count", "t_reset", "shade"):
-        parts[name] = _alike([np.ascontiguousarray(getattr(planes, name)) for planes in each], pixels)
-    return Planes(**{name: np.concatenate(part) for name, part in parts.items()})
+    rest = by_pixel(planes.rest, pixels, 2) if planes.rest.size else planes.rest
+    parts = {name: np.ascontiguousarray(getattr(planes, name)) for name in RECORDS}
+    parts |= {"fast": by_pixel(planes.fast, pixels, count).reshape(-1), "rest": rest.reshape(-1)}
+    return planes._replace(hot=planes.hot.astype(np.int64), **parts)
 
 
-def _alike(planes: list[np.ndarray], pixels: int) -> list[np.ndarray]:
-    """One plane of some sensors: with room for each pixel of all, if any of them uses its own, or else for a few."""
-    if not any(len(plane) == pixels for plane in planes):
-        return planes[:1]
-    return [plane if len(plane) == pixels else np.repeat(plane[:1], pixels, axis=0) for plane in planes]
+def uploaded(memory: Any, planes: Planes) -> Planes:
+    """The same planes on a device, where none is empty."""
+    return Planes(*(memory.put(plane if plane.size else np.zeros(1, plane.dtype)) for plane in planes))
+
+
+def blank_planes(
+    memory: Any, specs: Sequence[DvsSpec], flags: Flags, numbers: Sequence[Numbers], size: tuple[int, int]
+) -> tuple[Planes, np.ndarray]:
+    """The planes on a device of sensors of one size and the same effects, one after the other, yet without light, and
+    their maps of bad pixels [uint8].  A plane has room for all, if any sensor uses its own, or else for a few."""
+    pixels, used = size[0] * size[1], [kept_of(flags, num) for num in numbers]
+    total, thetas = len(specs) * pixels, np.zeros((len(specs), pixels, 2), np.float32)
+    for theta, spec, num in zip(thetas, specs, numbers, strict=True):
+        if num.mismatch > 0:
+            fill_thresholds(theta, num.seed, num.camera, 0, spec.threshold_on, spec.threshold_off, spec.mismatch)
+    room = {name: total if any(each[name] for each in used) else UNUSED for name in RECORDS}
+    records = {name: memory.zeros((room[name], *shape), kind) for name, (kind, shape) in RECORDS.items()}
+    records["theta"] = memory.put(thetas.reshape(-1, 2)[: room["theta"]])
+    bad = np.concatenate([bad_of(spec, num, pixels) for spec, num in zip(specs, numbers, strict=True)])
+    shades = [shade_of(spec, *size) for spec in specs]
+    shaded = any(spec.shading for spec in specs)
+    planes = Planes(
+        fast=memory.zeros(total * (int(stride_of(flags)) // PITCH), np.float32),
+        rest=memory.zeros(2 * total if flags.poles and not flags.log_input else 1, np.float32),
+        hot=memory.zeros(1, np.int64),  # (what they send is proposed apart: `proposed`)
+        shade=memory.put(np.concatenate([np.broadcast_to(each, pixels) for each in shades]) if shaded else shades[0]),
+        **records,
+    )
+    return planes, bad
 
 
 def by_pixel(plane: np.ndarray, pixels: int, count: int) -> np.ndarray:

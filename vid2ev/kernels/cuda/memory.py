@@ -28,6 +28,10 @@ class Simulated:
         """An array of zeros."""
         return np.zeros(shape, dtype)
 
+    def like(self, array: Any) -> Any:
+        """A device's array of the same shape and type, with anything in it."""
+        return np.empty_like(array)
+
     def put(self, array: np.ndarray) -> Any:
         """A copy of an array, on the device."""
         return np.array(array)
@@ -96,6 +100,9 @@ class Card:
 
     def zeros(self, shape: Any, dtype: Any) -> Any:
         return self.put(np.zeros(0, dtype)).new_zeros(shape)
+
+    def like(self, array: Any) -> Any:
+        return self.torch.empty_like(array)
 
     def put(self, array: np.ndarray) -> Any:
         return self.torch.from_numpy(np.array(array).view(SIGNED.get(array.dtype, array.dtype))).to(self.device)
