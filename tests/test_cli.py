@@ -227,11 +227,17 @@ def test_an_upsampling_that_nobody_has(source: str) -> None:
         ("holds files", ["-o", "photos"]),
         ("is a file", ["-o", "file"]),
         ("within", ["-o", "."]),
+        ("from 1 to 65536", ["--subframes", "100000"]),
+        ("from 1 to 65536", ["--max-subframes", "100000"]),
+        ("at least 1e-09", ["--set", "frame_rate_hz=1e-30"]),
+        ("from 1e-06", ["--fps", "1e-300"]),
+        ("loop is a link", ["-o", "loop"]),
     ],
 )
 def test_values_that_cannot_be(sentence: str, arguments: list[str]) -> None:
     Path("photos").mkdir()
     Path("photos/one.png").touch()
+    Path("loop").symlink_to("loop")
     Path("file").touch()
     refused(2, sentence, "convert", CLIP, *arguments, *QUICK)
     refused(2, sentence, "convert", CLIP, *arguments, *QUICK, "--dry-run")

@@ -53,6 +53,26 @@ def test_what_does_not_count_changes_no_bit(reference: Path, tmp_path: Path, cha
     assert (tmp_path / "out" / "preview.mp4").exists() == changed.get("preview", True)
 
 
+@pytest.mark.parametrize("upsample", ["none", "linear", "flow"])
+def test_frames_may_be_days_apart(tmp_path: Path, upsample: str) -> None:
+    """A time lapse: what a sensor cannot take at a time it is given in parts."""
+    texture = np.random.default_rng(0).uniform(0.2, 1, (12, 16)).astype(np.float32)
+    np.save(tmp_path / "lapse.npy", np.stack([texture, texture, 0.7 * texture, 1.4 * texture]))
+    np.save(tmp_path / "lapse_timestamps.npy", np.array([0.0, 0.04, 86400.0, 86400.04]))
+    sensor = ["random_phase=true", "mismatch=0", "crossing_noise=0"]
+    made = convert(tmp_path / "lapse.npy", tmp_path / "out", "ideal", sensor, upsample=upsample)
+    assert made["duration_us"] == 86_400_040_000 and made["counts"]["frames"] == 4
+    assert made["counts"]["on"] > 3 * 12 * 16 and made["counts"]["off"] > 12 * 16
+    assert made["counts"]["subframes"] >= 4
+
+
+@pytest.mark.parametrize("fps", [3e6, 1e7, 1e9])
+def test_frames_may_be_less_than_a_microsecond_apart(tmp_path: Path, fps: float) -> None:
+    np.save(tmp_path / "fast.npy", np.random.default_rng(0).uniform(0.2, 1, (5, 12, 16)).astype(np.float32))
+    made = convert(tmp_path / "fast.npy", tmp_path / "out", "ideal", fps=fps, upsample="none")
+    assert made["counts"]["frames"] == 5 and made["counts"]["on"] > 0
+
+
 def test_what_is_counted_goes_on_where_a_conversion_was_paused(tmp_path: Path) -> None:
     """Frames, sub-frames and intervals that asked for more of them, and what the sensor has counted."""
     texture = cv2.GaussianBlur(np.random.default_rng(0).uniform(0, 1, (48, 100)).astype(np.float32), (0, 0), 2)

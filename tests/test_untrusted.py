@@ -21,7 +21,7 @@ import torch
 from interp import weights
 from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
-from vid2ev.commands.batch import sources_in
+from vid2ev.commands.batch import _listed, sources_in
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import open_events, recognise
 from vid2ev.light.picture_files import read_picture
@@ -41,7 +41,7 @@ from vid2ev.sources import open_source
 from vid2ev.sources.motion import parse_motion
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.toml_text import parsed_toml
-from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes, read_arrays
+from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes, read_arrays, read_text
 
 MEGABYTE = 1 << 20
 
@@ -185,7 +185,9 @@ def test_a_png_takes_no_room_for_what_it_has_not(tmp_path: Path) -> None:
                 reads(place)
 
 
-@pytest.mark.parametrize("read", [head_of, read_arrays, recognise])
+@pytest.mark.parametrize(
+    "read", [head_of, read_arrays, recognise, read_text, read_rig, read_poses, read_timestamps, _listed]
+)
 def test_a_pipe_is_said_to_be_one_and_not_waited_for(read: Callable[[Path], object], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     pipe = os.open(tmp_path / "pipe", os.O_RDWR)

@@ -198,13 +198,15 @@ def _recorded(
     course: _Course,
 ) -> Recorder:
     """A recording made to its end, from the last checkpoint on, or by new plans from the beginning."""
+    began = time.monotonic()
     if planner:
         done = progress_of(folder)
         planner.begin(done.looked, done.ended)
         recipe = planner.left
     recorder = make(recipe)
     recorder.take_up()
-    while not recorder.done.finished and not _record(recorder, planner, course):
+    began -= recorder.done.seconds
+    while not recorder.done.finished and not _record(recorder, planner, course, began):
         assert planner
         recorder.give_up()
         if recorder.done.by_hand:
@@ -218,10 +220,11 @@ def _ends(frames: int, _: Recipe, done: Progress) -> bool:
     return done.frames >= frames
 
 
-def _record(recorder: Recorder, planner: Planner | None, course: _Course) -> bool:
-    """From the point of the last checkpoint to the end of the source; returns False where there are new plans."""
+def _record(recorder: Recorder, planner: Planner | None, course: _Course, began: float) -> bool:
+    """From the point of the last checkpoint to the end of the source; returns False where there are new plans.  Work
+    on it `began` [s of the monotonic clock], with that of earlier runs."""
     recipe, done = recorder.recipe, recorder.done
-    began, limited_before, work = time.monotonic() - done.seconds, done.limited, 0
+    limited_before, work = done.limited, 0
     coming = planner.instants if planner else partial(instants, recorder.seen, device=recorder.device)
     with closing(coming(done.warmed + max(done.frames - 1, 0))) as seen:
         first = next(seen, None)

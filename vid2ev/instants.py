@@ -19,6 +19,7 @@ from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.mounts import Mount
 from vid2ev.recipe import Recipe
 from vid2ev.rig.depth import between
+from vid2ev.sensors.clock import LONGEST_INTERVAL_NS
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sight import Sight, Stage, arriving
@@ -30,6 +31,7 @@ from vid2ev.stream.upload import Upload, as_array, downloaded
 from vid2ev.truth import Truth, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
+from vid2ev.upsample.linear import LinearUpsampling
 from vid2ev.upsample.none import NoUpsampling
 
 LEAST_AHEAD, MOST_AHEAD = 4, 16  # frames made in advance, while the sensors work: between them as many as
@@ -169,7 +171,10 @@ def _intervals(recipe: Recipe, start: int, upload: Upload | None) -> Generator[I
         if index == start:
             yield Interval(iter([frame]))
         elif before is not None and index > start:
+            gap_ns = frame.t_ns - before.t_ns
             method = straight if cuts.unrelated else upsampler
+            if gap_ns >= LONGEST_INTERVAL_NS:  # (more than a sensor takes at a time)
+                method = LinearUpsampling(gap_ns // LONGEST_INTERVAL_NS + 1, upload)
             interval = method.between(before, replace(frame, cut=cut))
             yield interval if frame.depth is None else replace(interval, frames=_filled(interval, before, frame))
         before = frame

@@ -61,8 +61,9 @@ def check_file(path: Path) -> None:
 def read_text(path: Path) -> str:
     """A text in UTF-8, without the mark that Windows puts before it.
 
-    Raises OSError, UnicodeDecodeError, DataError for one that is too long to be meant.
+    Raises OSError, UnicodeDecodeError, DataError for a pipe, and for one that is too long to be meant.
     """
+    check_file(path)
     size = path.stat().st_size if path.is_file() else 0
     if size > TEXT_MB << 20:
         raise DataError(f"{path}: {size:,} bytes are too many for such a text; expected at most {TEXT_MB} MB")

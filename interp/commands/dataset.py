@@ -69,7 +69,7 @@ def dataset(
     from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import counting
     from vid2ev.commands.worker_options import workers_of
-    from vid2ev.errors import UsageError
+    from vid2ev.errors import UsageError, clause
     from vid2ev.sensors.tiles import usable_cores
 
     workers = workers_of(options, usable_cores())
@@ -77,7 +77,9 @@ def dataset(
     try:
         spec = DatasetSpec(videos=found, size=_size(size), **options)
     except ValidationError as error:
-        raise UsageError(error.errors()[0]["msg"].removeprefix("Value error, ")) from error
+        complaint = error.errors()[0]
+        named = f"--{str(complaint['loc'][0]).replace('_', '-')} {complaint['input']}: " if complaint["loc"] else ""
+        raise UsageError(named + clause(complaint["msg"])) from error
     quiet |= as_json
     share = partial(shared_out, noun="scenes", quiet=quiet, said=_said)
     with counting(quiet, SCENES) as report:

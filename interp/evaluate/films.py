@@ -19,9 +19,10 @@ from interp.evaluate.group import Cameras, Group
 from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
+from interp.own_codes import curve_of
 from interp.representation.event_counts import count_events
 from vid2ev import Events
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import is_scene
 
 SLOW_HZ = 240.0
@@ -62,7 +63,9 @@ class Film:
         self.name, self.video, self._protocol, self._limit = name, video, protocol, limit
         self.multiple, self._simulated, self._told = protocol.multiple, simulated, Told()
         source = simulated.opened(video)
-        self.size, self.frames = source.size, source.frames_expected or 0
+        if not source.rewindable:
+            raise UsageError(f"{video} can be read once only; save it as a file to score methods on it")
+        self.size, self.frames, self.curve = source.size, source.frames_expected or 0, curve_of(source.describe())
         count = max(self.frames - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
         path = Path(video)
@@ -109,7 +112,8 @@ class Film:
         return {
             "kind": "scene" if is_scene(self.video) else "video", "frames": told.frames, "size": list(self.size),
             "event_size": list(self.size), "sensor": self._simulated.name, "rate_hz": round(told.rate_hz, 3),
-            "groups": told.groups, "not_scored": told.not_scored, "remarks": [*remarks, *told.remarks],
+            "curve": self.curve, "groups": told.groups, "not_scored": told.not_scored,
+            "remarks": [*remarks, *told.remarks],
         }  # fmt: skip
 
     def _group(self, number: int, part: list[Seen], events: Events) -> Group:
@@ -121,7 +125,8 @@ class Film:
         truth = np.stack([part[k].codes for k in protocol.positions])
         times_us = np.array([each.t_us for each in part])
         cameras = Cameras(disparity_px=0.0, offset_us=0.0)  # (one place, one clock; how it was exposed, nobody knows)
-        return Group(number, number * self.multiple, keys, protocol.positions, truth, times_us, counts, cameras)
+        first, positions = number * self.multiple, protocol.positions
+        return Group(number, first, keys, positions, truth, times_us, counts, cameras, self.curve)
 
 
 def _after(events: Events, t_us: int) -> Events:

@@ -31,12 +31,13 @@ class Group:
 
     number     of the group in its sequence
     first      number of its first key frame among the frames of the sequence
-    keys       the key frames, sRGB codes uint8 [2, H, W, 3]
+    keys       the key frames, codes uint8 [2, H, W, 3]
     positions  places of the frames to score, 1 ... skip
     truth      these frames, likewise [N, H, W, 3]
     times_us   times of all its frames, int64 [skip + 2]
     events     between the key frames
     cameras    what is known of the cameras
+    curve      the transfer curve of the codes
     """
 
     number: int
@@ -47,6 +48,7 @@ class Group:
     times_us: np.ndarray
     events: EventCounts
     cameras: Cameras
+    curve: str = "srgb"
 
     @property
     def gap_us(self) -> int:

@@ -19,6 +19,7 @@ from interp.evaluate.group import Footage, Group
 from interp.evaluate.identity import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
+from interp.own_codes import recoded, shown
 from interp.pretrained import OF_RUN
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
@@ -74,10 +75,11 @@ class OfMethod:
 
     def frames(self, group: Group) -> Sequence[np.ndarray | None]:
         """See `Rebuilder`."""
-        keys = as_tensor(group.keys).to(self.device)
+        keys = as_tensor(shown(group.keys, group.curve)).to(self.device)
         gap = Gap(keys[0], keys[1], group.events.to(self.device), group.gap_us)
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
-        return list(self.protocol.coded(self.method.between(gap, targets)[self.protocol.picked]))
+        made = self.method.between(gap, targets)[self.protocol.picked]
+        return list(self.protocol.coded(recoded(made, group.curve)))
 
 
 def methods_of(

@@ -12,12 +12,11 @@ from interp.candidates.bridge import DARK
 from interp.evaluate.group import Group
 from interp.evaluate.protocol import range_of
 from interp.evaluate.row import Row
+from interp.own_codes import light_of
 from vid2ev.compare.pictures import highest, lowest, moments, moving, psnr, psnr_of_mean, squared_error
-from vid2ev.light.transfer import parse_transfer
 from vid2ev.stream.frames import LUMINANCE
 from vid2ev.upsample.motion import MotionEstimator
 
-LIGHT = parse_transfer("srgb").to_light(np.arange(256) / 255).astype(np.float32)  # of codes
 LEAST_EXPLAINED = 0.25  # of what changes: of pans that are found 0.87 and more, of others up to 0.12; films 0.4 to 0.9
 
 
@@ -32,7 +31,8 @@ def rows_of(
     return [
         Row(
             sequence=sequence, method=method, group=group.number, position=position,
-            multiple=len(group.times_us) - 1, t_us=int(group.times_us[position]), contrast=contrast_of(true),
+            multiple=len(group.times_us) - 1, t_us=int(group.times_us[position]),
+            contrast=contrast_of(true, group.curve),
             **scores_of(picture, true, group.keys), **conditions,
         )
         for position, true, picture in zip(group.positions, group.truth, made, strict=True)
@@ -59,7 +59,7 @@ def scores_of(made: np.ndarray, true: np.ndarray, keys: np.ndarray) -> dict[str,
 
 def conditions_of(group: Group) -> dict[str, float]:
     """What makes a group hard, by the names of a row."""
-    first, last = (LIGHT[key] @ LUMINANCE for key in group.keys)
+    first, last = (light_of(group.curve)[key] @ LUMINANCE for key in group.keys)
     motion = MotionEstimator().between(first, last)
     moved = motion.shift_px if motion.explained >= LEAST_EXPLAINED else math.nan
     height, width = group.events.off_on.shape[-2:]
@@ -73,6 +73,6 @@ def conditions_of(group: Group) -> dict[str, float]:
     }
 
 
-def contrast_of(true: np.ndarray) -> float:
+def contrast_of(true: np.ndarray, curve: str = "srgb") -> float:
     """Standard deviation of the log light of a picture uint8 [H, W, 3] [nat]."""
-    return float(np.log(LIGHT[true] @ LUMINANCE + np.float32(DARK)).std(dtype=np.float64))
+    return float(np.log(light_of(curve)[true] @ LUMINANCE + np.float32(DARK)).std(dtype=np.float64))

@@ -12,9 +12,9 @@ import numpy as np
 
 from interp.data.chance import chance
 from interp.data.sensor_ranges import SENSORS
+from interp.own_codes import codes_of, curve_of
 from vid2ev import Dvs, DvsSpec, Events, load_sensor, open_source
 from vid2ev.instants import Instant, instants
-from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.recipe import Recipe
 from vid2ev.sources import is_scene
 from vid2ev.sources.source import Source
@@ -27,7 +27,7 @@ DENSER = 4  # instants of a scene's light for each frame of the truth
 class Seen(NamedTuple):
     """A frame of a film.
 
-    codes    sRGB, uint8 [H, W, 3]
+    codes    by the film's curve (`interp.own_codes`), uint8 [H, W, 3]
     t_us     its time
     events   since the frame before
     shot     whether a new shot has begun since then
@@ -84,10 +84,10 @@ class Simulated:
         edited = self.edited(video)
         denser = {"fps": DENSER * edited["fps"]} if is_scene(video) else {}
         recipe = Recipe.of(video, self.spec, seed=self.seed, **(edited | denser))
-        dvs = recipe.mounts[0].dvs()
+        dvs, curve = recipe.mounts[0].dvs(), curve_of(film.describe())
         with closing(instants(recipe)) as light:
             for frame in film.frames():
-                yield Seen(srgb_codes(frame.light), frame.t_ns // 1000, *_until(frame.t_ns, light, dvs))
+                yield Seen(codes_of(frame.light, curve), frame.t_ns // 1000, *_until(frame.t_ns, light, dvs))
 
 
 def _until(t_ns: int, light: Iterator[Instant], dvs: Dvs) -> tuple[Events, bool]:

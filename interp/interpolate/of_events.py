@@ -69,7 +69,7 @@ class OfEventFile:
     Raises UsageError where it has no frames, or none in the part asked for.
     """
 
-    curve = "srgb"
+    curve = coded = "srgb"
     bits = 8
     apart = False  # one sensor
 

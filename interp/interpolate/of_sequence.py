@@ -26,7 +26,7 @@ class OfSequence:
     Raises UsageError where no frame lies in the part asked for.
     """
 
-    curve = "srgb"
+    curve = coded = "srgb"
     bits = 8
 
     def __init__(self, folder: Path, options: Options):

@@ -14,11 +14,10 @@ import torch
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
+from interp.own_codes import BRIGHT, curve_of
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
-
-BRIGHT = ("pq", "hlg", "log100", "log316", "linear")  # curves of more light than a film of 8 bits holds
 
 
 class OfSource:
@@ -53,7 +52,7 @@ class OfSource:
         said = str(self._about.get("transfer", "srgb"))
         whole = said == "srgb" and "edits" not in self._about
         self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
-        self.curve = "bt709" if said in BRIGHT else said
+        self.curve, self.coded = "bt709" if said in BRIGHT else said, curve_of(self._about)
         rate = self._about.get("fps") or self._about.get("rate")
         self.rate = Fraction(rate) if rate else self._mean_rate()
 

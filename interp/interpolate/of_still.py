@@ -38,7 +38,7 @@ class OfStill:
     Raises UsageError where there is no picture, or are no events, DataError for files that hold none.
     """
 
-    curve = "srgb"
+    curve = coded = "srgb"
     apart = False
 
     def __init__(self, picture: Path, events: Path, options: Options):

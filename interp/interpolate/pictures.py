@@ -1,6 +1,7 @@
 """Frames as pictures: codes of a film, codes or light in files.
 
-png    sRGB codes of 8 bits, or 16 where the source has more than 8; those of key frames are the source's own
+png    codes of 8 bits, or 16 where the source has more than 8, by the source's own curve (`interp.own_codes`): those of
+       key frames are the source's own
 mp4    codes of 8 bits by the source's own curve, so that the film is as bright as the source
 exr    float32, linear light, white at 1.0 and no upper end; needs the package OpenEXR
 """
@@ -18,6 +19,7 @@ from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.take import Take
 from interp.light import to_light
+from interp.own_codes import recoded
 from vid2ev.errors import UsageError
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.light.transfer import parse_transfer
@@ -33,22 +35,22 @@ class Pictures:
 
     kind    mp4, png or exr
     bits    8 or 16, of PNG
-    curve   of a film
+    curve   of films and PNG; EXR are linear
     Raises UsageError for EXR without the package.
     """
 
     def __init__(self, kind: str, bits: int, curve: str):
-        self.kind, self.bits, self.curve = kind, bits if kind == "png" else 8, curve
+        self.kind, self.bits, self.curve = kind, bits if kind == "png" else 8, "linear" if kind == "exr" else curve
         self._write = None
         if kind == "exr":
             from vid2ev.scenes.picture_writing import writer_of
 
             self._write = writer_of("exr")[0]
-        self._film = _by_curve(curve) if kind == "mp4" and curve != "srgb" else None
+        self._table = _by_curve(curve) if self.bits == 8 and self.curve not in ("srgb", "linear") else None
 
     def describe(self) -> str:
         """For people, and for JSON."""
-        return {"png": f"png of {self.bits} bits", "mp4": f"mp4 by the curve {self.curve}", "exr": "exr"}[self.kind]
+        return "exr" if self.kind == "exr" else f"{self.kind} of {self.bits} bits by the curve {self.curve}"
 
     def picture(self, frame: Filled) -> np.ndarray:
         """What is written of a frame: codes, or light [H, W, 3]."""
@@ -57,10 +59,11 @@ class Pictures:
             light = to_light(torch.from_numpy(np.ascontiguousarray(codes)), "srgb").numpy()
             return light if light.shape[2] == 3 else np.repeat(light, 3, axis=2)
         codes = np.clip(codes if codes.shape[2] == 3 else codes[..., 0], 0, 1)
-        if self._film is not None:
-            return self._film[np.rint(codes * np.float32(TABLE)).astype(np.uint16)]
+        if self._table is not None:
+            return self._table[np.rint(codes * np.float32(TABLE)).astype(np.uint16)]
         top = np.float32(2**self.bits - 1)
-        return np.rint(codes * top).astype(np.uint8 if self.bits == 8 else np.uint16)
+        signal = recoded(torch.from_numpy(np.ascontiguousarray(codes)), self.curve).numpy()
+        return np.rint(signal * top).astype(np.uint8 if self.bits == 8 else np.uint16)
 
     def of_light(self, light: np.ndarray) -> np.ndarray:
         """The same of light [H, W]."""

@@ -35,6 +35,7 @@ from vid2ev.pictures.film import join_films, write_film
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
+from vid2ev.sources.images import FRAMES
 from vid2ev.untrusted import first_line, json_of, read_arrays
 
 Kind = Literal["mp4", "png", "exr"]
@@ -170,8 +171,8 @@ class Shelf:
             else:
                 times = [t_us for line in self.done for t_us in line["t_us"]]
                 (self._frames / "timestamps.txt").write_text("# us\n" + "".join(f"{t}\n" for t in times))
-                write_manifest(self._frames / "manifest.json", manifest)
-                for name in ("timestamps.txt", "manifest.json"):
+                write_manifest(self._frames / FRAMES, manifest)
+                for name in ("timestamps.txt", FRAMES):
                     sync(self._frames / name)
                 self._frames.rename(self._whole)
                 shutil.rmtree(self.partial / "replaced", ignore_errors=True)
@@ -182,7 +183,7 @@ class Shelf:
     def _begin(self) -> None:
         """Take up what is there, find all finished, or start."""
         job, made = self.partial / "job.json", manifest_of(self.output, self.kind)
-        made_in = self._whole / "manifest.json"
+        made_in = self._whole / FRAMES
         if self.resume and job.exists() and not self._frames.exists() and made_in.exists():
             about_to_be_put, wanted = read_manifest(made_in), self.job
             if not difference({key: about_to_be_put.get(key) for key in wanted}, wanted):
@@ -273,16 +274,16 @@ def kind_of(output: Path | None, asked: str | None) -> Kind:
 
 def manifest_of(output: Path, kind: str) -> Path:
     """Where the manifest of an output is."""
-    return output.with_suffix(".json") if kind == "mp4" else output / "manifest.json"
+    return output.with_suffix(".json") if kind == "mp4" else output / FRAMES
 
 
 def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:
     """Raise UsageError unless frames may be written to `output`; touches nothing."""
     if kind != "mp4":
-        if output.name in ("", "..") or output.is_mount() or output.resolve() == Path.cwd():
+        if output.name in ("", "..") or output.is_mount() or os.path.realpath(output) == os.getcwd():
             raise UsageError(f"{output} cannot be renamed into place; give a folder within it, such as {output / 'x'}")
         held = {path.name for path in output.iterdir()} if output.is_dir() else set()
-        ours = {"timestamps.txt", "manifest.json"}
+        ours = {"timestamps.txt", FRAMES}
         if others := [name for name in held - ours if not (name[:-4].isdecimal() and name[-4:] in (".png", ".exr"))]:
             raise UsageError(f"{output} holds other files ({min(others)}); choose another folder with -o")
     begun = (output.with_name(f"{output.name}.partial") / "job.json").exists()

@@ -41,6 +41,7 @@ class Take(Protocol):
     channels     1 or 3
     bits         8 or 16: what holds the codes of its frames as they are
     curve        the transfer curve of a film of it that looks as it does
+    coded        that of the codes of its pictures (`interp.own_codes`)
     rate         frames per second, as the file says, or on average
     gaps_expected  how many gaps there should be; None if there is no telling
     event_size   width and height of the event camera [px]; None without one
@@ -59,6 +60,8 @@ class Take(Protocol):
     def bits(self) -> int: ...
     @property
     def curve(self) -> str: ...
+    @property
+    def coded(self) -> str: ...
     @property
     def rate(self) -> Fraction: ...
     @property

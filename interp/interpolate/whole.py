@@ -83,7 +83,7 @@ def interpolate(
     if told:
         told(f"{fill.method.name}: {ready.why}")
     rate = film_rate(take, grid, play)
-    pictures = Pictures(kind, take.bits, take.curve)
+    pictures = Pictures(kind, take.bits, take.curve if kind == "mp4" else take.coded)
     job = {
         "versions": versions(("torch",)),
         "source": take.describe(),
@@ -94,6 +94,7 @@ def interpolate(
         "tiles": fill.tiling.describe(),
         "cuts": cuts,
         "format": pictures.describe(),
+        "transfer": pictures.curve,
         "film_rate": str(rate) if kind == "mp4" else None,
     }
     with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write, line=LINE) as shelf:

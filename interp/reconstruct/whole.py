@@ -115,6 +115,7 @@ def reconstruct(
         "pictures": str(slicing),
         "reconstruction": about,
         "format": pictures.describe(),
+        "transfer": pictures.curve,
         "film_rate": str(rate) if kind == "mp4" else None,
     }
     with Shelf(output, kind, job, rate, overwrite=overwrite, resume=resume, write=pictures.write) as shelf:

@@ -291,6 +291,6 @@ def test_what_is_no_take_says_so(
 def test_a_manifest_says_all_that_decided_the_frames(tmp_path: Path) -> None:
     source, events = images(tmp_path / "in", moving(3)), written(tmp_path / "a.npz", drawn())
     interpolate(source, tmp_path / "out", multiple=2, options=Options(events=events))
-    said = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    said = json.loads((tmp_path / "out" / "frames.json").read_text())
     assert said["grid"] == {"multiple": "2"} and said["source"]["events"]["identity"]["sha256"]
     assert said["key_frames"] == 3 and said["frames"] == 5 and "torch" in said["versions"]

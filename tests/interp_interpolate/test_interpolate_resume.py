@@ -50,7 +50,7 @@ def killed(source: Path, output: Path, at: int) -> None:
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "manifest.json"}
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "frames.json"}
 
 
 def decoded(film: Path) -> list[np.ndarray]:

@@ -166,7 +166,7 @@ def test_killed_it_goes_on_to_the_same_bytes(tmp_path: Path, network: str, at: i
     told = reconstruct(path, tmp_path / "twice", resume=True, **given)
     assert told["frames"] == 40 and told["run"]["frames"] < 40
     for file in os.listdir(tmp_path / "once"):
-        if file != "manifest.json":
+        if file != "frames.json":
             assert (tmp_path / "once" / file).read_bytes() == (tmp_path / "twice" / file).read_bytes()
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -148,6 +150,17 @@ def test_what_is_kept_for_what_is_to_come_says_so(clip: Path, tmp_path: Path, he
         "follower",
     )
     assert planning.SPARED in whys["photoreceptor"] and planning.SPARED not in whys["follower"]
+
+
+def test_the_time_it_took_is_that_of_all_plans(
+    clip: Path, tmp_path: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock that goes on a second whenever it is asked."""
+    held(SOME)
+    clock = itertools.count()
+    monkeypatch.setattr("vid2ev.conversion.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    manifest = made(clip, tmp_path / "auto", tolerance=0.01)
+    assert gone(manifest) == [] and manifest["run"]["seconds"] > 100 + 10
 
 
 def test_light_that_trembles_more_and_more_makes_it_begin_again_once(

@@ -149,6 +149,16 @@ def test_a_pipe_taken_up_again_passes_over_what_was_done(pipe) -> None:
     assert [frame.t_ns for frame in open_source("-").frames(6)] == [240_000_000, 280_000_000, 320_000_000]
 
 
+def test_a_pipe_that_ends_too_early_says_so_as_a_file_does(encode, pipe, tmp_path: Path) -> None:
+    data = encode("a.mkv", noise(40), codec="ffv1").read_bytes()
+    (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
+    file = open_source(tmp_path / "cut.mkv")
+    pipe(data[: len(data) // 2])
+    piped = open_source("-")
+    assert len(list(file.frames())) == len(list(piped.frames())) < 40
+    assert file.warnings == piped.warnings and any("truncated" in warning for warning in piped.warnings)
+
+
 @pytest.mark.parametrize("data", [b"", b"no video at all\n" * 50, b"YUV4MPEG2 W64 H48 F25:1\n"])
 def test_what_is_no_video_is_refused(pipe, data: bytes) -> None:
     pipe(data)

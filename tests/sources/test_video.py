@@ -13,6 +13,7 @@ import av
 import numpy as np
 import pytest
 
+from vid2ev.commands.summary import source_text
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.sources import footage, open_source
@@ -351,6 +352,26 @@ def test_damage_in_the_middle_costs_only_what_is_damaged(encode) -> None:
     assert 16 <= len(same) <= len(frames) <= 20
 
 
+def test_damage_that_a_decoder_notices_is_remarked_on(encode) -> None:
+    """Most bits of noise may be any; of films it is most damage that is noticed."""
+    path = encode("a.mkv", noisy(40), codec="libx264", options={"bf": "0"})
+    whole, remarked = path.read_bytes(), 0
+    assert not list_warnings(path)
+    for seed in range(8):
+        draws = np.random.default_rng(seed)
+        data, middle = bytearray(whole), int(draws.uniform(0.3, 0.7) * len(whole))
+        data[middle : middle + 500] = draws.bytes(500)
+        path.write_bytes(data)
+        remarked += any("damaged" in warning for warning in list_warnings(path))
+    assert remarked >= 1
+
+
+def list_warnings(path: Path) -> list[str]:
+    source = open_source(path)
+    list(source.frames())
+    return source.warnings
+
+
 def test_a_disk_that_fails_ends_the_clip_with_a_remark(encode, monkeypatch: pytest.MonkeyPatch) -> None:
     path = encode("a.mp4", flat([8 * k for k in range(30)]), codec="libx264", options={"bf": "2"})
     source = open_source(path)
@@ -481,6 +502,16 @@ def test_it_is_ready_for_json(encode) -> None:
 
     about = json.loads(json.dumps(open_source(encode("a.mkv", flat([10]))).describe()))
     assert about["kind"] == "video" and about["size"] == [48, 32] and about["codec"] == "ffv1"
+
+
+def test_a_number_of_frames_that_no_header_has_is_about_right(encode) -> None:
+    for name, about in (("a.mkv", "about 3 frames"), ("a.mp4", "video, 48x32, 3 frames")):
+        codec = {"codec": "libx264"} if name == "a.mp4" else {}
+        source = open_source(encode(name, flat([10, 20, 30]), **codec))
+        assert about in source_text(source.describe())
+    assert "about 2 frames" in source_text(
+        open_source(encode("a.mp4", flat([1, 2, 3]), codec="libx264"), stop=0.04).describe()
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- real clips

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.untrusted import check_file
 
 if TYPE_CHECKING:
     from vid2ev.cluster.work import Outcome
@@ -192,6 +193,7 @@ def is_list(path: Path) -> bool:
 
 def _listed(path: Path) -> list[str]:
     """The lines of a list but for empty ones and those that begin with #.  Raises DataError, UsageError."""
+    check_file(path)
     try:
         lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, ValueError) as error:

@@ -133,11 +133,19 @@ def source_text(source: Mapping[str, Any]) -> str:
     """A source's description as one line; unknown facts are left out."""
     facts = [
         "x".join(map(str, source["size"])) if source.get("size") else "",
-        f"{source['frames_expected']} frames" if source.get("frames_expected") else "",
+        _frames_text(source),
         f"{source['duration_expected_s']:.6g} s" if source.get("duration_expected_s") else "",
         *(str(source[key]) for key in ("codec", "pixel_format", "transfer") if source.get(key)),
     ]
     return f"{source['path']} ({', '.join(fact for fact in [source.get('kind', ''), *facts] if fact)})"
+
+
+def _frames_text(source: Mapping[str, Any]) -> str:
+    """How many frames a source has, as far as it is known before they are read."""
+    if not source.get("frames_expected"):
+        return ""
+    guessed = source.get("frames_estimated") or {"start_s", "stop_s"} & {*source.get("edits", {})}
+    return f"{'about ' * bool(guessed)}{source['frames_expected']} frames"
 
 
 def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -16,13 +16,14 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_validator
 
 from vid2ev.physics.omission import omitted
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import clock, entry, events_of
 from vid2ev.stream.scene import Omission, Scene
 
+SLOWEST_HZ = 1e-9  # of event frames: 32 years from one to the next
 KINDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}  # of events held back
 
 
@@ -31,6 +32,13 @@ class FixedRate(BaseModel, frozen=True, extra="forbid"):
 
     frame_rate_hz: float = Field(0.0, ge=0, le=1e6, description="event frames per second; 0: free-running")
     rounding: Literal["nearest", "causal"] = Field("nearest", description="to the nearest event frame, or to the next")
+
+    @field_validator("frame_rate_hz")
+    @classmethod
+    def _within_a_lifetime(cls, value: float) -> float:
+        if 0.0 < value < SLOWEST_HZ:
+            raise ValueError(f"{value} Hz: expected 0, or at least {SLOWEST_HZ}")
+        return value
 
 
 class EventFrames:

@@ -239,7 +239,7 @@ def begun_job(directory: Path) -> dict[str, Any]:
 
 def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
     """Raise UsageError unless a recording may be written to `directory`; touches nothing."""
-    if directory.name in ("", "..") or directory.is_mount() or directory.resolve() == Path.cwd():
+    if directory.name in ("", "..") or directory.is_mount() or os.path.realpath(directory) == os.getcwd():
         raise UsageError(
             f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
         )

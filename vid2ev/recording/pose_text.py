@@ -18,6 +18,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file
+from vid2ev.untrusted import check_file
 
 HEADER = "# timestamp tx ty tz qx qy qz qw\n"
 COLUMNS = 8
@@ -52,6 +53,7 @@ def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarra
 def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError, UsageError if
     there is no such file."""
+    check_file(path)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError as error:

@@ -27,7 +27,7 @@ from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.toml_text import parsed_toml, toml_value
-from vid2ev.untrusted import beside
+from vid2ev.untrusted import beside, check_file
 
 EXAMPLE = Path(__file__).with_name("example_rig.toml")
 Model = TypeVar("Model", bound=BaseModel)
@@ -90,6 +90,7 @@ def write_text(path: Path, text: str, overwrite: bool = False) -> None:
 
 def read_text(path: Path) -> str:
     """The text of a small file.  Raises UsageError if it is not there, DataError if it cannot be read."""
+    check_file(path)
     try:
         if path.is_file() and path.stat().st_size > LARGEST:
             raise DataError(f"{path}: {path.stat().st_size:,} bytes are too many for a rig or calibration file")

@@ -60,13 +60,13 @@ class DvsBatch:
         self.size, options = size, {"labels": labels, "transfer": transfer, "skip": False}
         self._sensors = [
             Dvs(spec, size, seed, camera=camera, **options)  # type: ignore[arg-type]
-            for spec, seed, camera in zip(specs, seeds, cameras_of(specs, cameras), strict=True)
+            for spec, seed, camera in zip(specs, seeds, cameras_of(specs, seeds, cameras), strict=True)
         ]
         self._tiles = Tiles(len(self._sensors), threads)
 
     def renew(self, specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None = None) -> None:
         """Become other sensors, as many as before and without light yet, in the same arrays (`Dvs.renew`)."""
-        others = zip(self._sensors, specs, seeds, cameras_of(specs, cameras), strict=True)
+        others = zip(self._sensors, specs, seeds, cameras_of(specs, seeds, cameras), strict=True)
         for sensor, spec, seed, camera in others:
             sensor.renew(spec, seed, camera)
 
@@ -107,6 +107,13 @@ class DvsBatch:
         return [result for run in runs for result in run]
 
 
-def cameras_of(specs: Sequence[DvsSpec], cameras: Sequence[int] | None) -> Sequence[int]:
-    """The numbers of the cameras of a batch."""
-    return cameras if cameras is not None else [0] * len(specs)
+def cameras_of(specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None) -> Sequence[int]:
+    """The numbers of the cameras of a batch.  Raises UsageError for one without sensors, and for other numbers of seeds
+    or cameras than of these."""
+    cameras = cameras if cameras is not None else [0] * len(specs)
+    if not specs or not len(specs) == len(seeds) == len(cameras):
+        raise UsageError(
+            f"a batch of {len(specs)} specs, {len(seeds)} seeds and {len(cameras)} cameras: expected one of each for"
+            " every sensor, and at least one"
+        )
+    return cameras

@@ -45,7 +45,7 @@ class DvsBatchOnCard:
 
     def renew(self, specs: Sequence[DvsSpec], seeds: Sequence[int], cameras: Sequence[int] | None = None) -> None:
         """Become other sensors, without light yet.  Raises UsageError as when made."""
-        cameras, size = cameras_of(specs, cameras), self.size
+        cameras, size = cameras_of(specs, seeds, cameras), self.size
         for seed, camera in zip(seeds, cameras, strict=True):
             check_sensor(size, seed, camera, 1)
         for spec in specs:

@@ -106,16 +106,16 @@ class Piped:
     kind = "pipe"
     rewindable = False
     planned = 0
-    end_s: Fraction | None = None
 
     def __init__(self, kept: Kept):
         self.name, self.kept = kept.name, kept
         with self._opened() as (container, stream):
             self.rate, self.pixel_shape, self.codec = _said_of(stream)
             self.first = next(_decoded(container, stream, 0, []), None)
-        kept.wanted = False
-        if self.first is None:
-            raise DataError(f"{self.name}: no frame in it can be decoded; pipe {STREAMS} into it")
+            kept.wanted = False
+            if self.first is None:
+                raise DataError(f"{self.name}: no frame in it can be decoded; pipe {STREAMS} into it")
+            self.end_s = announced_end_s(container, stream, stamp_of(self.first) or Fraction(0))
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
         """The pictures from the first one on.  Raises UsageError if they are not kept any more."""
@@ -235,7 +235,7 @@ def _sought(
 
 def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
-    whole = broken = 0
+    whole = broken = guessed = 0
     for packet in _packets(container, stream, remarks):
         if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
             broken += 1
@@ -246,7 +246,10 @@ def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> I
         except av.FFmpegError:
             broken += 1
             continue
+        guessed += sum(picture.is_corrupt for picture in pictures)
         yield from pictures
+    if guessed:
+        remarks.append(f"damaged pictures, which the decoder has guessed with those that build on them: {guessed}")
     if broken:
         remarks.append(f"damaged packets of the file left out: {broken}")
     if whole + broken < planned:

@@ -3,7 +3,8 @@
 8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
 rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB unless
-a transfer is given, 16-bit ones too; floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
+a transfer is given, or `frames.json` says one, 16-bit ones too; floating point is linear light, 1.0 white as it stands.
+Transparency is ignored.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, remarks_on_unit, stamps_beside
 from vid2ev.stream.frames import Colour, Frame
+from vid2ev.untrusted import json_of, read_text
 
 TIMESTAMPS = "timestamps.txt"
+FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 
 class Images:
@@ -62,7 +66,7 @@ class Images:
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         if transfer == "auto":
-            transfer = "linear" if first.dtype.kind == "f" else "srgb"
+            transfer = "linear" if first.dtype.kind == "f" else _said(self.path / FRAMES)
         self._reader = PictureReader(transfer, colour)
         self._dtype = first.dtype
 
@@ -122,6 +126,14 @@ class Images:
         if len(stamps) != len(self._places):
             raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
         return stamps, unit
+
+
+def _said(path: Path) -> str:
+    """The transfer curve that pictures of a folder are said to be coded by; sRGB if nothing is said."""
+    try:
+        return parse_transfer(str(json_of(read_text(path)).get("transfer", "srgb"))).name
+    except (OSError, ValueError, AttributeError):  # (there is none, or it is none of ours)
+        return "srgb"
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:

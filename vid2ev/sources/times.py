@@ -27,13 +27,14 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import first_line, read_array
+from vid2ev.untrusted import check_file, first_line, read_array
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
 DECIMAL_COMMA = re.compile(r"(?:^|[\s;])([+-]?\d{1,50})(?:,(\d{1,50}))?\s*$")  # or whole numbers, in columns
 LONGEST_WORD = 100  # digits of a time
+SLOWEST_HZ = 1e-6  # of frames: 12 days from one to the next
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
 
@@ -44,8 +45,8 @@ def round_ns(seconds: Fraction) -> int:
 
 def parse_fps(fps: float | Fraction) -> Fraction:
     """Frames per second as written: 29.97 is 2997/100, Fraction(30000, 1001) stays.  Raises UsageError."""
-    if not math.isfinite(fps) or not 0 < fps <= 10**9:
-        raise UsageError(f"fps {fps}: expected more than 0 and at most 1e9 frames per second")
+    if not math.isfinite(fps) or not SLOWEST_HZ <= fps <= 10**9:
+        raise UsageError(f"fps {float(fps):g}: expected frames per second from {SLOWEST_HZ:g} to 1e9")
     return Fraction(str(fps))
 
 
@@ -115,6 +116,7 @@ def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fracti
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError, for lines that name
     other `images` than those that are there in their place, too."""
     unit, column, rows = None, -1, []
+    check_file(path)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -199,4 +199,5 @@ class Video:
             "rate": None if rate is None else str(rate),
             "fps": None if self._fps is None else str(self._fps),
             "frames_expected": self.frames_expected,
+            "frames_estimated": not self._footage.planned,
         }

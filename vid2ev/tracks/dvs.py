@@ -171,7 +171,8 @@ class DvsTrack:
         nothing happens, some formats write on and on."""
         frame_us = np.fromfile(self.folder.written(f"{self._within}{FRAME_US}"), np.int64)
         with self.folder.taking_up():
-            end_us = frame_us[-1] + math.ceil(latest_us(self.dvs.spec))
+            # (an event is at least a microsecond after the frame before it)
+            end_us = frame_us[-1] + max(1, math.ceil(latest_us(self.dvs.spec)))
             if not (start_us == frame_us[0] and start_us + duration_us <= end_us):
                 raise ValueError("times that are not those of its frames")
         return Recording(

@@ -18,6 +18,7 @@ from vid2ev.upsample.registered import other, others
 __all__ = ["METHODS", "Interval", "Subframes", "Upsampler", "make_upsampler"]
 
 METHODS = ("none", "linear", "flow")
+MOST = 1 << 16  # steps of an interval: their instants are in memory at once
 Subframes = int | Literal["auto"]
 
 
@@ -70,10 +71,12 @@ def make_upsampler(
     found = None if method in METHODS else other(method)
     if method not in METHODS and found is None:
         raise UsageError(f"upsampling '{method}': expected one of {', '.join([*METHODS, *others()])}")
-    if subframes != "auto" and subframes < 1:
-        raise UsageError(f"subframes {subframes}: expected a whole number of at least 1, or auto")
-    if max_subframes < 1 or not threshold > 0:
-        raise UsageError(f"max_subframes {max_subframes}, threshold {threshold}: expected at least 1, and more than 0")
+    if subframes != "auto" and not 1 <= subframes <= MOST:
+        raise UsageError(f"subframes {subframes}: expected a whole number from 1 to {MOST}, or auto")
+    if not 1 <= max_subframes <= MOST or not threshold > 0:
+        raise UsageError(
+            f"max_subframes {max_subframes}, threshold {threshold}: expected from 1 to {MOST}, and more than 0"
+        )
     if found is not None:
         make, rest = found
         return make(rest, subframes, max_subframes, threshold)  # type: ignore[no-any-return]

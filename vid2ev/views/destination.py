@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError
@@ -30,7 +31,7 @@ def check_free(output: Path, overwrite: bool = False) -> None:
 
 
 def _check_replaceable(folder: Path) -> None:
-    if folder.name in ("", "..") or folder.is_mount() or folder.resolve() == Path.cwd():
+    if folder.name in ("", "..") or folder.is_mount() or os.path.realpath(folder) == os.getcwd():
         raise UsageError(f"{folder} cannot be renamed into place; give a folder within it, such as {folder / 'events'}")
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{folder} is a file; choose another name with -o")

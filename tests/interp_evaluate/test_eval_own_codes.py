@@ -1,0 +1,92 @@
+"""Pictures have the codes of the file that holds them, to those who score them and to those who make more of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+import torch
+from skimage.metrics import peak_signal_noise_ratio
+
+from interp.evaluate.run import evaluate
+from interp.interpolate.whole import interpolate
+from interp.own_codes import BRIGHT, codes_of, curve_of, light_of, recoded, shown
+from vid2ev import convert, open_source
+
+HEIGHT, WIDTH, FRAMES = 48, 64, 9
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Path:
+    """A lossless video of RGB codes, which are of BT.709 as nothing else is said."""
+    blobs = cv2.GaussianBlur(np.random.default_rng(1).normal(size=(HEIGHT, WIDTH + 40, 3)), (0, 0), 3)
+    codes = np.rint(255 * (blobs - blobs.min()) / np.ptp(blobs)).astype(np.uint8)
+    with av.open(str(tmp_path / "film.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=240)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
+        for k in range(FRAMES):
+            shift = np.array([[1, 0, -1.5 * k], [0, 1, 0]], np.float32)
+            frame = av.VideoFrame.from_ndarray(cv2.warpAffine(codes, shift, (WIDTH, HEIGHT)), format="bgr24")
+            frame.pts, frame.time_base = k, Fraction(1, 240)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return tmp_path / "film.mkv"
+
+
+def codes_in(film: Path) -> list[np.ndarray]:
+    """What FFmpeg takes out of it."""
+    with av.open(str(film)) as container:
+        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def write(folder: Path, pictures: Sequence[np.ndarray]) -> None:
+    folder.mkdir(parents=True)
+    for k, picture in enumerate(pictures):
+        cv2.imwrite(str(folder / f"{k:03d}.png"), picture[..., ::-1])
+
+
+def test_frames_of_a_video_are_scored_by_its_own_codes(film: Path, tmp_path: Path) -> None:
+    frames = codes_in(film)
+    write(tmp_path / "others" / "film", frames)
+    rows = evaluate([str(film)], tmp_path / "report", baselines=["nearest"], predictions=[tmp_path / "others"]).rows
+    assert {row.psnr for row in rows if row.method == "others"} == {100.0}
+    nearest = [row for row in rows if row.method == "nearest"]
+    assert len(nearest) == 7
+    for row in nearest:
+        key, true = frames[0 if row.position <= 4 else 8], frames[row.position]
+        own = peak_signal_noise_ratio(true, key, data_range=int(true.max()) - int(true.min()))
+        assert row.position == 4 or row.psnr == pytest.approx(own, abs=1e-9)
+
+
+def test_pictures_of_a_video_are_its_frames_and_can_be_used_again(film: Path, tmp_path: Path) -> None:
+    interpolate(film, tmp_path / "made", multiple=2, method="linear")
+    names = sorted((tmp_path / "made").glob("*.png"))
+    assert len(names) == 2 * FRAMES - 1
+    for frame, name in zip(codes_in(film), names[::2], strict=True):
+        np.testing.assert_array_equal(cv2.imread(str(name))[..., ::-1], frame)
+    again, first = open_source(tmp_path / "made", colour="rgb"), open_source(film, colour="rgb")
+    assert again.describe()["transfer"] == "bt709"
+    for one, other in zip([*again.frames()][::2], first.frames(), strict=True):
+        np.testing.assert_allclose(one.light, other.light, rtol=1e-6)
+    assert convert(tmp_path / "made", tmp_path / "events", preview=False)["counts"]["frames"] == 2 * FRAMES - 1
+    assert evaluate([str(tmp_path / "made")], tmp_path / "report", baselines=["linear"]).rows
+
+
+@pytest.mark.parametrize("curve", ["srgb", "bt709", "smpte240m", "gamma:2.2", "gamma:2.6"])
+def test_codes_are_what_they_were(curve: str) -> None:
+    codes = np.arange(256, dtype=np.uint8)
+    np.testing.assert_array_equal(codes_of(light_of(curve), curve), codes)
+    signal = recoded(torch.from_numpy(shown(codes, curve)), curve).numpy()
+    np.testing.assert_array_equal(np.rint(255 * signal), codes)
+    assert codes_of(np.array([np.nan, -1.0, 7.0]), curve).tolist() == [0, 0, 255]
+
+
+def test_light_that_has_no_codes_of_its_own_is_srgb() -> None:
+    assert curve_of({"transfer": "bt709"}) == curve_of({"transfer": "bt709", "edits": {"resized": False}}) == "bt709"
+    assert curve_of({}) == curve_of({"transfer": "bt709", "edits": {"resized": True}}) == "srgb"
+    assert {curve_of({"transfer": curve}) for curve in BRIGHT} == {"srgb"}
