@@ -191,6 +191,9 @@ def test_a_command_that_is_not() -> None:
     [
         [],
         ["--subframes", "0"],
+        ["--tolerance", "nan"],
+        ["--truth-rate", "nan"],
+        ["--truth-rate", "0"],
         ["--subframes", "many"],
         ["--threads", "0"],
         ["--max-subframes", "0"],

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from vid2ev.commands.auto import Auto
+from vid2ev.commands.finite import Finite
 from vid2ev.commands.source_options import source_options
 from vid2ev.commands.worker_options import worker_options
 
@@ -107,7 +108,7 @@ from vid2ev.commands.worker_options import worker_options
     " That says what matters; it rarely saves time, and may take twice as long.",
 )  # fmt: skip
 @click.option(
-    "--tolerance", type=click.FloatRange(0, 1), default=0.01, show_default=True, metavar="D",
+    "--tolerance", type=Finite(0, 1), default=0.01, show_default=True, metavar="D",
     help="How far from those of all effects events and frames may be with auto, as a distance.",
 )  # fmt: skip
 @click.option(
@@ -144,7 +145,13 @@ from vid2ev.commands.worker_options import worker_options
     help="What is known for certain: depth, mask, map (pixels in the other cameras), poses; of scenes also flow.",
 )  # fmt: skip
 @click.option(
-    "--truth-rate", "truth_rate_hz", type=float, default=30, show_default=True, metavar="HZ", help="How often."
+    "--truth-rate",
+    "truth_rate_hz",
+    type=Finite(0, min_open=True),
+    default=30,
+    show_default=True,
+    metavar="HZ",
+    help="How often.",
 )
 @click.option("--preview/--no-preview", default=True, help="Make preview.mp4.  [default: yes]")
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")

@@ -8,7 +8,9 @@ from typing import Any
 
 import click
 
-SECONDS = click.FloatRange(0, max_open=True, max=1e9)
+from vid2ev.commands.finite import Finite
+
+SECONDS = Finite(0, max_open=True, max=1e9)
 
 
 @click.command(short_help="Turn an event file into one of another format.")

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vid2ev.commands.finite import Finite
+
 if TYPE_CHECKING:
     pass
 
-SECONDS = click.FloatRange(0, 1e9)
+SECONDS = Finite(0, 1e9)
 
 
 @click.command(short_help="Make a film or a picture of any event file.")
@@ -34,7 +36,7 @@ SECONDS = click.FloatRange(0, 1e9)
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(0.01, 1000),
+    type=Finite(0.01, 1000),
     default=30,
     show_default=True,
     metavar="RATE",
@@ -42,7 +44,7 @@ SECONDS = click.FloatRange(0, 1e9)
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(1e-6, 1e6),
+    type=Finite(1e-6, 1e6),
     metavar="FACTOR",
     help="Of the film against reality; 0.1 is slow motion.  [default: 1]",
 )

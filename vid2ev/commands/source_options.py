@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from vid2ev.commands.finite import Finite
+
 SOURCE_OPTIONS = (
     click.option(
         "--transfer",
@@ -17,7 +19,7 @@ SOURCE_OPTIONS = (
     ),
     click.option(
         "--fps",
-        type=click.FloatRange(0, min_open=True),
+        type=Finite(0, min_open=True),
         metavar="RATE",
         help="Frames per second, instead of the source's own times.",
     ),
@@ -25,7 +27,7 @@ SOURCE_OPTIONS = (
     click.option("--stop", type=float, metavar="S", help="End there."),
     click.option(
         "--slowdown",
-        type=click.FloatRange(0, min_open=True),
+        type=Finite(0, min_open=True),
         metavar="F",
         help="The footage plays F times slower than the world went: 8 for 240 fps that play at 30.",
     ),

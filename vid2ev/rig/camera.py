@@ -42,7 +42,7 @@ DEVICES = re.compile(r"(com|lpt)\d")  # (names that Windows keeps for itself)
 class Optics(BaseModel):
     """Size, field of view and distortion of a camera, as far as they are stated."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     size: tuple[Side, Side] | None = Field(default=None, description="width and height [px]; left out: the video's")
     fov_deg: Angle | None = Field(
@@ -180,7 +180,7 @@ class Camera(Optics):
 class Rig(BaseModel):
     """The camera of the video, and the virtual cameras around it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     source: Source = Source()
     cameras: tuple[Camera, ...] = Field(min_length=1)
