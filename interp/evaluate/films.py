@@ -65,7 +65,9 @@ class Film:
         source = simulated.opened(video)
         if not source.rewindable:
             raise UsageError(f"{video} can be read once only; save it as a file to score methods on it")
-        self.size, self.frames, self.curve = source.size, source.frames_expected or 0, curve_of(source.describe())
+        about = source.describe()
+        self.size, self.frames, self.curve = source.size, source.frames_expected or 0, curve_of(about)
+        self._stored = str(about.get("pixel_format", ""))
         count = max(self.frames - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
         path = Path(video)
@@ -112,7 +114,7 @@ class Film:
         return {
             "kind": "scene" if is_scene(self.video) else "video", "frames": told.frames, "size": list(self.size),
             "event_size": list(self.size), "sensor": self._simulated.name, "rate_hz": round(told.rate_hz, 3),
-            "curve": self.curve, "groups": told.groups, "not_scored": told.not_scored,
+            "curve": self.curve, "stored": self._stored, "groups": told.groups, "not_scored": told.not_scored,
             "remarks": [*remarks, *told.remarks],
         }  # fmt: skip
 

@@ -36,6 +36,7 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
     return [
         *(f"{name}: not used: {reason}" for name, reason in summary["unusable"].items()),
         *(f"{_several(names)}: {remark}" for remark, names in said.items()),
+        *_decoded_otherwise(summary),
         *_perfect(summary["methods"]),
     ]
 
@@ -43,6 +44,17 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
 def notes(summary: Mapping[str, Any]) -> list[str]:
     """All of it, a sentence each."""
     return [*remarks(summary), *(f"not scored: {count} {reason}" for reason, count in left_out(summary).items())]
+
+
+def _decoded_otherwise(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Where others' pictures are of videos whose colours every decoder makes for itself."""
+    others = [name for name, of in summary["identities"].items() if not {"closed_form", "weights_sha256"} & {*of}]
+    videos = [name for name, of in summary["sequences"].items() if str(of.get("stored", "")).startswith("yuv")]
+    if others and videos:
+        yield (
+            f"{_several(others)} on {_several(videos)}: decoders make other RGB of YUV, by 40 to 50 dB; to compare"
+            " methods finely, make PNG of the video, give these to all of them, and score the folder"
+        )
 
 
 def _perfect(methods: Mapping[str, Any]) -> Iterator[str]:

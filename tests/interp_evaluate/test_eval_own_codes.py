@@ -13,6 +13,7 @@ import pytest
 import torch
 from skimage.metrics import peak_signal_noise_ratio
 
+from interp.evaluate.remarks import notes
 from interp.evaluate.run import evaluate
 from interp.interpolate.whole import interpolate
 from interp.own_codes import BRIGHT, codes_of, curve_of, light_of, recoded, shown
@@ -53,7 +54,11 @@ def write(folder: Path, pictures: Sequence[np.ndarray]) -> None:
 def test_frames_of_a_video_are_scored_by_its_own_codes(film: Path, tmp_path: Path) -> None:
     frames = codes_in(film)
     write(tmp_path / "others" / "film", frames)
-    rows = evaluate([str(film)], tmp_path / "report", baselines=["nearest"], predictions=[tmp_path / "others"]).rows
+    found = evaluate([str(film)], tmp_path / "report", baselines=["nearest"], predictions=[tmp_path / "others"])
+    rows = found.rows
+    assert not any("RGB of YUV" in note for note in notes(found.summary))
+    yuv = found.summary | {"sequences": {"film": found.summary["sequences"]["film"] | {"stored": "yuv420p"}}}
+    assert any(note.startswith("others on film: decoders make other RGB of YUV") for note in notes(yuv))
     assert {row.psnr for row in rows if row.method == "others"} == {100.0}
     nearest = [row for row in rows if row.method == "nearest"]
     assert len(nearest) == 7
