@@ -370,6 +370,9 @@ def test_every_error_raised_on_purpose_has_its_exit_code(monkeypatch: pytest.Mon
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals, limits and terminals")
 
 
+SCENE = ["scene", "room", "--fps", "1000", "-o", "room"]
+
+
 def started(*arguments: str, before: str = "", **options: Any) -> subprocess.Popen[str]:
     program = f"import sys; from vid2ev.commands import main\n{before}\nmain(sys.argv[1:])"
     return subprocess.Popen([sys.executable, "-c", program, *arguments], text=True, **options)
@@ -400,6 +403,20 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
     _, error = child.communicate()
     assert (child.returncode, error.count("\n"), error[:11]) == (130, 1, "interrupted")
     assert left() == set()
+
+
+@posix
+@pytest.mark.parametrize("asks", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("arguments", [["render", "events.csv", "-o", "film.mp4", "--by", "duration:1ms"], SCENE])
+def test_who_asks_it_to_end_finds_nothing_half_made(arguments: list[str], asks: signal.Signals) -> None:
+    Path("events.csv").write_text("t,x,y,p\n" + "".join(f"{1000 * k},{k % 64},{k % 48},1\n" for k in range(10**5)))
+    child = started(*arguments, stderr=subprocess.PIPE)
+    while left() == {"events.csv"} and child.poll() is None:
+        time.sleep(0.05)
+    child.send_signal(asks)
+    _, error = child.communicate()
+    assert (child.returncode, error) == (130, "interrupted\n")
+    assert left() == {"events.csv"}
 
 
 @posix

@@ -7,7 +7,11 @@ what is heavy when they are called.
 from __future__ import annotations
 
 import difflib
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from itertools import pairwise
 from typing import Any
@@ -18,6 +22,21 @@ from vid2ev.errors import DataError, UsageError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
 MEMORY_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or --device cpu"
+
+
+@contextmanager
+def tidy() -> Iterator[None]:
+    """Within it, what asks a program to end (SIGTERM, SIGHUP) ends it as Ctrl-C does: what is half made is removed."""
+    asks = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    ours = threading.current_thread() is threading.main_thread()
+    heard = [each for each in asks if ours and signal.getsignal(each) is signal.SIG_DFL]
+    for each in heard:
+        signal.signal(each, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for each in heard:
+            signal.signal(each, signal.SIG_DFL)
 
 
 class Commands(click.Group):

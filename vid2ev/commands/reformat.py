@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from vid2ev.commands import tidy
 from vid2ev.commands.finite import Finite
 
 SECONDS = Finite(0, max_open=True, max=1e9)
@@ -22,6 +23,7 @@ SECONDS = Finite(0, max_open=True, max=1e9)
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@tidy()
 def reformat(source: str, target: Path, as_json: bool, quiet: bool, **options: Any) -> None:
     """Turn the event file IN, of any format, into OUT: every event at its own microsecond.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vid2ev.commands import tidy
 from vid2ev.commands.finite import Finite
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ SECONDS = Finite(0, 1e9)
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@tidy()
 def render(events: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
     """Make a film (.mp4), a picture (.png) or a folder of pictures of EVENTS: an event file, or a recording's folder.
 
