@@ -76,6 +76,7 @@ CLIENT_FLOORS = {
     "precision": 0,
     "pretrained": 0,
     "light": 1,
+    "own_codes": 2,
     "warp": 1,
     "blend": 1,
     "blocks": 1,
