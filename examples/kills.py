@@ -36,6 +36,7 @@ import click
 HERE = Path(__file__).resolve().parent
 FULL = 3  # the exit code of what a full disk ended with a sentence
 TORN = b'{"group": 7, "ro'
+MADE = ("manifest.json", "frames.json")  # what a whole output has
 LASTING = ((os, "fsync"), (shutil, "rmtree"), *((Path, name) for name in ("rename", "replace", "unlink")))
 OF_TRAINING = ("weights", "steps.json")  # curves and pictures of a validation that is killed are not made up for
 
@@ -171,8 +172,8 @@ class Kills:
         """Put half a line at the end of a file that grows; not of one that was brought to the disk with all beside."""
         places = [self.out, self.folder / "out.partial"]
         found = [file for place in places for name in self.job.growing for file in place.rglob(name)]
-        growing = [file for file in found if not any((at / "manifest.json").exists() for at in file.parents)]
-        done = (self.out / "manifest.json").exists() or (self.out / "report.md").exists()
+        growing = [file for file in found if not any((at / name).exists() for at in file.parents for name in MADE)]
+        done = any((self.out / name).exists() for name in (*MADE, "report.md"))
         if growing and not done and self.chance.random() < 0.5:
             with open(self.chance.choice(sorted(growing)), "ab") as file:
                 file.write(TORN[: self.chance.randrange(1, len(TORN))])

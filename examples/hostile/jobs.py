@@ -48,7 +48,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 def _lasting(file: Path) -> bytes:
-    if file.name in ("manifest.json", "run.json"):
+    if file.name in ("manifest.json", "frames.json", "run.json"):
         said = json.loads(file.read_text())
         return json.dumps({key: value for key, value in said.items() if key not in ("run", "machine")}).encode()
     return file.read_bytes()
