@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from interp.evaluate.kept import Kept
 from interp.train.run_folder import RunFolder
-from vid2ev import Dvs, convert, load_sensor
+from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.outputs import Outputs
 from vid2ev.recording.disk import put_in_place
 from vid2ev.recording.folder import partial_of
 from vid2ev.stream.events import Events
+from vid2ev.stream.frames import Frame
 
 CLIP = "synthetic:moving-edge,size=16x12,fps=100,duration_s=0.08"
 OPTIONS = {"overrides": ["frame_rate_hz=900", "delay_us=3000"], "threads": 1, "piece": 3 << 18}
@@ -98,6 +100,22 @@ def test_a_sensor_takes_no_state_of_another_kind() -> None:
         with pytest.raises(UsageError, match=f"in '{name}', expected"):
             dvs.restore(state | {name: state[name].astype(np.complex64)})
     dvs.restore(state)
+
+
+@pytest.mark.parametrize("changed", [{"seed": 6}, {"camera": 1}, {"size": (12, 16)}, {"key": "frame_rate_hz=40"}])
+@pytest.mark.parametrize("kind", ["dvs", "cis"])
+def test_a_sensor_takes_no_state_of_another_one(kind: str, changed: dict[str, Any]) -> None:
+    def sensor(seed: int = 5, camera: int = 0, size: tuple[int, int] = (16, 12), key: str = "") -> Any:
+        make, load = (Dvs, load_sensor) if kind == "dvs" else (Cis, load_cis)
+        made = make(load("paper", [key] if key else []), size, seed, camera=camera)
+        frame = Frame(np.full((*size[::-1], 3)[: 2 + (kind == "cis")], 0.5, np.float32), 0)
+        made.see(frame) if kind == "dvs" else list(made.exposures(frame))
+        return made
+
+    one = sensor()
+    with pytest.raises(UsageError, match="state of a sensor with other parameters, or another size, seed or camera"):
+        one.restore(sensor(**changed).state())
+    one.restore(sensor().state())
 
 
 def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path: Path) -> None:

@@ -96,6 +96,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     from interp.methods.running import Running
     from vid2ev.commands import batch
     from vid2ev.commands.worker_options import workers_of
+    from vid2ev.errors import UsageError
 
     quiet |= as_json
     workers = workers_of(options)
@@ -119,6 +120,10 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         if as_json:
             click.echo(json.dumps(made, indent=2))
         return
+    if output and output.suffix == ".mp4" and not single:
+        raise UsageError(
+            f"-o {output}: a film, of {len(found)} source(s) in {sources[0]}; expected the name of a folder"
+        )
     if output and single:
         paths = {found[0]: output}
     else:

@@ -66,6 +66,11 @@ def test_what_cannot_be_measured_is_within_no_limit() -> None:
     assert Budget.parse("us=0").holds(row(1, 0.0, None))  # there are no events that could be late
 
 
+def test_two_limits_of_a_kind_are_refused() -> None:
+    with pytest.raises(UsageError, match="vR is limited twice; expected one limit of each kind"):
+        Budget.parse("vR=0.05,us=3,vR=0.4")
+
+
 @pytest.mark.parametrize(
     "text", ["", "vR", "vR=", "vR=x", "vR=-1", "vR=nan", "us=inf", "distance=1", "vR=0.1;us=3", "time=x"]
 )

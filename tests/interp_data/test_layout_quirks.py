@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from interp.data.clip import write_clip
-from interp.data.layouts import open_sequence, sequences_in, windows
+from interp.data.layouts import open_sequence, opened_in, sequences_in, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.sequence import Placed
 from interp.data.layouts.writing import write_sequence
@@ -178,6 +179,27 @@ def test_as_many_pictures_as_times_belong_together(tmp_path: Path, images: int, 
     sequence = open_sequence(tmp_path / "seq")
     assert len(sequence.times_us) == count
     assert sequence.remarks[0] == f"{images} pictures and {times} times: the first 4 are taken for pairs"
+
+
+@pytest.mark.parametrize("head", ["0\n0\n", f"0\n0\n{9 * STEP_US}\n", f"{9 * STEP_US}\n", "0\nwrong\n0\n"])
+def test_times_above_those_that_increase_are_of_no_picture(tmp_path: Path, head: str) -> None:
+    written(tmp_path / "seq", times=head + "".join(f"{STEP_US * (k + 1)}\n" for k in range(6)))
+    sequence = open_sequence(tmp_path / "seq")
+    assert sequence.times_us.tolist() == [STEP_US * (k + 1) for k in range(6)]
+    assert any("times: the last 6 are taken for pairs" in remark for remark in sequence.remarks)
+
+
+@pytest.mark.parametrize("layout", ["hsergb", "bsergb"])
+def test_a_sequence_whose_events_are_missing_is_named(tmp_path: Path, layout: str) -> None:
+    written(tmp_path / "all" / "good", layout)
+    written(tmp_path / "all" / "bare", layout)
+    shutil.rmtree(tmp_path / "all" / "bare" / LAYOUTS[layout].events)
+    found, unusable = opened_in(tmp_path / "all")
+    assert [sequence.name for sequence in found] == ["good"]
+    ((name, why),) = unusable.items()
+    assert Path(name).name == "bare" and f"no folder {LAYOUTS[layout].events}; expected the events" in why
+    with pytest.raises(DataError, match="no folder"):
+        open_sequence(tmp_path / "all" / "bare")
 
 
 @pytest.mark.parametrize("head", ["", "# exposure\n"])

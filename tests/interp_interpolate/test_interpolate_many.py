@@ -11,6 +11,7 @@ from small_takes import images, moving, recording
 
 from interp.commands.interpolate import interpolate
 from interp.commands.many import sources_in
+from vid2ev.errors import UsageError
 
 
 @pytest.fixture(autouse=True)
@@ -50,3 +51,10 @@ def test_many_are_made_in_turn_or_shared_out_to_the_same_bytes() -> None:
     assert run("films", "-o", "two").exit_code == 2
     result = run("films", "-o", "two", "--resume")
     assert result.exit_code == 0 and "2 of 2 done" in result.output and "5 frames" in result.output
+
+
+def test_a_film_is_of_one_source() -> None:
+    for sources in (["films"], ["films/f0", "films/f1"]):
+        result = run(*sources, "-o", "film.mp4")
+        assert isinstance(result.exception, UsageError) and "expected the name of a folder" in str(result.exception)
+        assert not Path("film.mp4").exists()

@@ -61,6 +61,8 @@ class Budget:
                     f"budget '{part.strip()}': expected NAME=LIMIT with one of {', '.join(LIMITS)}, such as vR=0.05,"
                     f" us=50 or time=10x{nearest(name, LIMITS)}"
                 )
+            if name in limits:
+                raise UsageError(f"budget '{text}': {name} is limited twice; expected one limit of each kind")
             limits[name] = _number(part.strip(), number.removesuffix("x") if name == "time" else number)
             if name == "time" and limits[name] == 0:
                 raise UsageError(f"budget '{part.strip()}': no setting takes no time; expected more, such as time=10x")

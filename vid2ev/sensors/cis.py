@@ -16,7 +16,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.limits import check_sensor, check_spec, time_ns
 from vid2ev.stream.exposures import Exposure
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.saved import clock, entry
+from vid2ev.stream.saved import check_mark, clock, entry, mark_of
 
 __all__ = ["Cis", "CisSpec"]
 
@@ -114,7 +114,7 @@ class Cis:
     # ------------------------------------------------------------------------------------------------- state
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything that later exposures depend on, as plain arrays (copies); needs at least one frame."""
+        """Everything that later exposures depend on, as plain arrays (copies); nothing before the first frame."""
         if self._t_ns is None:
             return {}
         clock = [self._t_ns, self._first_ns, self._next]
@@ -125,13 +125,15 @@ class Cis:
             "open": np.array([(each.index, each.start_ns) for each in self._open], np.int64).reshape(-1, 2),
             "totals": np.array([self._rows.get(each.total) for each in self._open]).reshape(-1, *self._rows.shape),
             "pending": np.array([each.pending for each in self._open]).reshape(-1, self._rows.shape[0]),
-        }
+        } | self._mark()
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave.
 
         Raises UsageError for another.
         """
+        if state:
+            check_mark(state, self._mark())
         self._open.clear()
         if not state:
             self._t_ns, self._first_ns, self._next = None, 0, 0
@@ -168,6 +170,9 @@ class Cis:
         return {name: self._shaped(np.broadcast_to(planes[field], shape).copy()) for name, field in names.items()}
 
     # ------------------------------------------------------------------------------------------------- inside
+
+    def _mark(self) -> dict[str, np.ndarray]:
+        return mark_of(self.spec, self.size, self.seed, self.camera)
 
     def _advance(self, light: np.ndarray, t_ns: int, cut: bool) -> Iterator[Exposure]:
         """The exposures that a frame completes; all of them are to be taken before the next frame comes."""

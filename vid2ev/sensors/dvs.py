@@ -23,7 +23,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.saved import clock
+from vid2ev.stream.saved import check_mark, clock, mark_of
 from vid2ev.stream.still import Still, nothing_told, told_of
 
 if TYPE_CHECKING:
@@ -194,19 +194,21 @@ class Dvs:
     # ------------------------------------------------------------------------------------------------- state
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything that later events depend on, as plain arrays (copies); needs at least one frame."""
+        """Everything that later events depend on, as plain arrays (copies); nothing before the first frame."""
         if self._t_ns is None:
             return {}
         state = self._pixels.state()
         numbers = [self._t_ns, self._leak_since_ns, self._step, int(self._fresh_noise), self._origin_ns]
         state["clock"] = np.array(numbers, np.int64)
-        return state | self._readout.state()
+        return state | self._readout.state() | self._mark()
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave.
 
         Raises UsageError for another.
         """
+        if state:
+            check_mark(state, self._mark())
         self._pixels.restore(state)
         self._seen = None
         if not state:
@@ -263,6 +265,9 @@ class Dvs:
         for t in t_ns:
             times.append(later(t, times[-1] if times else self._t_ns))
         return times
+
+    def _mark(self) -> dict[str, np.ndarray]:
+        return mark_of(self.spec, self.size, self.seed, self.camera)
 
     def _light(self, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Light [..., height, width] as the walk takes it, with the table of its codes."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from vid2ev.errors import UsageError
 from vid2ev.stream.events import Events
 
 LATEST_NS = 1 << 62
+MARK = "of"
 
 
 def entry(state: Mapping[str, np.ndarray], name: str, dtype: Any, shape: tuple[int | None, ...]) -> np.ndarray:
@@ -25,6 +28,18 @@ def entry(state: Mapping[str, np.ndarray], name: str, dtype: Any, shape: tuple[i
             f" {[length or 'any' for length in shape]}: another sensor's state"
         )
     return array
+
+
+def mark_of(spec: BaseModel, size: tuple[int, int], seed: int, camera: int) -> dict[str, np.ndarray]:
+    """What a state says of the sensor that gave it: uint8 [16], another for every other sensor."""
+    said = repr((spec.model_dump_json(), *map(int, (*size, seed, camera)))).encode()
+    return {MARK: np.frombuffer(hashlib.blake2b(said, digest_size=16).digest(), np.uint8).copy()}
+
+
+def check_mark(state: Mapping[str, np.ndarray], mark: Mapping[str, np.ndarray]) -> None:
+    """Raise UsageError for a state of a sensor with another mark."""
+    if not np.array_equal(entry(state, MARK, np.uint8, mark[MARK].shape), mark[MARK]):
+        raise UsageError("state of a sensor with other parameters, or another size, seed or camera; expected its own")
 
 
 def clock(state: Mapping[str, np.ndarray], name: str, count: int) -> tuple[int, ...]:

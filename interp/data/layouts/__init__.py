@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from interp.data.layouts.ergb import LAYOUTS, Ergb
+from interp.data.layouts.ergb import LAYOUTS, STAMPS, Ergb, Names
 from interp.data.layouts.own import MANIFEST, Own
 from interp.data.layouts.sequence import Placed, Sequence, Windows, windows
 from vid2ev.errors import DataError, UsageError
@@ -74,9 +74,13 @@ def opened_in(folder: str | Path) -> tuple[list[Sequence], dict[str, str]]:
 def _kind(folder: Path) -> str | None:
     if (folder / MANIFEST).is_file():
         return "own"
-    return next(
-        (name for name, of in LAYOUTS.items() if all((folder / part).is_dir() for part in (of.images, of.events))), None
-    )
+    return next((name for name, of in LAYOUTS.items() if _is_of(folder, of)), None)
+
+
+def _is_of(folder: Path, of: Names) -> bool:
+    """Whether a folder is a sequence of a layout, or what is left of one without its events."""
+    images = folder / of.images
+    return images.is_dir() and ((folder / of.events).is_dir() or (images / STAMPS[0]).is_file())
 
 
 def _below(folder: Path, depth: int) -> list[Path]:

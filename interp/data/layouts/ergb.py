@@ -5,15 +5,17 @@
               polarity
 
 Times are microseconds, one to a line.  Some folders have more pictures than times, or more times than pictures: the
-first ones belong together.  Where pictures are missing by their numbers, and there is a time for each number, a picture
-has the time of its number.  Some have lines above the times that are none.  Events lie on the pictures, between pixels;
-what lies beyond is dropped where they are counted (`Placed.within`), never moved to the border.
+first ones belong together, or the last times where the first do not increase.  Where pictures are missing by their
+numbers, and there is a time for each number, a picture has the time of its number.  Some have lines above the times
+that are none.  Events lie on the pictures, between pixels; what lies beyond is dropped where they are counted
+(`Placed.within`), never moved to the border.
 
 Sources: Tulyakov et al., "Time Lens", CVPR 2021, and "Time Lens++", CVPR 2022, and the READMEs of their data.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,6 +56,8 @@ class Ergb:
 
     def __init__(self, folder: Path, layout: str):
         names = LAYOUTS[layout]
+        if not (folder / names.events).is_dir():
+            raise DataError(f"{folder}: no folder {names.events}; expected the events of its pictures in it")
         self.name, self.folder, self.remarks = folder.name, folder, list[str]()
         pictures, stamps = numbered(folder / names.images, ".png"), self._stamps(folder / names.images)
         stamps = self._of_numbers(pictures, stamps)
@@ -62,10 +66,7 @@ class Ergb:
         if not pictures or not stamps:
             raise DataError(f"{folder}: {len(pictures)} pictures and {len(stamps)} times; expected some of both")
         if len(pictures) != len(stamps):
-            some = min(len(pictures), len(stamps))
-            self.remarks.append(
-                f"{len(pictures)} pictures and {len(stamps)} times: the first {some} are taken for pairs"
-            )
+            stamps = self._paired(len(pictures), stamps)
         timed = [(picture, t_us) for picture, t_us in zip(pictures, stamps, strict=False) if t_us is not None]
         if not timed:
             raise DataError(f"{folder}: no picture has a time; expected one to a line of {STAMPS[0]}")
@@ -115,6 +116,13 @@ class Ergb:
             raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
         return found[0][..., ::-1]
 
+    def _paired(self, pictures: int, stamps: list[int | None]) -> list[int | None]:
+        """The first times for as many pictures; the last ones where only these increase: lines above them are wrong."""
+        some = min(pictures, len(stamps))
+        which = "last" if not _increase(stamps[:some]) and _increase(stamps[-some:]) else "first"
+        self.remarks.append(f"{pictures} pictures and {len(stamps)} times: the {which} {some} are taken for pairs")
+        return stamps[-some:] if which == "last" else stamps[:some]
+
     def _of_numbers(self, pictures: list[Path], stamps: list[int | None]) -> list[int | None]:
         """The times of the pictures' numbers, where some of these are left out and there is a time for each; else the
         times as they are."""
@@ -135,6 +143,12 @@ class Ergb:
         if strange := times.count(None):
             self.remarks.append(f"{strange} of the {len(times)} lines of {path.name} say no time")
         return times
+
+
+def _increase(stamps: list[int | None]) -> bool:
+    """Whether times go up from each to the next, whatever lines between them say no time."""
+    times = [t_us for t_us in stamps if t_us is not None]
+    return all(a < b for a, b in pairwise(times))
 
 
 def _time_us(line: str) -> int | None:
