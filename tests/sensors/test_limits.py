@@ -67,7 +67,7 @@ def test_a_transfer_that_is_none_is_refused_when_the_sensor_is_made(transfer: An
         Dvs(DvsSpec(), (2, 2), transfer=transfer)
 
 
-@pytest.mark.parametrize("t_ns", ["2", None, float("nan"), float("inf"), [1, 2]])
+@pytest.mark.parametrize("t_ns", ["2", None, float("nan"), float("inf"), [1, 2], 1.5, 2**63, -(2**63)])
 def test_a_time_that_is_none_is_refused(t_ns: Any) -> None:
     for sensor, light in ((Dvs(DvsSpec(), (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))):
         sensor.step(light, 0)

@@ -46,9 +46,12 @@ def time_ns(t_ns: Any) -> int:
     try:
         if isinstance(t_ns, str | bytes):
             raise TypeError
-        return int(t_ns)
+        whole = int(t_ns)
+        if whole != t_ns or abs(whole) >= 1 << 63:
+            raise ValueError
+        return whole
     except (TypeError, ValueError, OverflowError) as error:
-        raise UsageError(f"frame time {t_ns!r}: expected a whole number of nanoseconds") from error
+        raise UsageError(f"frame time {t_ns!r}: expected a whole number of nanoseconds, below 2**63") from error
 
 
 def is_whole(number: Any, least: int, most: int | None = None) -> bool:
