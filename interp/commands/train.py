@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from interp.train.machines import Machines
 
 WORD = "auto"
+SAYS = {  # what an option says of a job: the part of it, if it is in one, and the name
+    "network": ("", "network"), "size": ("", "size"), "seed": ("recipe", "seed"), "steps": ("recipe", "steps"),
+    "time_": ("recipe", "time_s"),
+}  # fmt: skip
 
 
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
@@ -166,7 +170,10 @@ def _job(options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
 
 
 def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]) -> Job:
-    """The job of a run that was begun, unless the command line says what it should be."""
+    """The job of a run that was begun, with what the command line says of it: whatever is not said is as it was begun.
+
+    What decides more than a number, such as settings and data, has to be said as a whole.
+    """
     from pydantic import ValidationError
 
     from interp.train.job import Job
@@ -174,10 +181,18 @@ def _taken_up(path: Path, options: Mapping[str, Any], starts: Mapping[str, Path]
     from vid2ev.commands.progress import given
     from vid2ev.untrusted import first_line
 
-    if given() & options.keys():
+    said = given() & options.keys()
+    if said - SAYS.keys():
         return _job(options, starts)
     try:
-        return Job(**begun_job(path))
+        begun = Job(**begun_job(path))
+        if not said:
+            return begun
+        asked, merged = _job(options, starts).model_dump(), begun.model_dump()
+        for part, name in map(SAYS.__getitem__, said):
+            of, to = (asked[part], merged[part]) if part else (asked, merged)
+            to[name] = of[name]
+        return Job(**merged)
     except (ValidationError, TypeError) as error:
         raise DataError(
             f"{path / 'run.json'} does not say what is trained ({first_line(error, 150)}); copy the run again, or start"

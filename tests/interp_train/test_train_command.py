@@ -50,6 +50,18 @@ def test_a_run_in_two_sessions_ends_with_a_table() -> None:
     assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}
 
 
+@pytest.mark.parametrize(
+    "said", [["--steps", "3"], ["--seed", "7"], ["--network", "rrin-events-guided"], ["--size", "tiny"]]
+)
+def test_what_is_not_said_of_a_run_is_as_it_was_begun(said: list[str]) -> None:
+    assert run(*FEW, "--seed", "7", "-o", "run", "--session", "0.001s").exit_code == 0
+    for wrong, why in (("--steps", "recipe.steps = 3, not 4"), ("--seed", "recipe.seed = 7, not 4")):
+        refused = run("-o", "run", "--resume", wrong, "4")
+        assert refused.exit_code == 2 and f"was begun with {why}" in refused.output
+    again = run("-o", "run", "--resume", *said, "--workers", "0", "--cpu")
+    assert again.exit_code == 0 and again.output.startswith("run: step 3 of 3"), again.output
+
+
 def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> None:
     told = run("--dry-run", "--time", "2h", "--network", "e2vid")
     assert told.exit_code == 0, told.output
