@@ -113,7 +113,9 @@ def test_a_sensor_takes_no_state_of_another_one(kind: str, changed: dict[str, An
         return made
 
     one = sensor()
-    with pytest.raises(UsageError, match="state of a sensor with other parameters, or another size, seed or camera"):
+    with pytest.raises(
+        UsageError, match="another sensor's state, which has other parameters, or another size, seed or camera"
+    ):
         one.restore(sensor(**changed).state())
     one.restore(sensor().state())
 
