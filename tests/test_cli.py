@@ -410,7 +410,8 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
 @pytest.mark.parametrize("arguments", [["render", "events.csv", "-o", "film.mp4", "--by", "duration:1ms"], SCENE])
 def test_who_asks_it_to_end_finds_nothing_half_made(arguments: list[str], asks: signal.Signals) -> None:
     Path("events.csv").write_text("t,x,y,p\n" + "".join(f"{1000 * k},{k % 64},{k % 48},1\n" for k in range(10**5)))
-    child = started(*arguments, stderr=subprocess.PIPE)
+    heard = f"import signal; signal.signal({int(asks)}, signal.SIG_DFL)"  # (who runs the tests may hear nothing)
+    child = started(*arguments, before=heard, stderr=subprocess.PIPE)
     while left() == {"events.csv"} and child.poll() is None:
         time.sleep(0.05)
     child.send_signal(asks)
