@@ -39,7 +39,9 @@ def mark_of(spec: BaseModel, size: tuple[int, int], seed: int, camera: int) -> d
 def check_mark(state: Mapping[str, np.ndarray], mark: Mapping[str, np.ndarray]) -> None:
     """Raise UsageError for a state of a sensor with another mark."""
     if not np.array_equal(entry(state, MARK, np.uint8, mark[MARK].shape), mark[MARK]):
-        raise UsageError("another sensor's state, which has other parameters, or another size, seed or camera; expected its own")
+        raise UsageError(
+            "another sensor's state, which has other parameters, or another size, seed or camera; expected its own"
+        )
 
 
 def clock(state: Mapping[str, np.ndarray], name: str, count: int) -> tuple[int, ...]:
