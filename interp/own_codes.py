@@ -61,5 +61,5 @@ def _halves(curve: str) -> np.ndarray:
 @lru_cache(8)
 def _shown(curve: str) -> np.ndarray:
     if curve == "srgb":
-        return (np.arange(256, dtype=np.float32) / np.float32(255)).astype(np.float32)
+        return np.arange(256, dtype=np.float32) / np.float32(255)
     return parse_transfer("srgb").to_signal(parse_transfer(curve).to_light(np.arange(256) / 255)).astype(np.float32)

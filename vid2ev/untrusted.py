@@ -70,6 +70,23 @@ def read_text(path: Path) -> str:
     return path.read_text(encoding="utf-8-sig")
 
 
+def read_lines(path: Path, expected: str) -> list[str]:
+    """The lines of a text that may be long, such as one with a line for each frame.
+
+    Raises UsageError if there is no such file, DataError for what is not `expected`: a pipe, no text, more than one
+    file may put into memory, what cannot be read.
+    """
+    check_file(path)
+    check_bytes(path, path.stat().st_size if path.is_file() else 0)
+    try:
+        return path.read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: no such file; expected {expected}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise DataError(f"{path} cannot be read: {reason}; expected {expected}") from error
+
+
 def check_depth(path: Path, text: str) -> None:
     """Raise DataError for YAML with more brackets in brackets than anybody writes.
 

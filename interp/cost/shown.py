@@ -7,7 +7,7 @@ from typing import Any
 
 from interp.cost.measure import Rebuilding, Row
 from vid2ev.compare.plots import save
-from vid2ev.cost.plot import label
+from vid2ev.cost.plot import label, stairs
 from vid2ev.cost.table import columns
 
 COLOURS = {
@@ -49,7 +49,7 @@ def plot(found: Rebuilding, picture: Path) -> None:
         x, y = zip(*here, strict=True)
         axes.scatter(x, y, color=COLOURS[group], s=36, zorder=3, label=group)
     x, y = zip(*(_place(found, row) for row in found.front), strict=True)
-    axes.step(x, y, where="post", color="#444444", lw=1)
+    stairs(axes, x, y)
     x_best, y_best = _place(found, found.recommended)
     axes.scatter(
         [x_best], [y_best], s=190, facecolors="none", edgecolors="#e08a00", linewidths=2, zorder=4,

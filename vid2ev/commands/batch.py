@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.untrusted import check_file
+from vid2ev.errors import UsageError, Vid2evError
+from vid2ev.untrusted import read_lines
 
 if TYPE_CHECKING:
     from vid2ev.cluster.work import Outcome
@@ -193,13 +193,7 @@ def is_list(path: Path) -> bool:
 
 def _listed(path: Path) -> list[str]:
     """The lines of a list but for empty ones and those that begin with #.  Raises DataError, UsageError."""
-    check_file(path)
-    try:
-        lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"{path} cannot be read as a list of videos ({error}); give a text file, a line for each"
-        ) from error
+    lines = [line.strip() for line in read_lines(path, "a list of videos, a line for each")]
     found = [line for line in lines if line and not line.startswith("#")]
     if not found:
         raise UsageError(f"{path} names no videos; expected a line for each")

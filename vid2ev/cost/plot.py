@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from vid2ev.compare.plots import save
 from vid2ev.cost.front import Row
@@ -33,7 +35,16 @@ MEANINGS = {
     "several": "several together",
 }
 LEAST = 1e-4  # less is drawn as nothing
-CLOSE_PX = 11  # labels nearer than this, up or down, would cover each other
+MARK_PX = 5  # half of what a point takes
+PLACES = [  # of a name beside its point [points of type], and which end of it is there; the best ones first
+    *((8, up, "left") for up in (0, 7, -7)),
+    *((-8, up, "right") for up in (0, 7, -7)),
+    *(
+        (right, up, end)
+        for up in (11, -11, 20, -20, 30, -30)
+        for right, end in ((0, "center"), (3, "left"), (-3, "right"))
+    ),
+]
 
 
 def plot(cost: Cost, picture: Path) -> None:
@@ -83,8 +94,7 @@ def _scale(axes: Any, cost: Cost, rows: list[Row]) -> None:
 
 def _draw_front(axes: Any, cost: Cost) -> None:
     ahead = [row for row in cost.front if row.errors.headline is not None]
-    places = [row.time for row in ahead], [_error(row) for row in ahead]
-    axes.step(*places, where="post", color="#444444", linewidth=1, zorder=1)
+    stairs(axes, [row.time for row in ahead], [_error(row) for row in ahead])
 
 
 def _draw_recommended(axes: Any, cost: Cost) -> None:
@@ -101,20 +111,33 @@ def _draw_recommended(axes: Any, cost: Cost) -> None:
         )  # fmt: skip
 
 
-def label(axes: Any, points: Iterable[tuple[float, float, str, str]]) -> None:
-    """Names beside points (x, y, name, colour), moved up where they would cover one another."""
+def stairs(axes: Any, x: Sequence[float], y: Sequence[float]) -> None:
+    """A front: level from each point to the next."""
+    axes.plot(np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1], color="#444444", linewidth=1, zorder=1)
+
+
+def label(axes: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
+    """Names beside points (x, y, name, colour), each where it covers least of names and points, and of lines."""
+    from matplotlib.transforms import Bbox
+
     axes.figure.draw_without_rendering()
-    taken: list[tuple[float, float, float]] = []
-    for x_of, y_of, name, colour in sorted(points, key=lambda point: point[1]):
-        x, y = axes.transData.transform((x_of, y_of))
-        width, up = 6.0 * len(name), 0.0
-        while any(abs(y + up - other) < CLOSE_PX and x < right and x + width > left for left, right, other in taken):
-            up += CLOSE_PX
-        taken.append((x, x + width, y + up))
-        axes.annotate(
-            name, (x_of, y_of), xytext=(8, up * 0.72 - 3), textcoords="offset points", fontsize=8, color=colour,
-            bbox={"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5},
-        )  # fmt: skip
+    marks = axes.transData.transform([point[:2] for point in points])
+    taken = [Bbox.from_bounds(x - MARK_PX, y - MARK_PX, 2 * MARK_PX, 2 * MARK_PX) for x, y in marks]
+    lines = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
+
+    def covers(box: Any) -> int:
+        across = sum(line.intersects_bbox(box, filled=False) for line in lines)
+        outside = not (axes.bbox.containsx(box.x0) and axes.bbox.containsx(box.x1))
+        return int(across + 10 * (outside + sum(box.overlaps(other) for other in taken)))
+
+    for x, y, name, colour in points:
+        text = axes.annotate(name, (x, y), (0, 0), textcoords="offset points", fontsize=8, color=colour, va="center")
+
+        def there(place: tuple[int, int, str], text: Any = text) -> Any:
+            text.set(position=place[:2], ha=place[2])
+            return text.get_window_extent()
+
+        taken.append(there(min(PLACES, key=lambda place: covers(there(place)))))
 
 
 def _error(row: Row) -> float:

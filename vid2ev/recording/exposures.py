@@ -32,7 +32,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
-from vid2ev.untrusted import first_line, read_text
+from vid2ev.untrusted import first_line, read_lines
 
 KINDS = {"raw": "raw", "png": "frames", "mp4": "frames.mp4"}  # and what they are called
 TIMESTAMPS, HEADER = "timestamps.txt", "# start_us end_us\n"
@@ -128,13 +128,11 @@ class ExposureFiles:
 
 def read_spans(path: Path) -> np.ndarray:
     """When each exposure began and ended, int64 [N, 2], us, of a file timestamps.txt.  Raises DataError."""
+    lines = read_lines(path, "two times in us on every line")
     try:
-        lines = read_text(path).splitlines()
         rows = [[int(word) for word in line.split()] for line in lines if line.strip() and line.lstrip()[0] != "#"]
         spans = np.array(rows, np.int64).reshape(-1, 2)
-    except DataError:
-        raise
-    except (OSError, ValueError, OverflowError) as error:
+    except (ValueError, OverflowError) as error:
         said = first_line(error, 100)
         raise DataError(f"{path}: cannot be read ({said}); expected two times in us on every line") from error
     if not len(spans) or np.abs(spans.astype(np.float64)).max() >= LATEST_US or np.any(spans[:, 1] < spans[:, 0]):

@@ -18,7 +18,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file
-from vid2ev.untrusted import check_file
+from vid2ev.untrusted import read_lines
 
 HEADER = "# timestamp tx ty tz qx qy qz qw\n"
 COLUMNS = 8
@@ -53,15 +53,8 @@ def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarra
 def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Instants [N] int64 ns, positions [N, 3] m, unit quaternions x, y, z, w [N, 4].  Raises DataError, UsageError if
     there is no such file."""
-    check_file(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except FileNotFoundError as error:
-        raise UsageError(f"{path}: no such file; give a file of poses") from error
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        raise DataError(f"{path} cannot be read: {reason}; give a file of poses") from error
-    rows = [(number, line.split()) for number, line in enumerate(lines, start=1) if _holds(line)]
+    lines = enumerate(read_lines(path, "a file of poses"), start=1)
+    rows = [(number, line.split()) for number, line in lines if _holds(line)]
     times = np.array([_nanoseconds(path, number, row) for number, row in rows], np.int64)
     poses = np.array([_numbers(path, number, row) for number, row in rows], np.float64).reshape(-1, 7)
     quaternions = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)

@@ -26,9 +26,9 @@ class BatchEvents:
 
     clips: list[list[Events]]
 
-    def of(self, clip: int, frame: int) -> Events:
-        """Those of one interval."""
-        return self.clips[clip][frame]
+    def of(self, clip: int) -> list[Events]:
+        """Those of each interval of a clip."""
+        return self.clips[clip]
 
     def __len__(self) -> int:
         return sum(len(events) for clip in self.clips for events in clip)

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import check_file, first_line, read_array
+from vid2ev.untrusted import first_line, read_array, read_lines
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
@@ -116,12 +116,7 @@ def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fracti
     """Stamps [s] of a text file and the unit they were read in (rule above).  Raises DataError, for lines that name
     other `images` than those that are there in their place, too."""
     unit, column, rows = None, -1, []
-    check_file(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as text ({error}); expected one time per line") from error
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_lines(path, "one time per line"), 1):
         if line.lstrip().startswith("#"):
             said = re.match(UNIT_LINE, line)
             stated = said and (said[1] or said[2] or said[3])
