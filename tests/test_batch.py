@@ -73,6 +73,15 @@ def test_names_that_occur_twice_get_a_number() -> None:
     assert len(one) and len(other) and one.t.tolist() != other.t.tolist()
 
 
+def test_of_files_a_name_goes_on_after_a_comma() -> None:
+    named = batch.directories(
+        ["2024,05/clip.mp4", "my,clip.mp4", "scene:room,seed=3", "synthetic:ramp,fps=9", "-"], Path()
+    )
+    assert [path.name for path in named.values()] == [
+        "clip_events", "my,clip_events", "room_events", "ramp_events", "stdin_events",
+    ]  # fmt: skip
+
+
 def test_resume_leaves_what_is_done_and_makes_the_rest() -> None:
     assert vid2ev("clips/a9.npy", "clips/broken.mp4", "-o", "out").exit_code == 1
     made = Path("out/a9_events/manifest.json").stat().st_mtime_ns

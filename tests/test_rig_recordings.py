@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, read_events
+from vid2ev.conversion import Paused
 from vid2ev.recipe import Recipe
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.camera import Camera, Rig, Source
@@ -238,6 +239,24 @@ def test_other_depth_is_another_recording(tmp_path: Path) -> None:
     np.save(tmp_path / "depth.npy", np.full((48, 64), 3, np.float32))
     with pytest.raises(UsageError, match="was begun with"):
         convert(CLIP, tmp_path / "out", resume=True, **options)
+
+
+def test_another_seed_is_another_recording_of_a_rig(tmp_path: Path) -> None:
+    options = OPTIONS | {"rig": rig()}
+    made = convert(CLIP, tmp_path / "out", **options)
+    assert convert(CLIP, tmp_path / "out", resume=True, **options) == made
+    with pytest.raises(UsageError, match="was begun with seed = 3, not 4"):
+        convert(CLIP, tmp_path / "out", resume=True, **options | {"seed": 4})
+
+
+def test_a_seed_that_was_drawn_is_that_of_the_rig_when_it_is_taken_up(tmp_path: Path) -> None:
+    options = OPTIONS | {"rig": rig(), "seed": None}
+    with pytest.raises(Paused):
+        convert(CLIP, tmp_path / "out", piece=1, pause=lambda: True, **options)
+    made = convert(CLIP, tmp_path / "out", resume=True, **options)
+    whole = convert(CLIP, tmp_path / "whole", **options | {"seed": made["seed"]})
+    assert columns(tmp_path / "out" / "left") == columns(tmp_path / "whole" / "left")
+    assert made["seed"] == whole["seed"] != convert(CLIP, tmp_path / "other", **options)["seed"]
 
 
 def test_frames_are_asked_for_beside_any_rig(tmp_path: Path) -> None:

@@ -102,6 +102,21 @@ def test_a_sensor_takes_no_state_of_another_kind() -> None:
     dvs.restore(state)
 
 
+@pytest.mark.parametrize("keys", [[], ["frame_rate_hz=3"], ["delay_us=900"]])
+def test_an_empty_state_is_that_of_a_sensor_without_light(keys: list[str]) -> None:
+    light = np.random.default_rng(1).uniform(0, 1, (9, 12, 16)).astype(np.float32)
+    used, new = (Dvs(load_sensor("paper", keys), (16, 12), 5) for _ in range(2))
+    used.steps(light, [k * 10**7 for k in range(9)])
+    used.restore(new.state())
+    assert used.counts == new.counts and not used.state()
+    for sensor in (used, new):
+        sensor.steps(light, [10**9 + k * 10**7 for k in range(9)])
+    one, other = used.state(), new.state()
+    assert one.keys() == other.keys()
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name], name)
+
+
 @pytest.mark.parametrize("changed", [{"seed": 6}, {"camera": 1}, {"size": (12, 16)}, {"key": "frame_rate_hz=40"}])
 @pytest.mark.parametrize("kind", ["dvs", "cis"])
 def test_a_sensor_takes_no_state_of_another_one(kind: str, changed: dict[str, Any]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -29,6 +28,7 @@ from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part, usable_cores
 from vid2ev.sight import scene_of
+from vid2ev.sources import short_name
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
@@ -90,7 +90,8 @@ def convert(
     device     where light and events are made: cpu, cuda (a GPU; the CPU where there is none), or auto, by how much
                there is to do (`sensors.devices`); "simulated" is for tests.  Light differs by what float32 rounds
     part       pixels of the event cameras that are simulated; `split` puts the recordings of all parts together
-    since_ns   the instant that the recording begins with; what is seen before it only warms event cameras
+    since_ns   the instant that the recording begins with; what is seen before it only warms event cameras (not with
+               effects "auto", which would have to look at it)
     made       the events of all parts, which are then not simulated
     pause      asked at every checkpoint: whether to raise `Paused`, for `resume` to go on from there
     What is written is said by the fields of `Outputs` (formats, preview, frames, ...).  Everything else is as for
@@ -111,6 +112,8 @@ def convert(
     where = device_for(device, recipe.work, threads)
     if scene := scene_of(recipe.source):
         scene.world.afresh, scene.memory = not skip, where.memory
+    if effects == "auto" and since_ns is not None:
+        raise UsageError("effects auto of a recording that begins after its light, which is not looked at; name them")
     planner = Planner(recipe, tolerance, threads, where) if effects == "auto" else None
     recipe, plans = (recipe, {}) if planner else planned(recipe, effects, tolerance)
     if resume and not recipe.source.rewindable:
@@ -151,10 +154,7 @@ def telling(tell: Callable[[Mapping[str, Any]], object]) -> Report:
 
 def default_directory(video: str | Path) -> Path:
     """Where the recording of a video goes if nothing else is said."""
-    if str(video) == "-" or str(video).startswith("camera:"):
-        return Path("stdin_events" if str(video) == "-" else f"{str(video).replace(':', '')}_events")
-    path = Path(os.path.abspath(str(video).removeprefix("synthetic:").removeprefix("scene:").partition(",")[0]))
-    return Path(f"{path.name if path.is_dir() else path.stem}_events")
+    return Path(f"{short_name(str(video))}_events")
 
 
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:

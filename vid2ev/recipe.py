@@ -193,7 +193,7 @@ class Recipe:
         """The recipe as JSON: what the manifest says of it, and by which a run is known again."""
         if self.alone:
             return self.describe_camera(self.mounts[0])
-        rig = {"rig": self.rig.describe(), "depth": self.depth}
+        rig = {"rig": self.rig.describe(), "depth": self.depth, "seed": self.seed}
         cameras = {mount.name: mount.describe() for mount in self.mounts}
         return plain(self._shared() | rig | {"cameras": cameras, "bayer": self.bayer, "labels": self.labels})
 

@@ -119,6 +119,8 @@ def test_a_state_is_taken_up_by_the_other(name, memory):
     assert_same(seen(cpu, clip, 5), whole[5:])
     assert_same(card.steps(frames[5:], clip.t_ns[5:]), whole[5:])
     assert sum(map(len, whole[5:])) > 100 and card.counts == cpu.counts
+    cpu.forget_counts(), card.forget_counts()
+    assert card.counts == cpu.counts and not any(card.counts.values())
 
 
 def test_frames_with_cuts_and_with_what_is_still_are_run_as_on_a_cpu():

@@ -181,6 +181,16 @@ def test_rigs_camera_by_camera() -> None:
     assert compare("one/left", "two/left")["distance"] == found["left"]["distance"]
 
 
+def test_a_folder_of_recordings_is_no_rig() -> None:
+    for name in ("one/a", "one/rig", "two/a", "two/rig"):
+        Path(name).parent.mkdir(exist_ok=True)
+        convert(
+            "synthetic:moving-edge,size=24x16,duration_s=0.1", name, frame_camera=name.endswith("rig"), preview=False
+        )
+    with pytest.raises(UsageError, match="one"):
+        CliRunner().invoke(command, ["one", "two"], catch_exceptions=False, standalone_mode=False)
+
+
 def test_statistics_of_each_alone() -> None:
     one, other = write(busy(3000, SIZE, seed=1), "a.h5"), write(isolated(20, size=SIZE), "b.h5", duration_us=30 * 10**6)
     found = compare(one, other, "--statistics", "--align", "start")
@@ -189,3 +199,10 @@ def test_statistics_of_each_alone() -> None:
     assert found["reference_statistics"]["events"] == found["reference_events"]
     said = CliRunner().invoke(command, [one, other, "--statistics", "--align", "start"], catch_exceptions=False)
     assert "A alone" in said.stdout and "events/pixel/s" in said.stdout
+
+
+def test_rates_are_over_the_time_compared() -> None:
+    """Of which the first event says nothing."""
+    path = write(moved(isolated(20, size=SIZE), 80 * 10**6), "a.h5")
+    found = compare(path, path, "--statistics")["statistics"]
+    assert found["rate_hz"] == pytest.approx(20 / 100 / (SIZE[0] * SIZE[1]))

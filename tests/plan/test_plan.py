@@ -13,6 +13,7 @@ from against.clips import clean
 from vid2ev.errors import UsageError
 from vid2ev.physics.omission import light_events
 from vid2ev.physics.peaks import taken
+from vid2ev.physics.shading import shading_map
 from vid2ev.plan.measure import scene_of
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
@@ -60,6 +61,20 @@ def test_auto_keeps_within_the_tolerance() -> None:
         assert distance(sent(spec, size, frames), sent(plan.spec, size, frames), size) <= plan.distance
     assert plan.spec.pole_taus_us == () and plan.spec.delay_us == 400
     assert [row.fate for row in plan.rows] == ["replaced", "replaced"]
+
+
+def test_of_poles_the_first_does_not_go_without_the_second() -> None:
+    plan = plan_of(scene("edge"), POLES, 1.0, among=["photoreceptor", "refractory"])
+    assert plan.gone == () and plan.spec == POLES
+    assert plan_of(scene("edge"), POLES, 1.0, among=["follower"]).gone == ("follower",)
+
+
+@pytest.mark.parametrize("size", [(64, 48), (27, 60)])
+def test_a_shading_is_looked_at_up_to_the_corners(size: tuple[int, int]) -> None:
+    spec = clean(shading=(0.0, -0.5))
+    frames = [Frame(np.full(size[::-1], 0.3, np.float32), k * 1_000_000) for k in range(3)]
+    figure = EFFECTS["shading"].omission(scene_of(spec, size, frames), spec).figure
+    assert f"light x {shading_map(spec.shading, *size).min():.2g} to 1 " in figure
 
 
 def test_what_costs_nothing_and_what_is_an_estimate_stay() -> None:

@@ -82,6 +82,11 @@ def test_the_range_is_that_of_all_frames_where_depth_is_known() -> None:
     assert (found.near, found.far) == (0.5, 0.0)
 
 
+def test_of_what_is_infinitely_far_a_homography_is_exact() -> None:
+    found = seen_range(np.full((2, 2), np.inf))
+    assert homography_error_px(SOURCE, SOURCE, POSES["ahead"], found) == 0.0
+
+
 def rig(folder: Path) -> Path:
     path = folder / "rig.toml"
     path.write_text(

@@ -10,6 +10,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.columns import EventColumns, column_files
+from vid2ev.recording.disk import lock
 from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
@@ -191,6 +192,25 @@ def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
                 pass
         made(first)
     assert (tmp_path / "out" / "events.h5").exists()
+
+
+def test_a_lock_that_was_removed_since_it_was_opened_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl", reason="no file locks on this system")
+    flock, held, removed = fcntl.flock, [], tmp_path / "out" / "lock"
+
+    def late(handle: int, flags: int) -> None:
+        """As if another process had ended, and a third begun, between the opening of the lock and this."""
+        monkeypatch.setattr(fcntl, "flock", flock)
+        removed.unlink()
+        held.append(lock(tmp_path / "out"))
+        flock(handle, flags)
+
+    (tmp_path / "out").mkdir()
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(UsageError, match="another vid2ev"):
+        lock(tmp_path / "out")
+    os.close(held[0])
+    os.close(lock(tmp_path / "out"))
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:

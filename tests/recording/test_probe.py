@@ -54,6 +54,14 @@ def test_without_effects_the_signal_is_the_log_of_the_light(tmp_path: Path) -> N
     assert len(columns["t_us"]) == 61 and np.all(np.diff(columns["t_us"]) == 5000)
 
 
+def test_times_before_zero_are_told_as_they_are() -> None:
+    light, nothing = np.full((2, 3), 0.5, F), Events.empty(False)
+    inside = [np.zeros(1, F)] * 4
+    for t_ns, said in ((-966_666_667, "-966666.667"), (-1, "-0.001"), (0, "0.000"), (5_000_001, "5000.001")):
+        line = Probe([(1, 1)], 3).lines(Frame(light, t_ns), nothing, inside).decode()
+        assert line.split(",")[0] == said
+
+
 def test_tables_of_some_pixels_each_make_the_table_of_all(tmp_path: Path) -> None:
     """Events of one microsecond in the order of their rows and columns, frames in that in which pixels were named."""
     rng, pixels = np.random.default_rng(0), [(5, 0), (0, 1), (7, 3), (1, 1), (2, 3)]

@@ -38,9 +38,10 @@ def test_integers_need_to_be_told_what_they_mean(tmp_path: Path, dtype, bits: in
     np.testing.assert_array_equal(frame.light, code_table("srgb", bits)[stack[2]])
 
 
-def test_colour(tmp_path: Path) -> None:
-    stack = np.zeros((1, 1, 3, 3), np.uint8)
-    stack[0, 0] = np.diag([255, 255, 255])
+@pytest.mark.parametrize("dtype", [np.uint8, "<u2", ">u2"])
+def test_colour(tmp_path: Path, dtype) -> None:
+    stack = np.zeros((1, 1, 3, 3), dtype)
+    stack[0, 0] = np.diag([np.iinfo(dtype).max] * 3)
     (frame,) = open_source(saved(tmp_path, stack), fps=1, transfer="linear").frames()
     np.testing.assert_allclose(frame.light[0], [0.2126, 0.7152, 0.0722], atol=1e-6)
 
@@ -65,6 +66,9 @@ def test_times_beside_the_file(tmp_path: Path, suffix: str) -> None:
     source = open_source(path)
     assert [frame.t_ns for frame in source.frames()] == [1_000_000, 2_000_000, 4_000_000]
     assert source.describe()["timestamps_unit"] == "us (by spacing)"
+    np.save(tmp_path / "clip_timestamps.npy", 2 * stamps)
+    others = open_source(path).describe()
+    assert others != source.describe() and others.keys() == source.describe().keys()
     assert "are taken for us" in source.warnings[0]
     np.save(path, np.zeros((4, 2, 2), np.float32))
     with pytest.raises(DataError, match="3 times"):

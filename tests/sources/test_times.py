@@ -100,7 +100,9 @@ def test_the_unit_of_a_timestamp_file(tmp_path: Path, text: str, unit: str, seco
     assert read_timestamps(file) == ([Fraction(second) for second in seconds], unit)
 
 
-@pytest.mark.parametrize("text", ["0\nsoon\n", "0\n1/0\n", "0\nnan\n", "# unit: h\n0\n1\n", "1e300\n2e300\n"])
+@pytest.mark.parametrize(
+    "text", ["0\nsoon\n", "0\n1/0\n", "0\nnan\n", "# unit: h\n0\n1\n", "1e300\n2e300\n", "0\n,\n,\nx\n"]
+)
 def test_a_bad_timestamp_file_is_refused_by_name(tmp_path: Path, text: str) -> None:
     file = tmp_path / "timestamps.txt"
     file.write_text(text)

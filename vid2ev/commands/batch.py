@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -51,13 +52,14 @@ def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
     from vid2ev.conversion import default_directory
 
     named: dict[str, Path] = {}
-    for video in videos:
-        name = default_directory(video).name
-        taken = {path.name for other, path in named.items() if other != video}
-        number = 2
+    taken: set[str] = set()
+    alike: Counter[str] = Counter()
+    for video in dict.fromkeys(videos):
+        name = first = default_directory(video).name
         while name in taken:
-            name = f"{default_directory(video).name}_{number}"
-            number += 1
+            alike[first] += 1
+            name = f"{first}_{alike[first] + 1}"
+        taken.add(name)
         named[video] = within / name
     return named
 

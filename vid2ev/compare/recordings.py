@@ -127,7 +127,7 @@ def compare_recordings(
         tally.add(a, b, rows)
     alone = None
     if statistics:
-        of_one, of_other = (statistics_of(progress.noted(side.blocks(span_us)), size) for side in sides)
+        of_one, of_other = (statistics_of(progress.noted(side.blocks(span_us)), size, span_us) for side in sides)
         alone = of_one, of_other
     comparison = tally.comparison()
     kept = comparison.events, comparison.reference_events

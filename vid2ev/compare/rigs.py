@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import UsageError
-from vid2ev.recording.manifest import read_manifest
+from vid2ev.recording.manifest import as_stated, read_manifest
 
 
 def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path, Path]]:
@@ -27,11 +27,11 @@ def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path,
 
 def is_rig(path: Path) -> bool:
     """Whether a folder is the recording of several cameras."""
-    alone = any(file.is_file() for file in path.glob("events*"))
-    return path.is_dir() and not alone and any(path.glob("*/manifest.json"))
+    return (path / "manifest.json").is_file() and "cameras" in read_manifest(path)
 
 
 def event_cameras(folder: Path) -> list[str]:
     """The names of a rig's event cameras."""
-    manifests = sorted(folder.glob("*/manifest.json"))
-    return [path.parent.name for path in manifests if read_manifest(path)["sensor"]["kind"] != "cis"]
+    with as_stated(folder / "manifest.json"):
+        cameras = read_manifest(folder)["cameras"]
+        return sorted(name for name, camera in cameras.items() if camera["kind"] != "cis")

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from vid2ev.errors import UsageError
+from vid2ev.sensors.record import changed
 from vid2ev.toml_text import toml_value
 
 
@@ -37,14 +37,14 @@ class Rung:
 
     def applied(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """The options of a conversion (those of `Recipe.of`, and effects) with what the rung changes."""
-        changed = {**options, **self.options}
+        asked = {**options, **self.options}
         for sensor, key in (("sensor", "dvs"), ("cis", "cis")):
             mine = {name: value for name, value in self.settings.items() if name.startswith("cis.") == (key == "cis")}
-            if mine and isinstance(changed.get(sensor), BaseModel):
-                changed[sensor] = _changed(changed[sensor], mine)
+            if mine and isinstance(asked.get(sensor), BaseModel):
+                asked[sensor] = changed(asked[sensor], {name.removeprefix("cis."): mine[name] for name in mine})
             else:
-                changed["overrides"] = [*changed.get("overrides", ()), *_texts(mine)]
-        return changed
+                asked["overrides"] = [*asked.get("overrides", ()), *_texts(mine)]
+        return asked
 
     def arguments(self) -> str:
         """The same on the command line of `convert`."""
@@ -65,11 +65,3 @@ class Rung:
 
 def _texts(settings: Mapping[str, Any]) -> list[str]:
     return [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in settings.items()]
-
-
-def _changed(spec: BaseModel, settings: Mapping[str, Any]) -> BaseModel:
-    values = {key.removeprefix("cis."): value for key, value in settings.items()}
-    try:
-        return type(spec)(**(spec.model_dump() | values))
-    except ValidationError as error:
-        raise UsageError(f"{', '.join(_texts(settings))}: {error.errors()[0]['msg']}") from error

@@ -10,6 +10,7 @@ from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import whole_file, writing
+from vid2ev.sources import short_name
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Findings:
 
 def check(name: str | None, source: str, overwrite: bool, kind: str = "cost") -> tuple[Path, Path]:
     """The places of the JSON and the PNG file; raises UsageError where one is taken."""
-    stem = name or f"{_short(source)}_{kind}"
+    stem = name or f"{short_name(source)}_{kind}"
     places = Path(f"{stem}.json"), Path(f"{stem}.png")
     for place in places:
         if place.exists() and not overwrite:
@@ -37,9 +38,3 @@ def store(described: Mapping[str, Any], place: Path) -> None:
         place.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(place) as file:
             file.write(f"{json.dumps(described, indent=2, allow_nan=False)}\n".encode())
-
-
-def _short(source: str) -> str:
-    """The name of a source without folder, suffix or what was asked of it."""
-    path = Path(source.removeprefix("synthetic:").removeprefix("scene:").partition(",")[0])
-    return path.name if path.is_dir() else path.stem

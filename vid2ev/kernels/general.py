@@ -45,8 +45,8 @@ from vid2ev.physics.photoreceptor import (
     separate_rates,
     turning_points,
 )
-from vid2ev.physics.photoreceptor_noise import rice_expected, rice_gap
-from vid2ev.physics.random import RICE, philox, unit
+from vid2ev.physics.photoreceptor_noise import rice_expected, rice_gap, rice_words
+from vid2ev.physics.random import unit
 
 KNOTS = 8  # room for the ends of the pieces: three of the response, each cut once at most
 
@@ -186,8 +186,7 @@ def next_rice(path, knots, s, k, on, off, pixel, num, iv):
 def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
     """Does candidate k happen at s? 1 as ON, -1 as OFF, 0 not at all."""
     here = value(path, s)
-    words = philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 16) + k)
-    chance = unit(words[1]) * expected
+    chance = unit(rice_words(pixel, k, num, iv)[1]) * expected
     upward = rice_expected(on - here, np.inf, num, iv)
     if chance < upward:
         return 1

@@ -37,6 +37,7 @@ class PictureReader:
         table = self._tables[bits]
         if picture.ndim == 2:
             return self._grey(table[picture])
+        picture = picture.astype(picture.dtype.newbyteorder("="), copy=False)  # (the kernels take no other)
         height, width, _ = picture.shape
         channels = (picture[..., 0], picture[..., 1], picture[..., 2])
         if self.colour == "rgb":

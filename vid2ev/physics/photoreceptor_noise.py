@@ -92,10 +92,15 @@ def rice_expected(to_on, to_off, num, iv):
 
 
 @compiled
+def rice_words(pixel, k, num, iv):
+    """What is drawn for candidate k of a pixel in this interval: words for its wait, and for its chance."""
+    return philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 24) + k)
+
+
+@compiled
 def rice_gap(pixel, k, num, iv):
-    """The exponential number that stands for the wait of candidate k of a pixel in this interval."""
-    words = philox(num.seed, RICE + 256 * num.camera, pixel, (iv.step << 16) + k)
-    return -log64(unit(words[0]))
+    """The exponential number that stands for the wait of candidate k."""
+    return -log64(unit(rice_words(pixel, k, num, iv)[0]))
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

@@ -56,8 +56,10 @@ def omission_of_levels(seen: Exposed, spec: Any) -> LevelChange:
 
 def omission(scene: Scene, spec: Any) -> Omission:
     """The shading; the scene's light is what arrives behind it, and that before it was measured beside it."""
-    gains = np.maximum(np.polynomial.polynomial.polyval(np.linspace(0.0, 1.0, 65), (1.0, *spec.shading)), 1e-6)
-    figure = f"light x {gains.min():.2g} to {gains.max():.2g} up to a width from the centre"
+    width, height = scene.size
+    radii = np.linspace(0.0, np.hypot(width - 1, height - 1) / 2 / width, 65)
+    gains = np.maximum(np.polynomial.polynomial.polyval(radii, (1.0, *spec.shading)), 1e-6)
+    figure = f"light x {gains.min():.2g} to {gains.max():.2g} from the centre to the corners"
     mean = bare(scene, echoes=echoes(spec))
     if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
         mean += otherwise_late(scene, spec, tuple(gains))

@@ -32,7 +32,7 @@ CELL_NS, CELL_PIXELS = 1_000_000, 2048
 class Shot(BaseModel, frozen=True, extra="forbid"):
     """Parameters of the shot noise."""
 
-    shot_rate_hz: float = Field(0.0, ge=0, le=1e5, description="noise events of a dark pixel, ON and OFF together [Hz]")
+    shot_rate_hz: float = Field(0.0, ge=0, le=5e4, description="noise events of a dark pixel, ON and OFF together [Hz]")
     shot_light_factor: float = Field(0.25, ge=0, le=1, description="the rate at light 1, relative to the dark")
 
 

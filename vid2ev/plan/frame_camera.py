@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
-from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, chosen, names_of, without
+from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, chosen, names_of
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.record import changed
 from vid2ev.stream.bounds import together
 from vid2ev.stream.exposed import ROUNDING, Exposed, LevelChange
 
@@ -124,7 +125,7 @@ def _planned(
     costs = {name: _cost(name, frames_each) for name in omissions}
     rows = tuple(FrameRow(name, _fate(name, gone, said), said, costs[name], 0.0) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
-    return FramePlan(shown, tolerance, rows, without(spec, changes), distance, {})
+    return FramePlan(shown, tolerance, rows, changed(spec, changes), distance, {})
 
 
 def _within(omissions: dict[str, LevelChange], tolerance: float) -> list[str]:

@@ -89,7 +89,7 @@ class Measure:
         travel = self._plane(TRAVEL)
         bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
         return Scene(
-            pixels=self.size[0] * self.size[1],
+            size=self.size,
             frames=self._frames,
             seconds=self._ns * 1e-9,
             threshold=2 * self._half,

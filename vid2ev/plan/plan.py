@@ -20,9 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, TypeVar
-
-from pydantic import ValidationError
+from typing import Any, Literal, NamedTuple
 
 from vid2ev.errors import UsageError, nearest
 from vid2ev.physics import (
@@ -40,14 +38,13 @@ from vid2ev.physics import (
 )
 from vid2ev.physics.thresholds import spread_of
 from vid2ev.sensors.cis_spec import EFFECTS as OF_FRAMES
-from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.record import changed
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.bounds import together
 from vid2ev.stream.scene import Omission, Scene
 
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
 FEW = 50  # events: their number is what it is said to be to a seventh, the standard deviation
-AnySpec = TypeVar("AnySpec", DvsSpec, CisSpec)
 WORDS = ("auto", "all", "none")
 
 
@@ -208,7 +205,10 @@ def _planned(
 ) -> Plan:
     used = list(omissions)
     if effects == "auto":
-        gone = _within(chosen(omissions, among), tolerance)
+        able = chosen(omissions, among)
+        if "follower" in used and "follower" not in able:  # (without which the first pole does not go)
+            able.pop("photoreceptor", None)
+        gone = _within(able, tolerance)
         changes = dict(change for name in gone for change in omissions[name].replace or EFFECTS[name].off.items())
     else:
         kept = names_of(effects)
@@ -221,7 +221,7 @@ def _planned(
     fates = {name: _fate(name, gone, said, effects == "auto") for name, said in omissions.items()}
     rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
-    return Plan(shown, tolerance, rows, without(spec, changes), distance, seen)
+    return Plan(shown, tolerance, rows, changed(spec, changes), distance, seen)
 
 
 def chosen(omissions: dict[str, Any], among: Sequence[str] | None) -> dict[str, Any]:
@@ -275,11 +275,3 @@ def _fate(name: str, gone: Sequence[str], said: Omission, auto: bool) -> Literal
     if name not in gone:
         return "kept"
     return "replaced" if auto and said.replace else "dropped"
-
-
-def without(spec: AnySpec, changes: dict[str, Any]) -> AnySpec:
-    """The specification with these changes; raises UsageError where it cannot be."""
-    try:
-        return type(spec)(**(spec.model_dump() | changes))
-    except ValidationError as error:
-        raise UsageError(f"effects left out by {', '.join(changes)}: {error.errors()[0]['msg']}") from error

@@ -64,7 +64,7 @@ def view_row(mount: Mount, recipe: Recipe, depth: DepthRange) -> Row:
         return _row("kept", Omission(None, "no bound yet", "of depth maps", "no depth is known"), DEPTH_NS)
     off = homography_error_px(source, camera, pose, depth)
     kind: Kind = "bound" if source.model == "none" else "estimate"
-    near_m, far_m = 1 / depth.near, math.inf if depth.far == 0 else 1 / depth.far
+    near_m, far_m = _metres(depth.near), _metres(depth.far)
     figure = f"{off:.2g} px"
     why = f"what one homography would be off; depth {near_m:.3g} to {far_m:.3g} m, holes"
     return _row("kept", Omission(None, kind, figure, why), DEPTH_NS)
@@ -73,12 +73,16 @@ def view_row(mount: Mount, recipe: Recipe, depth: DepthRange) -> Row:
 def homography_error_px(source: Intrinsics, camera: Intrinsics, pose: Pose, depth: DepthRange) -> float:
     """How far from where it looks at the scene's depth a pixel looks at most by the homography of the mean inverse
     depth [px of the source]; inf if the camera stands beyond the nearest of the scene."""
-    if 1 / depth.near <= pose.translation_m[2]:
+    if _metres(depth.near) <= pose.translation_m[2]:
         return math.inf
-    planes = [math.inf if inverse == 0 else 1 / inverse for inverse in (depth.near, depth.far)]
-    middle = _places(source, camera, pose, 2 / (depth.near + depth.far))
-    ends = [np.hypot(*(place - middle)) for place in (_places(source, camera, pose, plane) for plane in planes)]
-    return float(np.nanmax(ends))
+    inverses = (depth.near + depth.far) / 2, depth.near, depth.far
+    middle, *ends = (_places(source, camera, pose, _metres(inverse)) for inverse in inverses)
+    return float(np.nanmax([np.hypot(*(place - middle)) for place in ends]))
+
+
+def _metres(inverse: float) -> float:
+    """The depth [m] of an inverse depth [1/m], 0 for what is infinitely far."""
+    return 1 / inverse if inverse else math.inf
 
 
 def _places(source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float) -> np.ndarray:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import sync, whole_file, write_npy
+from vid2ev.recording.disk import whole_file, whole_path, write_npy
 from vid2ev.recording.truth_arrays import (
     LARGEST,
     SMALLEST,
@@ -69,15 +69,11 @@ def _read_npy(path: Path) -> np.ndarray:
 
 def _write_exr(path: Path, depth: np.ndarray) -> None:
     file = _openexr(path).File({"compression": _openexr(path).ZIP_COMPRESSION}, {"Z": depth})
-    beside = path.with_name(f"{path.name}.new")
-    try:
-        file.write(str(beside))
-    except RuntimeError as error:  # (of the library, for whatever the disk says)
-        beside.unlink(missing_ok=True)
-        raise OSError(f"{path} cannot be written") from error
-    sync(beside)
-    beside.replace(path)
-    sync(path.parent)
+    with whole_path(path) as beside:
+        try:
+            file.write(str(beside))
+        except RuntimeError as error:  # (of the library, for whatever the disk says)
+            raise OSError(f"{path} cannot be written") from error
 
 
 def _read_exr(path: Path) -> np.ndarray:

@@ -30,18 +30,34 @@ def lock(folder: Path) -> int:
     except BlockingIOError:
         os.close(handle)
         raise UsageError(f"another vid2ev is writing {folder}; wait for it, or choose another folder with -o") from None
-    return handle
+    if _is_at(handle, folder / "lock"):
+        return handle
+    os.close(handle)  # (who held it has removed it since it was opened, and others may hold a new one)
+    folder.mkdir(parents=True, exist_ok=True)
+    return lock(folder)
+
+
+def _is_at(handle: int, path: Path) -> bool:
+    """Whether the file of a handle is still there by its name."""
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    return False
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
     """A file to write that is there as a whole or not at all, whenever the process or the machine stops."""
+    with whole_path(path) as beside, open(beside, "wb") as file:
+        yield file
+
+
+@contextmanager
+def whole_path(path: Path) -> Iterator[Path]:
+    """`whole_file` for what others write: the path that they write to, which takes the place of `path`."""
     beside = path.with_name(f"{path.name}.new")
     try:
-        with open(beside, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
+        yield beside
+        sync(beside)
         beside.replace(path)
     except BaseException:
         _remove(beside)

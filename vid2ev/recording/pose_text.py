@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.decimals import decimal
 from vid2ev.recording.disk import whole_file
 from vid2ev.untrusted import read_lines
 
@@ -45,7 +46,7 @@ def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarra
         raise UsageError("poses are finite, and their quaternions of length 1")
     # (+ 0.0: a zero without a sign)
     return "".join(
-        f"{_seconds(int(t))} {' '.join(repr(value + 0.0) for value in pose)}\n"
+        f"{decimal(int(t), 9)} {' '.join(repr(value + 0.0) for value in pose)}\n"
         for t, pose in zip(t_ns, poses.tolist(), strict=True)
     )
 
@@ -63,10 +64,6 @@ def read_poses(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _holds(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
-
-
-def _seconds(t_ns: int) -> str:
-    return f"{'-' if t_ns < 0 else ''}{abs(t_ns) // 10**9}.{abs(t_ns) % 10**9:09d}"
 
 
 def _nanoseconds(path: Path, number: int, row: list[str]) -> int:

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.recording.decimals import decimal
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
@@ -45,7 +46,7 @@ class Probe:
         """The events since the frame before, and a frame with what the pixels have inside after it: filtered, signal,
         level_on and level_off [nat]."""
         lines = self.event_lines(events)
-        t_us = f"{frame.t_ns // 1000}.{frame.t_ns % 1000:03d}"
+        t_us = decimal(frame.t_ns, 3)
         for k, (x, y) in enumerate(self.pixels):
             state = ",".join(f"{column[k]:.7g}" for column in inside)
             lines.append(f"{t_us},{x},{y},frame,{frame.light[y, x]:.7g},{state}\n")

@@ -12,7 +12,7 @@ from vid2ev.errors import UsageError
 from vid2ev.sensors.batch import cameras_of
 from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
-from vid2ev.sensors.clock import Clock, Step, first_count, pace_of
+from vid2ev.sensors.clock import Clock, Step, first_count, later, pace_of
 from vid2ev.sensors.compiled import flags_of, numbers_of
 from vid2ev.sensors.limits import check_sensor, check_spec
 from vid2ev.sensors.pixel_planes import blank_planes
@@ -63,8 +63,13 @@ class DvsBatchOnCard:
         self._origins: list[int] = []  # what noise by count is counted from: the first frames [ns]
 
     def restart(self, light: Any, t_ns: Sequence[int]) -> None:
-        """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips]."""
-        times = [int(t) for _, t in zip(self._numbers, t_ns, strict=True)]
+        """Settle each sensor in a frame of light [clips, height, width], linear, at its t_ns [clips].
+
+        Raises UsageError for times that are not after those before.
+        """
+        before: list[int | None] = [clock.t_ns for clock in self._clocks]
+        before = before or [None] * len(self._numbers)
+        times = [later(t, last) for t, last in zip(t_ns, before, strict=True)]
         self._origins = self._origins or times
         counts = [first_count(t, origin) for t, origin in zip(times, self._origins, strict=True)]
         self._clocks = [Clock(t, count) for t, count in zip(times, counts, strict=True)]
@@ -73,7 +78,7 @@ class DvsBatchOnCard:
     def steps(self, light: Any, t_ns: Any) -> CardEvents:
         """Advance all through frames of light [frames, clips, height, width], linear, at t_ns [frames, clips].
 
-        Raises UsageError for times that are not after those before.
+        Raises UsageError for times that are not after those before, and for sensors without light (`restart`).
         """
         return self._walk.walk(light, self._checked_steps(t_ns))
 
@@ -82,6 +87,8 @@ class DvsBatchOnCard:
         grids.add(self._walk.sent(light, self._checked_steps(t_ns)))
 
     def _checked_steps(self, t_ns: Any) -> list[list[Step]]:
+        if not self._clocks:
+            raise UsageError("a batch without light: expected restart(light, t_ns) before its steps")
         times = np.asarray(t_ns, np.int64)
         before = np.array([[clock.t_ns for clock in self._clocks]], np.int64)
         if (np.diff(np.concatenate([before, times]), axis=0) <= 0).any():

@@ -62,6 +62,10 @@ class CardWalk:
         """What has been counted (`layout.TALLIES`)."""
         return self.memory.get(self._totals.counts)
 
+    def forget_tallies(self) -> None:
+        """Count anew what `tallies` has."""
+        self._totals.counts[:] = 0
+
     def settle(self, light: Any, t_ns: Sequence[int], counts: Sequence[int]) -> None:
         """Settle each sensor in a frame of its light [clips, height, width] at its t_ns, where crossings are counted
         from its count."""

@@ -207,13 +207,12 @@ class Dvs:
 
         Raises UsageError for another.
         """
-        if state:
-            check_mark(state, self._mark())
+        if not state:
+            self._be(self.spec, self.seed, self.camera)
+            return
+        check_mark(state, self._mark())
         self._pixels.restore(state)
         self._seen = None
-        if not state:
-            self._t_ns, self._origin_ns = None, self._first_ns
-            return
         self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = clock(state, "clock", 5)
         self._fresh_noise = bool(fresh)
         self._readout.restore(state)

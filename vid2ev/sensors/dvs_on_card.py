@@ -106,6 +106,11 @@ class DvsOnCard(Dvs):
         self._download()
         return super().inside(pixels)
 
+    def forget_counts(self) -> None:
+        """`Dvs.forget_counts`."""
+        super().forget_counts()
+        self._card.forget_tallies()
+
     @property
     def counts(self) -> dict[str, int]:
         """`Dvs.counts`."""

@@ -131,10 +131,8 @@ class Pixels:
         return state | {"tallies": self.tallies.sum(axis=0)}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state; an empty one is that of pixels without light."""
+        """Take up a state."""
         self.sleep.forget()
-        if not state:
-            return
         for name in STATE_PLANES:
             plane = getattr(self.planes, name)
             plane[...] = entry(state, name, plane.dtype, plane.shape)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Mapping
+from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from vid2ev.errors import UsageError, clause
+
+Spec = TypeVar("Spec", bound=BaseModel)
 LEAST = 1e-100  # nearer to 0 is no measure of anything, and what is divided by it may be beyond all numbers
 
 
@@ -20,3 +24,12 @@ class Record(BaseModel, frozen=True, extra="forbid"):
             if isinstance(value, float) and 0.0 < abs(value) < LEAST:
                 raise ValueError(f"{name} {value}: expected 0, or at least {LEAST}")
         return self
+
+
+def changed(spec: Spec, changes: Mapping[str, Any]) -> Spec:
+    """The specification with these changes.  Raises UsageError where it cannot be."""
+    try:
+        return type(spec)(**(spec.model_dump() | {**changes}))
+    except ValidationError as error:
+        said = ", ".join(f"{key}={value}" for key, value in changes.items())
+        raise UsageError(f"{said}: {clause(error.errors()[0]['msg'])}") from error

@@ -8,6 +8,7 @@ A new kind of source is a class that satisfies `Source` (`source.py`) and a line
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -20,7 +21,7 @@ from vid2ev.stream.frames import Colour
 if TYPE_CHECKING:
     from vid2ev.rig.intrinsics import Framing
 
-__all__ = ["OPTIONS", "Source", "begins_s", "open_source"]
+__all__ = ["OPTIONS", "Source", "begins_s", "open_source", "short_name"]
 
 SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX, STANDARD_INPUT = "synthetic:", "scene:", "camera:", "-"
 OPTIONS = ("transfer", "fps", "colour", "slowdown", "start", "stop", "crop", "size", "motion")  # of `open_source`
@@ -177,3 +178,14 @@ def _existing(path: Path) -> Path:
     if not path.exists():
         raise UsageError(f"{path}: no such file or folder; give a video, a folder of images or a .npy array")
     return path
+
+
+def short_name(name: str) -> str:
+    """What a source is called after: without folder, suffix, or what is asked of a scene or a synthetic clip."""
+    if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
+        return "stdin" if name == STANDARD_INPUT else name.replace(":", "")
+    for prefix in (SYNTHETIC_PREFIX, SCENE_PREFIX):
+        if name.startswith(prefix):
+            name = name.removeprefix(prefix).partition(",")[0]
+    path = Path(os.path.abspath(name))
+    return path.name if path.is_dir() else path.stem

@@ -19,7 +19,15 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.pictures import TYPES, PictureReader
 from vid2ev.light.transfer import KNOWN
 from vid2ev.sources.stacks import NpyStack, NpzStack, Stack
-from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, remarks_on_unit, stamps_beside, stamps_of_array
+from vid2ev.sources.times import (
+    Clock,
+    digest_of,
+    expected_duration_s,
+    parse_fps,
+    remarks_on_unit,
+    stamps_beside,
+    stamps_of_array,
+)
 from vid2ev.stream.frames import Colour, Frame
 
 
@@ -74,6 +82,7 @@ class ArrayStack:
             "transfer": self._reader.transfer,
             "fps": None if self._fps is None else str(self._fps),
             "timestamps_unit": self._unit,
+            "timestamps_sha256": digest_of(self._stamps),
             "frames_expected": self.frames_expected,
         }
 

@@ -21,7 +21,15 @@ from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_pictu
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.light.transfer import parse_transfer
-from vid2ev.sources.times import Clock, expected_duration_s, parse_fps, read_timestamps, remarks_on_unit, stamps_beside
+from vid2ev.sources.times import (
+    Clock,
+    digest_of,
+    expected_duration_s,
+    parse_fps,
+    read_timestamps,
+    remarks_on_unit,
+    stamps_beside,
+)
 from vid2ev.stream.frames import Colour, Frame
 from vid2ev.untrusted import json_of, read_text
 
@@ -80,6 +88,7 @@ class Images:
             "transfer": self._reader.transfer,
             "fps": None if self._fps is None else str(self._fps),
             "timestamps_unit": self._unit,
+            "timestamps_sha256": digest_of(self._stamps),
             "frames_expected": self.frames_expected,
         }
 

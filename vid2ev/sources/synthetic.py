@@ -20,12 +20,16 @@ from vid2ev.errors import UsageError
 from vid2ev.sources.times import parse_fps, round_ns
 from vid2ev.stream.frames import Frame
 
+WIDEST_NAT = 61.0  # of a swing: from what float32 can still hold to the brightest light that sensors take
+
 
 @dataclass(frozen=True)
 class SyntheticClip(ABC):
     """A clip of `size` (width, height) with frames at k / fps from 0 to duration_s [s], both ends included."""
 
     name: ClassVar[str]
+    above_0: ClassVar[tuple[str, ...]] = ()  # parameters of which the formula makes sense above 0 only,
+    from_0: ClassVar[tuple[str, ...]] = ("duration_s",)  # and from 0 on
     kept: ClassVar[None] = None
     size: tuple[int, int] = (320, 240)
     fps: float = 240.0
@@ -35,10 +39,12 @@ class SyntheticClip(ABC):
     def __post_init__(self) -> None:
         parse_fps(self.fps)
         numbers = [getattr(self, f.name) for f in fields(self) if f.name not in ("size", "warnings")]
-        if min(self.size) < 1 or self.duration_s < 0 or not all(map(math.isfinite, numbers)):
-            raise UsageError(
-                f"synthetic:{self.name}: {self}; expected finite numbers, a size from 1x1, a duration from 0"
-            )
+        if min(self.size) < 1 or not all(map(math.isfinite, numbers)):
+            raise UsageError(f"synthetic:{self.name}: {self}; expected finite numbers, and a size from 1x1")
+        for key in (*self.above_0, *self.from_0):
+            if (value := getattr(self, key)) < 0 or (value == 0 and key in self.above_0):
+                least = "above 0" if key in self.above_0 else "from 0 on"
+                raise UsageError(f"synthetic:{self.name}: {key}={value:g}; expected a number {least}")
 
     @abstractmethod
     def light(self, t_ns: int) -> np.ndarray:
@@ -85,6 +91,7 @@ class Ramp(SyntheticClip):
     """Log light rises evenly from ln(low) to ln(high): ln(low) + d is reached at duration_s d / ln(high / low)."""
 
     name = "ramp"
+    above_0 = ("duration_s", "low", "high")
     low: float = 0.05
     high: float = 1.0
 
@@ -97,9 +104,15 @@ class Sine(SyntheticClip):
     """Log light swings by amplitude_nat [nat] about ln(mean), frequency_hz times a second, rising first."""
 
     name = "sine"
+    from_0 = ("duration_s", "mean")
     mean: float = 0.2
     amplitude_nat: float = 0.5
     frequency_hz: float = 10.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if abs(self.amplitude_nat) > WIDEST_NAT:
+            raise UsageError(f"synthetic:sine: amplitude_nat={self.amplitude_nat:g}; expected at most {WIDEST_NAT:g}")
 
     def light(self, t_ns: int) -> np.ndarray:
         swing = math.sin(2 * math.pi * self.frequency_hz * t_ns * 1e-9)
@@ -111,6 +124,7 @@ class Step(SyntheticClip):
     """Light is `low` before at_s [s] and `high` from then on."""
 
     name = "step"
+    from_0 = ("duration_s", "low", "high")
     low: float = 0.1
     high: float = 0.5
     at_s: float = 0.5
@@ -128,6 +142,8 @@ class MovingEdge(SyntheticClip):
     """
 
     name = "moving-edge"
+    above_0 = ("width",)
+    from_0 = ("duration_s", "low", "high")
     low: float = 0.1
     high: float = 0.6
     speed: float = 200.0
@@ -160,6 +176,7 @@ class Flash(SyntheticClip):
     """Light is `dark`, but for `bright` from at_s [s] for length_s [s]."""
 
     name = "flash"
+    from_0 = ("duration_s", "dark", "bright", "length_s")
     dark: float = 0.0
     bright: float = 1e6
     at_s: float = 0.5

@@ -17,6 +17,7 @@ opens and closes, and the first column counts.  The unit is
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -98,6 +99,11 @@ def expected_duration_s(stamps: Sequence[Fraction], fps: Fraction | None, frames
     return float((frames - 1) / fps) if fps else float(max(stamps) - stamps[0])
 
 
+def digest_of(stamps: Sequence[Fraction]) -> str | None:
+    """What tells stamps from others; None without any.  The file that they are in may be another than the frames'."""
+    return hashlib.sha256(" ".join(map(str, stamps)).encode()).hexdigest() if stamps else None
+
+
 def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
     """Stamps [s] of `NAME_timestamps.npy` or `NAME_timestamps.txt` beside the file `NAME`, and their unit.
 
@@ -123,7 +129,7 @@ def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fracti
             if stated and stated not in NS_PER_UNIT:
                 raise DataError(f"{path}, line {number}: unit '{stated[:40]}', expected s, ms, us or ns")
             unit, column = stated or unit, 0 if said and said[3] else column
-        elif line.strip():
+        elif line.replace(",", " ").strip():
             rows.append((line, column))
     _check_commas([line for line, column in rows if column], path)
     _check_names([line for line, _ in rows], images, path)

@@ -117,7 +117,7 @@ class Omission:
 class Scene:
     """What a sensor sees of a clip: extremes and sums over all pixels, by tiles of 2048 pixels in row-major order.
 
-    pixels, frames, seconds   how much was measured; seconds without the intervals before cuts
+    size, frames, seconds     width and height, and how much was measured; seconds without the intervals before cuts
     threshold                 that events are counted with [nat]: the lesser mean
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
@@ -146,7 +146,7 @@ class Scene:
     brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel, now and then
     """
 
-    pixels: int
+    size: tuple[int, int]
     frames: int
     seconds: float
     threshold: float
@@ -177,6 +177,11 @@ class Scene:
     busiest: float
     by_pixel: np.ndarray
     brightness: np.ndarray
+
+    @property
+    def pixels(self) -> int:
+        """How many there are."""
+        return self.size[0] * self.size[1]
 
     @property
     def events(self) -> float:
