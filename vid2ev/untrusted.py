@@ -155,13 +155,20 @@ def read_arrays(path: Path, names: Iterable[str] | None = None) -> dict[str, np.
         return found
 
 
+def openexr(path: Path) -> Any:
+    """The library that reads and writes an EXR.  Raises UsageError where it is not installed."""
+    try:
+        import OpenEXR
+    except ImportError as error:
+        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+    return OpenEXR
+
+
 def check_exr(path: Path) -> None:
     """Raise DataError for an EXR whose header claims more memory than it may, before the library takes it at its word.
     What is damaged otherwise the library finds out."""
     try:
-        import OpenEXR
-
-        parts = [part.header for part in OpenEXR.File(str(path), header_only=True).parts]
+        parts = [part.header for part in openexr(path).File(str(path), header_only=True).parts]
         bytes_ = 0
         for header in parts:
             for name in ("dataWindow", "displayWindow"):

@@ -218,7 +218,7 @@ def _timed(
             began = clock()
             method.between(gap, times)
             if gap.frame_0.is_cuda:
-                torch.cuda.synchronize()
+                torch.cuda.synchronize(gap.frame_0.device)
             if again >= 0:
                 taken[k].append(1000 * (clock() - began) / len(times))
     return taken

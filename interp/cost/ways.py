@@ -3,7 +3,7 @@
 closed forms    all of `interp.methods`
 networks        the best that come with vid2ev, of each kind, and those that are asked for
 of the first of these, or of what is asked for:
-precision       fewer bits                  compiled   by torch
+precision       fewer bits                  compiled   by torch, where it can
 tiles           of 256x256 px               motion     what is found once per gap, found anew for each frame
 larger          the same with more channels, untrained: its time alone
 """
@@ -21,7 +21,7 @@ import torch
 from interp import pretrained
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import OfEvents, OfFrames, of_weights
-from interp.methods.running import PLAIN, PRECISIONS, Running
+from interp.methods.running import PLAIN, PRECISIONS, Running, compiles
 from interp.methods.tiling import Tiling, parse_tiling
 from interp.networks.spec import BASES
 
@@ -95,7 +95,8 @@ def ways(networks: Sequence[str | Path], device: str) -> list[Way]:
     found += [Way(plain.name, "networks", partial(_itself, plain), of) for of, plain in opened.items()]
     for of, plain in [*opened.items()][:1]:
         found += _otherwise(plain, of, device)
-        found.append(_compiled(pretrained.path_of(asked[0]), of, device))
+        if compiles(device):
+            found.append(_compiled(pretrained.path_of(asked[0]), of, device))
     return found
 
 

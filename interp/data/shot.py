@@ -8,6 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+AHEAD = 8  # the event camera watches from the gap / AHEAD before the first key frame on
+
 
 @dataclass(frozen=True)
 class Beside:

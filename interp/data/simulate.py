@@ -25,11 +25,10 @@ from interp.data.chance import Range, chance, uniform
 from interp.data.clip import Clip
 from interp.data.sensor_ranges import SensorRanges
 from interp.data.settings import ClipSettings
-from interp.data.shot import Beside, Shot
+from interp.data.shot import AHEAD, Beside, Shot
 from interp.representation.event_counts import count_events
 from vid2ev import Cis, CisSpec, Dvs, DvsSpec, Events
 
-AHEAD = 8  # the event camera watches from the gap / AHEAD before the first key frame on
 BRIGHT_PERCENTILE = 95.0
 GAIN: Range = (1e-2, 1e3)  # of the aperture
 MOST = 255  # events that are counted in a pixel, sub-interval and polarity

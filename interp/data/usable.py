@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from interp.data.recorded import left_out
+from interp.data.scene_shots import SPAN_S
 from interp.data.settings import ClipSettings
 from interp.data.video_shots import check_film
 from vid2ev.errors import UsageError, nearest
@@ -26,8 +27,8 @@ def unusable(settings: ClipSettings, films: Sequence[str] = ()) -> list[str]:
     """
     found: dict[str, None] = {}
     if settings.scenes > 0:
-        for scene in settings.scene_names:
-            read_scene(scene)
+        for name in settings.scene_names:
+            _check_scene(name)
         for picture in settings.environments:
             _check_picture("environment", picture)
     if settings.scenes > 0 or settings.photographs > 0:
@@ -39,6 +40,12 @@ def unusable(settings: ClipSettings, films: Sequence[str] = ()) -> list[str]:
         if settings.recordings > 0:
             found |= dict.fromkeys(left_out(settings, multiple))
     return list(found)
+
+
+def _check_scene(name: str) -> None:
+    duration_s = read_scene(name).resolved(0).scene.duration_s
+    if duration_s < SPAN_S[1]:
+        raise UsageError(f"scene {name} lasts {duration_s:g} s; expected {SPAN_S[1]:g} s at least, to cut gaps from")
 
 
 def _check_picture(what: str, name: str) -> None:

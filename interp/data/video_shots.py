@@ -16,7 +16,7 @@ import numpy as np
 
 from interp.data.chance import chance
 from interp.data.settings import ClipSettings
-from interp.data.shot import Beside, coarse
+from interp.data.shot import AHEAD, Beside, coarse
 from vid2ev import Frame, UsageError, open_source
 from vid2ev.sources import Source, begins_s
 from vid2ev.upsample import make_upsampler
@@ -43,27 +43,37 @@ class VideoShot:
             source, begin_s = _opened(name)
             after_s, part = _place(source, name, settings.size, multiple, draw)
             start_s = begin_s + after_s
-            self._frames = _read(source, start_s, multiple + 3, part, settings.size, name)
+            self._frames = _read(source, start_s, _wanted(multiple), part, settings.size, name)
             cuts = CutDetector(THRESHOLD)
             if not any(cuts.begins_shot(a, b) for a, b in pairwise(self._frames)):
                 break
-        self._multiple, self._beside = multiple, beside
-        gap_ns = (self._frames[multiple + 1].t_ns - self._frames[1].t_ns) / settings.slowdown
+        self._multiple, self._before, self._beside = multiple, _before(multiple), beside
+        gap_ns = (self._frames[self._before + multiple].t_ns - self._frames[self._before].t_ns) / settings.slowdown
         self.gap_us = settings.bins * max(1, round(gap_ns / 1000 / settings.bins))
-        middle = self._frames[(multiple + 2) // 2 :][:2]
+        middle = self._frames[self._before + multiple // 2 :][:2]
         self.moved_px = multiple * (make_upsampler("flow", 2).between(*middle).shift_px or 0.0)
         self.about: dict[str, Any] = {"source": "video", "video": name, "start_s": start_s, "part": list(part)}
 
     def pictures(self, steps: int, first: int, last: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """The light of both cameras (`Shot`); up to a frame of the film before the gap, and one after it."""
+        """The light of both cameras (`Shot`); as far before the gap as event cameras watch, and a frame after it."""
         each = steps // self._multiple
         upsampler = make_upsampler("flow", each)
         stream = [self._frames[0]]
         for a, b in pairwise(self._frames):
             stream += upsampler.between(a, b).frames
         for j in range(first, last + 1):
-            frame = stream[j + each]
+            frame = stream[j + each * self._before]
             yield frame.light, coarse(frame.luminance, self._beside.coarser)
+
+
+def _before(multiple: int) -> int:
+    """Frames of the film before the gap, which event cameras watch."""
+    return max(1, -(-multiple // AHEAD))
+
+
+def _wanted(multiple: int) -> int:
+    """Frames of the film for a clip: those before the gap, its key frames and what is between them, and one more."""
+    return _before(multiple) + multiple + 2
 
 
 def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
@@ -86,14 +96,15 @@ def _place(
     smaller = fits[int(draw.integers(len(fits)))]
     wanted = smaller * size[0], smaller * size[1]
     left, top = (int(draw.integers(have - want + 1)) for have, want in zip(source.size, wanted, strict=True))
-    return float(draw.uniform(0, seconds * (1 - (multiple + 4) / count))), (left, top, *wanted)
+    return float(draw.uniform(0, seconds * (1 - (_wanted(multiple) + 1) / count))), (left, top, *wanted)
 
 
 def _fitting(source: Source, name: str, size: tuple[int, int], multiple: int) -> tuple[int, float, list[int]]:
     """Frames and seconds of a film, and by how much clips of it can be made smaller."""
     count, seconds = source.frames_expected, source.duration_expected_s
-    if not count or not seconds or count < multiple + 4:
-        raise UsageError(f"{name}: {count} frames; expected at least {multiple + 4} for clips of {multiple}")
+    least = _wanted(multiple) + 1
+    if not count or not seconds or count < least:
+        raise UsageError(f"{name}: {count} frames; expected at least {least} for clips of {multiple}")
     fits = [each for each in SMALLER if all(each * want <= have for want, have in zip(size, source.size, strict=True))]
     if not fits:
         raise UsageError(

@@ -24,7 +24,7 @@ from collections.abc import Callable
 
 import torch
 
-from interp.losses.over_time import inconsistency, visibility
+from interp.losses.over_time import check_codes, inconsistency, visibility
 from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks.frame_fed import Interpolated
 
@@ -134,7 +134,8 @@ def hdr(
 
 
 def _flicker(images: torch.Tensor, truth: torch.Tensor, flows: torch.Tensor, through_earlier: bool) -> torch.Tensor:
-    """Mean inconsistency of each image with the one before."""
+    """Mean inconsistency of each image with the one before.  Raises UsageError for codes that are not from 0 to 1."""
+    check_codes(truth)
     found = [
         inconsistency(
             images[:, k], images[:, k - 1], flow, visibility(truth[:, k], truth[:, k - 1], flow), through_earlier

@@ -22,15 +22,17 @@ STEEPNESS = 50.0
 LARGEST_CODE = 32.0  # codes of HDR frames may be above 1, those of 8-bit frames are above this
 
 
-@in_full_precision
-def visibility(frame: torch.Tensor, earlier: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
-    """M [B, 1, H, W] for true frames [B, C, H, W], 0 ... 1, and the flow [B, 2, H, W] px from the later to the earlier.
-
-    Raises UsageError for codes that are not from 0 to about 1.
-    """
-    largest = float(torch.maximum(frame.detach().abs().amax(), earlier.detach().abs().amax()))
+def check_codes(frames: torch.Tensor) -> None:
+    """Raise UsageError for codes of frames, of any shape, that are not from 0 to about 1.  A GPU is waited for."""
+    largest = float(frames.detach().abs().amax())
     if largest > LARGEST_CODE:
         raise UsageError(f"frames with codes up to {largest:g}: expected 0 ... 1; divide them by their full code")
+
+
+@in_full_precision
+def visibility(frame: torch.Tensor, earlier: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
+    """M [B, 1, H, W] for true frames [B, C, H, W], 0 ... 1 (`check_codes`), and the flow [B, 2, H, W] px from the later
+    to the earlier."""
     return torch.exp(-STEEPNESS * ((frame - warp(earlier, flow)) ** 2).sum(1, keepdim=True))
 
 

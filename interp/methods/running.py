@@ -19,8 +19,9 @@ PRECISIONS = {"float32": None, "bfloat16": torch.bfloat16, "float16": torch.floa
 class Running:
     """How a network is run.
 
-    precision   bits of what convolutions take and give: float32; bfloat16 and float16, which are fast where hardware
-                has them.  Warps, blends and what is remembered stay in float32 (`interp.precision`)
+    precision   bits of what convolutions take and give: float32, of which GPUs from Ampere on take 10 bits behind the
+                point (TF32); bfloat16 and float16, which are fast where hardware has them.  Warps, blends and what is
+                remembered stay in float32 (`interp.precision`)
     compiled    by torch, once for each size of frames, which takes half a minute or more; on a CPU that needs a
                 C++ compiler
     Raises UsageError for a precision that is none.
@@ -48,12 +49,11 @@ class Running:
             if not self.compiled:
                 yield
                 return
-            from torch._dynamo.exc import BackendCompilerFailed
-            from torch._inductor.exc import InductorError
+            from torch._dynamo.exc import ShortenTraceback  # (of a compiler that fails, or is missing, or of Triton)
 
             try:
                 yield
-            except (BackendCompilerFailed, InductorError) as error:
+            except ShortenTraceback as error:
                 said = str(error).strip().splitlines()[0]
                 raise UsageError(f"torch cannot compile networks here ({said}); leave out --compile") from error
 
@@ -63,3 +63,13 @@ class Running:
 
 
 PLAIN = Running()
+
+
+def compiles(device: str) -> bool:
+    """Whether torch can compile for a device here."""
+    try:
+        with Running(compiled=True).on(torch.device(device)):
+            torch.compile(torch.square)(torch.zeros(2, device=device))
+    except UsageError:
+        return False
+    return True

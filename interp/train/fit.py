@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field
 
 import torch
 from lightning.pytorch import Trainer
-from lightning.pytorch.callbacks import WeightAveraging
 from lightning.pytorch.loggers import TensorBoardLogger
 
 from interp.train.batches import Feed
@@ -19,9 +18,10 @@ from interp.train.checkpoints import Saves, WholeFiles, read_checkpoint
 from interp.train.curves import Curves
 from interp.train.keeping import Keeping
 from interp.train.learner import Learner, means
-from interp.train.machines import ALL, Machines
+from interp.train.machines import Machines
 from interp.train.progress import Bar
 from interp.train.run_folder import RunFolder
+from interp.train.running_mean import RunningMean
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores
 from interp.train.session import Limits, Session, validate_every
@@ -68,7 +68,7 @@ class Fit:
     feed: Feed
     folder: RunFolder
     name: str
-    machines: Machines = ALL
+    machines: Machines
     session_s: float | None = None
     stop: Stop = lambda: False
     quiet: bool = False
@@ -76,8 +76,7 @@ class Fit:
 
     def run(self) -> Outcome:
         """Train.  Raises DataError where training does not get on, or a file does not hold what it should."""
-        with unmentioned():
-            torch.set_num_threads(self.learner.recipe.threads)
+        with unmentioned(), self._threads():
             step = read_checkpoint(self.folder.checkpoint)["global_step"] if self.folder.checkpoint.exists() else 0
             self._take_up(self._given())
             trainer = self._trainer(step)
@@ -85,6 +84,17 @@ class Fit:
             with made_by_workers():
                 trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
             return self._outcome(trainer)
+
+    @contextmanager
+    def _threads(self) -> Iterator[None]:
+        """Without a GPU, of so many threads as the recipe says, which decide the last bits."""
+        before = torch.get_num_threads()
+        if self.machines.accelerator == "cpu":
+            torch.set_num_threads(self.learner.recipe.threads)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(before)
 
     def _given(self) -> tuple[int, int] | None:
         steps = self.learner.recipe.steps
@@ -120,7 +130,7 @@ class Fit:
                 session,
                 Bar(recipe.batch, self.quiet),
                 Keeping(self.folder, self.name),
-                WeightAveraging(use_buffers=False, avg_fn=self._mean),
+                RunningMean(recipe.mean),
                 Saves(self.folder.checkpoint, recipe.save_s),
             ],
             plugins=[WholeFiles()],
@@ -133,13 +143,10 @@ class Fit:
     def _precision(self) -> str:
         asked = self.learner.recipe.precision
         if asked == "auto":
-            on_gpu = self.machines.accelerator != "cpu" and torch.cuda.is_available()
-            asked = "32" if not on_gpu else "bf16" if torch.cuda.is_bf16_supported() else "16"
+            on_gpu = self.machines.accelerator != "cpu"
+            bf16 = on_gpu and torch.cuda.is_bf16_supported(including_emulation=False)
+            asked = "32" if not on_gpu else "bf16" if bf16 else "16"
         return {"32": "32-true", "bf16": "bf16-mixed", "16": "16-mixed"}[asked]
-
-    def _mean(self, mean: torch.Tensor, weight: torch.Tensor, count: torch.Tensor) -> torch.Tensor:
-        """The running mean with one weight more; at first over fewer steps, so that it does not hang on the start."""
-        return torch.lerp(weight, mean, min(self.learner.recipe.mean, (1 + int(count)) / (10 + int(count))))
 
     def _measure(self, trainer: Trainer, step: int) -> None:
         """The scores of what needs no training, once, and of the network before it has learnt anything."""

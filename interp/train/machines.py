@@ -12,36 +12,46 @@ from vid2ev.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class Machines:
-    """Devices of each machine ("auto": all GPUs, or one process), how many machines, and the kind of device."""
+    """How many processes train on each machine, how many machines, and on what."""
 
-    devices: int | Literal["auto"] = "auto"
+    devices: int = 1
     nodes: int = 1
-    accelerator: Literal["auto", "cpu"] = "auto"
+    accelerator: Literal["cuda", "cpu"] = "cpu"
 
     @classmethod
     def of(cls, devices: int | Literal["auto"], nodes: int, cpu: bool, processes: int) -> Self:
-        """Machines as asked for; those without a GPU, or where it is not wanted, get so many processes by default.
+        """Machines as asked for: all GPUs by default; without one, or where it is not wanted, so many processes.
 
         Two processes of one thread take 1.4 times as many samples a second as one of two threads.
         """
         import torch
 
-        without = cpu or not torch.cuda.is_available()
-        return cls(processes if without and devices == "auto" else devices, nodes, "cpu" if cpu else "auto")
+        gpus = 0 if cpu else torch.cuda.device_count()
+        if devices == "auto":
+            devices = gpus or processes
+        return cls(devices, nodes, "cuda" if gpus else "cpu")
 
     def check_batch(self, batch: int) -> None:
-        """Raise UsageError where a batch cannot be shared out evenly, among devices that are known."""
-        if self.devices != "auto":
-            check_shares(batch, self.devices * self.nodes)
+        """Raise UsageError where a batch cannot be shared out evenly."""
+        check_shares(batch, self.devices * self.nodes)
+
+    def check_clips(self, count: int) -> None:
+        """Raise UsageError where there are fewer clips to validate with than processes that do."""
+        if count < self.devices * self.nodes:
+            raise UsageError(
+                f"{count} clips to validate with among {self.devices * self.nodes} processes, expected one each at"
+                " least; set more validation.clips, or use fewer --devices"
+            )
+
+    def spare(self, threads: int) -> int:
+        """Cores for what makes samples, for each process that trains, which takes so many threads; at least 1."""
+        return max(1, cores() // self.devices - threads)
 
     @property
     def first(self) -> bool:
         """Whether this process leads: those that it starts, and those of other machines, have their ranks set."""
         ranks = ("LOCAL_RANK", "RANK", "NODE_RANK", "SLURM_PROCID", "GROUP_RANK")
         return all(os.environ.get(rank, "0") in ("", "0") for rank in ranks)
-
-
-ALL = Machines()
 
 
 def check_shares(batch: int, processes: int) -> None:

@@ -62,7 +62,8 @@ class RunFolder:
             path.mkdir(parents=True, exist_ok=True)
             self._lock: int | None = lock(path)
             for left in path.rglob("*.new"):  # (of files that were being written when a session was killed)
-                left.unlink()
+                if self.clips not in left.parents:  # (those of another machine may be being written now)
+                    left.unlink(missing_ok=True)
             if not resume:
                 for part, copy in self.starts(starts).items():
                     with whole_file(copy) as file:
@@ -150,8 +151,9 @@ class RunFolder:
         if not resume:
             if begun:
                 raise UsageError(f"{self.path} holds a run; --resume goes on with it, -o chooses another folder")
-            # (what a run leaves that is killed before it has begun is no reason not to begin)
-            ours = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
+            # (what a run leaves that is killed before it has begun is no reason not to begin, nor are clips, which
+            # another machine may be making already)
+            ours = re.compile(r"clips|lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
             if self.path.is_dir() and not all(ours.fullmatch(child.name) for child in self.path.iterdir()):
                 raise UsageError(f"{self.path} holds files that are no run; choose another folder with -o")
             return

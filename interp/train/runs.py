@@ -9,7 +9,7 @@ from pathlib import Path
 from interp.train.checkpoints import read_checkpoint
 from interp.train.fit import Fit, Outcome, Stop
 from interp.train.job import NOTHING, Job
-from interp.train.machines import ALL, Machines, cores
+from interp.train.machines import Machines, cores
 from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import RunFolder
 from interp.train.starts import begin
@@ -23,7 +23,7 @@ def run(
     job: Job,
     path: Path,
     resume: bool = False,
-    machines: Machines = ALL,
+    machines: Machines | None = None,
     session_s: float | None = None,
     workers: int | None = None,
     quiet: bool = False,
@@ -32,6 +32,7 @@ def run(
 ) -> Outcome:
     """Train in the folder `path`, or go on there.
 
+    machines    by default all GPUs of this one, or what the recipe says of those without
     session_s   seconds after which to stop, to go on another time
     workers     processes that make samples, for each that trains; None for those cores that training leaves, at least 1
     stop        asked after each step
@@ -39,6 +40,8 @@ def run(
     Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on.
     """
     begun_s = time.monotonic()
+    machines = machines or Machines.of("auto", 1, False, job.recipe.processes)
+    machines.check_batch(job.recipe.batch)
     learner = learner_of(job)
     if not resume:
         begin(learner, starts)
@@ -47,10 +50,11 @@ def run(
         if resume:
             begin(learner, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
-        spare = max(1, cores() - job.recipe.threads) if workers is None else workers
+        spare = machines.spare(job.recipe.threads) if workers is None else workers
         try:
             with counting(quiet, CLIPS) as report:
                 feed = feed_of(job, folder.clips, step, spare, cores(), report)
+            machines.check_clips(len(feed.validation))
         except UsageError:
             if not resume:
                 folder.give_up()

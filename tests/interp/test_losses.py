@@ -12,6 +12,7 @@ from torch.nn import functional as F
 from vgg16 import write_vgg16
 
 from interp.losses import objectives
+from interp.losses.objectives import reconstruction
 from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
 from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
@@ -81,9 +82,9 @@ def test_opposite_errors_of_colours_do_not_cancel() -> None:
 
 
 def test_codes_to_255_are_refused_where_they_would_hide_everything() -> None:
-    frame = torch.full((1, 3, 4, 4), 200.0)
+    frames, flows = torch.full((1, 3, 1, 4, 4), 200.0), torch.zeros(1, 2, 2, 4, 4)
     with pytest.raises(UsageError, match=r"expected 0 \.\.\. 1"):
-        visibility(frame, frame, torch.zeros(1, 2, 4, 4))
+        reconstruction(frames, frames, absolute, flows)
 
 
 def test_flicker_on_dark_frames_is_as_large_as_it_is() -> None:

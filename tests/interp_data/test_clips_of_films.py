@@ -10,7 +10,9 @@ import pytest
 from interp.data.making import made
 from interp.data.sensor_ranges import SENSORS
 from interp.data.settings import HELD_OUT, TRAINED_ON, ClipSettings
+from interp.data.shot import AHEAD, SAME
 from interp.data.validation import SEED, held_out, validation_clips
+from interp.data.video_shots import VideoShot
 from vid2ev import UsageError, open_source
 from vid2ev.light.eight_bits import srgb_codes
 
@@ -48,6 +50,20 @@ def test_a_film_whose_clock_does_not_begin_at_0_is_drawn_from_all_over(tmp_path:
         one, other = (made(ClipSettings(**FILMS, video_files=(str(path),)), 0, number) for path in (early, late))
         np.testing.assert_array_equal(one.truth, other.truth)
         np.testing.assert_array_equal(one.off_on, other.off_on)
+
+
+@pytest.mark.parametrize("multiple", [4, 8, 16, 32])
+def test_cameras_see_a_film_in_its_order_from_before_the_gap_on(tmp_path: Path, multiple: int) -> None:
+    """A film that grows brighter from frame to frame, of which the first key frame is one."""
+    light = 0.02 * np.exp(0.05 * np.arange(60))
+    np.savez(tmp_path / "film.npz", frames=np.ones((60, 24, 32, 3), np.float32) * light[:, None, None, None], fps=50)
+    settings = ClipSettings(**FILMS, multiples=(multiple,), video_files=(str(tmp_path / "film.npz"),))
+    for steps in {multiple, 32}:
+        for number in range(4):
+            shot = VideoShot(settings, 0, number, SAME, multiple)
+            seen = [frame.mean() for frame, _ in shot.pictures(steps, -max(steps // AHEAD, 1), steps)]
+            assert np.all(np.diff(seen) > 0)
+            assert np.abs(light - seen[max(steps // AHEAD, 1)]).min() < 1e-6
 
 
 def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:

@@ -143,6 +143,12 @@ def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> 
     assert shown.exit_code == 2 and "film.npz: 40x24 pixels; expected at least 128x128" in shown.output
 
 
+def test_a_scene_that_is_too_short_is_refused_before_training(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text("[scene]\nduration_s = 0.2\n")
+    shown = run("--set", 'clips.scene_names=["short.toml"]', "--dry-run")
+    assert shown.exit_code == 2 and "scene short.toml lasts 0.2 s; expected 0.3 s at least" in shown.output
+
+
 def write_hsergb(folder: Path, count: int) -> None:
     """A sequence in the HS-ERGB layout, of 40x24 pixels, with an event before each picture."""
     pictures, events = folder / "images_corrected", folder / "events_aligned"

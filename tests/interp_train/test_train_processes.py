@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 from small_run import in_a_process, kept, session
 
+from interp.train.machines import Machines
+from interp.train.run_folder import RunFolder
 from vid2ev.errors import UsageError
 
 pytestmark = pytest.mark.long
@@ -40,4 +43,37 @@ def test_batches_that_cannot_be_shared_are_refused(tmp_path: Path) -> None:
         feed = Feed([], [], 3, 0)  # type: ignore[arg-type]
         feed.trainer = SimpleNamespace(world_size=2)  # type: ignore[assignment]
         feed.train_dataloader()
-    assert torch.get_num_threads() == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "nodes", "cpu", "gpus", "found"),
+    [
+        ("auto", 1, False, 0, (2, "cpu")),
+        ("auto", 2, False, 8, (8, "cuda")),
+        ("auto", 1, True, 8, (2, "cpu")),
+        (3, 1, False, 8, (3, "cuda")),
+        (2, 1, False, 0, (2, "cpu")),
+    ],
+)
+def test_what_it_runs_on_is_known_from_the_start(
+    monkeypatch: pytest.MonkeyPatch, asked: Any, nodes: int, cpu: bool, gpus: int, found: tuple[int, str]
+) -> None:
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: gpus)
+    machines, processes = Machines.of(asked, nodes, cpu, 2), found[0] * nodes
+    assert (machines.devices, machines.accelerator) == found
+    machines.check_batch(processes), machines.check_clips(processes)
+    with pytest.raises(UsageError, match="cannot be shared out evenly"):
+        machines.check_batch(processes + 1)
+    with pytest.raises(UsageError, match="clips to validate with"):
+        machines.check_clips(processes - 1)
+
+
+def test_a_machine_that_does_not_lead_may_be_there_first(tmp_path: Path) -> None:
+    """And make clips already, while the one that leads begins the run."""
+    other = RunFolder(tmp_path / "run", {}, resume=False, first=False)
+    other.clips.mkdir(parents=True)
+    being_written = other.clips / "000003.npy.new"
+    being_written.touch()
+    first = RunFolder(tmp_path / "run", {}, resume=False)
+    assert being_written.exists()
+    first.close()

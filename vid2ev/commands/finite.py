@@ -16,3 +16,6 @@ class Finite(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is no finite number", param, ctx)
         return number
+
+
+SECONDS = Finite(0, 1e9)  # of a recording

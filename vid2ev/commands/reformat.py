@@ -9,9 +9,7 @@ from typing import Any
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.finite import Finite
-
-SECONDS = Finite(0, max_open=True, max=1e9)
+from vid2ev.commands.finite import SECONDS
 
 
 @click.command(short_help="Turn an event file into one of another format.")

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.finite import Finite
-
-if TYPE_CHECKING:
-    pass
-
-SECONDS = Finite(0, 1e9)
+from vid2ev.commands.finite import SECONDS, Finite
 
 
 @click.command(short_help="Make a film or a picture of any event file.")

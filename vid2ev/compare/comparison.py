@@ -77,9 +77,7 @@ class Comparison:
     @cached_property
     def absolute_timing_error_us(self) -> tuple[int | None, int | None]:
         """Median and 95th percentile of |t_A - t_B|."""
-        late = self.timing_errors[self.window_us - 1 :].copy()
-        late[1:] += self.timing_errors[: self.window_us - 1][::-1]
-        return percentile(late, 50), percentile(late, 95)
+        return absolute_percentiles(self.timing_errors)
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers, ready for JSON."""
@@ -210,6 +208,14 @@ def percentile(counts: np.ndarray, percent: int, lowest: int = 0) -> int | None:
     if total == 0:
         return None
     return lowest + int(np.searchsorted(np.cumsum(counts) * 100, total * percent))
+
+
+def absolute_percentiles(errors_us: np.ndarray) -> tuple[int | None, int | None]:
+    """Median and 95th percentile of |t_A - t_B| [us], of how many pairs have each t_A - t_B, 0 in the middle."""
+    middle = len(errors_us) // 2
+    late = errors_us[middle:].copy()
+    late[1:] += errors_us[:middle][::-1]
+    return percentile(late, 50), percentile(late, 95)
 
 
 def _share(part: int, whole: int, of_nothing: float = 0.0) -> float | None:

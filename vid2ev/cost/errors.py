@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.compare.comparison import Tally, percentile
+from vid2ev.compare.comparison import Tally, absolute_percentiles
 from vid2ev.compare.distance import TAUS_US, normalised
 from vid2ev.compare.matching import WINDOW_US
 from vid2ev.cost.passes import Sent
@@ -72,7 +72,7 @@ class Reference:
     def errors(self, sent: Sequence[Sent], coarse: int = 1, views: bool = False) -> Errors:
         """Errors of what another setting sent; of events as if each pixel were `coarse` by `coarse`."""
         squared = count = events = others = matched = 0.0
-        late = np.zeros(WINDOW_US, np.int64)
+        pairs = np.zeros(2 * WINDOW_US - 1, np.int64)
         for one, mine, reference in zip(sent, self._sent, self._events, strict=True):
             if reference is None:
                 continue
@@ -84,7 +84,7 @@ class Reference:
             count += float(np.abs(found.difference).sum())
             events, others = events + found.events, others + found.reference_events
             matched += found.matched
-            late += _unsigned(found.timing_errors)
+            pairs += found.timing_errors
         frames = _rms_lsb(sent, self._sent)
         seen = (
             quality([pair for x, y in zip(sent, self._sent, strict=True) for pair in _pairs(x, y)]) if views else None
@@ -94,22 +94,15 @@ class Reference:
         return Errors(
             distance=normalised(squared, int(events), int(others)),
             count_error=count / others if others else (None if count else 0.0),
-            timing_us=_timing(late),
+            timing_us=_timing(pairs),
             matched=matched / others if others else 1.0,
             rms_lsb=frames,
             views=seen,
         )
 
 
-def _unsigned(errors: np.ndarray) -> np.ndarray:
-    """How many pairs are so many microseconds apart, either way."""
-    late = errors[WINDOW_US - 1 :].copy()
-    late[1:] += errors[: WINDOW_US - 1][::-1]
-    return late
-
-
-def _timing(late: np.ndarray) -> tuple[int, int] | None:
-    median, most = percentile(late, 50), percentile(late, 95)
+def _timing(errors_us: np.ndarray) -> tuple[int, int] | None:
+    median, most = absolute_percentiles(errors_us)
     return None if median is None or most is None else (median, most)
 
 

@@ -15,9 +15,10 @@ from vid2ev.kernel_intrinsics import fma
 from vid2ev.physics.adc import WHITE, code_of
 from vid2ev.physics.electrons import shoot
 from vid2ev.physics.random import READOUT, fill_words, normal_pair
+from vid2ev.stream.still import BRIGHTEST as MOST
 
 F = np.float32
-BRIGHTEST = F(1e30)
+BRIGHTEST = F(MOST)
 
 
 class ReadOut(NamedTuple):

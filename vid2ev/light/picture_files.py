@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
-from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line
+from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
 
@@ -120,14 +120,11 @@ def _read(path: Path, page: int, count: int = 1) -> list[np.ndarray]:
 
 
 def _read_exr(path: Path) -> Picture:
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+    library = openexr(path)
     check_exr(path)
     try:
         # (one thread: pictures are read in turn with work that has threads of its own)
-        file = OpenEXR.File(str(path), separate_channels=True, num_threads=0)
+        file = library.File(str(path), separate_channels=True, num_threads=0)
         parts = [(part.header, part.channels) for part in file.parts]
     except Exception as error:  # (the library raises RuntimeError, ValueError and more)
         raise DataError(f"{path}: not an EXR that can be read ({first_line(error)})") from error

@@ -23,7 +23,7 @@ from pydantic import BaseModel, Field
 from vid2ev.kernel_compiler import compiled, inlined
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
-from vid2ev.physics.thresholds import FLOOR
+from vid2ev.physics.thresholds import DEVIATIONS, FLOOR
 from vid2ev.stream.scene import Omission, Scene
 
 CHUNK = 1024  # pixels drawn for at a time
@@ -40,7 +40,7 @@ class Mismatch(BaseModel, frozen=True, extra="forbid"):
 @inlined
 def clipped(mean, sigma, z):
     """mean + sigma z, z clipped symmetrically so that the result is at least FLOOR of the mean; sigma > 0."""
-    limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
+    limit = min(DEVIATIONS, (1.0 - FLOOR) * mean / sigma)
     return mean + sigma * min(max(z, -limit), limit)
 
 
@@ -48,7 +48,7 @@ def reached_spread(mean: float, sigma: float) -> float:
     """Standard deviation [nat] of the thresholds that the clip leaves of sigma [nat, >= 0]."""
     if sigma == 0.0:
         return 0.0
-    limit = min(4.0, (1.0 - FLOOR) * mean / sigma)
+    limit = min(DEVIATIONS, (1.0 - FLOOR) * mean / sigma)
     if limit < 0.01:  # all are at the clip, but for a share that cancels below
         return sigma * limit * math.sqrt(1.0 - limit * math.sqrt(8.0 / (9.0 * math.pi)))
     beyond = 0.5 * math.erfc(limit / math.sqrt(2.0))

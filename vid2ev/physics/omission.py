@@ -17,12 +17,10 @@ from typing import Any
 import numpy as np
 
 from vid2ev.physics.slopes import most_too_soon, slopes_of
-from vid2ev.physics.thresholds import STEPS, soon, spread_of, spread_thresholds
+from vid2ev.physics.thresholds import DEVIATIONS, STEPS, soon, spread_of, spread_thresholds
 from vid2ev.stream.bounds import off_by, unlike
 from vid2ev.stream.chances import at_least, at_most, surely
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
-
-DEVIATIONS = 4.0  # that thresholds are at most from their mean
 
 
 def tracks(spec: Any) -> bool:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 FLOOR = 0.1  # smallest threshold, as a share of the mean
+DEVIATIONS = 4.0  # standard ones that a threshold is at most from the mean
 STEPS = 256  # pixels that stand for all
 
 
@@ -77,7 +78,7 @@ def per_nat(spec: Any) -> float:
 
 def _limited(means: np.ndarray, sigma: float, z: np.ndarray) -> np.ndarray:
     """Means + sigma z, as `clipped` has it."""
-    limits = np.minimum(4.0, (1.0 - FLOOR) * means / sigma) if sigma > 0 else np.zeros(len(means))
+    limits = np.minimum(DEVIATIONS, (1.0 - FLOOR) * means / sigma) if sigma > 0 else np.zeros(len(means))
     return means + sigma * np.clip(z, -limits, limits)
 
 

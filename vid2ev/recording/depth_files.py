@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from vid2ev.recording.truth_arrays import (
     stated_number,
     write_png,
 )
-from vid2ev.untrusted import check_exr, read_array
+from vid2ev.untrusted import check_exr, openexr, read_array
 
 NOTHING, MOST = 65535, 65534  # codes
 CHANNELS = ("Z", "V", "Y", "R")  # of depth, of any layer, the likeliest first: renderers differ
@@ -68,7 +67,8 @@ def _read_npy(path: Path) -> np.ndarray:
 
 
 def _write_exr(path: Path, depth: np.ndarray) -> None:
-    file = _openexr(path).File({"compression": _openexr(path).ZIP_COMPRESSION}, {"Z": depth})
+    library = openexr(path)
+    file = library.File({"compression": library.ZIP_COMPRESSION}, {"Z": depth})
     with whole_path(path) as beside:
         try:
             file.write(str(beside))
@@ -77,23 +77,15 @@ def _write_exr(path: Path, depth: np.ndarray) -> None:
 
 
 def _read_exr(path: Path) -> np.ndarray:
-    openexr = _openexr(path)
+    library = openexr(path)
     with reading(path):
         open(path, "rb").close()  # (the library does not say why it cannot)
         check_exr(path)
-        channels = openexr.File(str(path), separate_channels=True, num_threads=0).channels()
+        channels = library.File(str(path), separate_channels=True, num_threads=0).channels()
         name = next((name for last in CHANNELS for name in channels if name.rpartition(".")[2] == last), None)
         if name is None:
             raise DataError(f"{path} has no channel Z of depth, only {', '.join(channels)}; give another file")
         return np.asarray(channels[name].pixels, np.float32)
-
-
-def _openexr(path: Path) -> Any:
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
-    return OpenEXR
 
 
 def _depth_png(m_per_code: float) -> Callable[[Path, np.ndarray], None]:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.pictures.colours import MOST, NEUTRAL, codes, event_colours
 
 EACH = MOST + 1  # counts of a polarity that are told apart
@@ -93,8 +94,7 @@ def _tint(upper, lower, tints, ground, u_row, v_row):  # type: ignore[no-untyped
 
 def _gray_table() -> np.ndarray:
     """Codes Y of light in steps of 1 / 65535, by Rec. ITU-R BT.709-6 items 1.2 and 3.4, 8 bits."""
-    light = np.arange(1 << 16) / 65535
-    return np.rint(16 + 219 * np.where(light < 0.018, 4.5 * light, 1.099 * light**0.45 - 0.099)).astype(np.uint8)
+    return np.rint(16 + 219 * parse_transfer("bt709").to_signal(np.arange(1 << 16) / 65535)).astype(np.uint8)
 
 
 COLOURS, GRAYS = codes(event_colours()), _gray_table()

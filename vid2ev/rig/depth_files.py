@@ -26,7 +26,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
 from vid2ev.rig.depth import DepthScale, between
-from vid2ev.untrusted import check_exr, first_line, read_arrays
+from vid2ev.untrusted import check_exr, first_line, openexr, read_arrays
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
 NAMES = ("depth", "depths", "disparity", "disparities")
@@ -130,13 +130,10 @@ def _read_arrays(path: Path) -> np.ndarray:
 
 
 def _read_exr(path: Path) -> np.ndarray:
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+    library = openexr(path)
     try:
         check_exr(path)
-        file = OpenEXR.File(str(path), separate_channels=True, num_threads=0)
+        file = library.File(str(path), separate_channels=True, num_threads=0)
         channels = {name: channel for part in file.parts for name, channel in part.channels.items()}
         named = [name for name in channels if name.rpartition(".")[2] in ("Z", "depth", "Depth")]
         if not named and len(channels) != 1:
