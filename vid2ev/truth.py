@@ -2,7 +2,7 @@
 
     depth    how far what a pixel sees is, along the camera's axis [m]
     flow     where that is at the next such instant, less where it is now [px]; of scenes only
-    mask     what the source sees as well; elsewhere a view is made up
+    mask     what the source sees as well; elsewhere a view is made up; of scenes, what the lens sees
     map      where each pixel is in each of the other cameras [px]
     poses    where the camera is: in the world of a scene, otherwise in the rig
 
@@ -91,7 +91,7 @@ class Wanted:
             else None
             for picture, mount in zip(pictures, mounts, strict=True)
         ]
-        masks = [np.ones(depth.shape, bool) for depth in depths]
+        masks = [~np.isnan(depth) for depth in depths]
         return tuple(
             self._truth(mounts, k, t_ns, poses, depths, flow=flows[k], mask=masks[k]) for k in range(len(mounts))
         )

@@ -18,7 +18,9 @@ focal = st.floats(1, 5000)
 shift = st.floats(-2000, 2000)
 turn = st.floats(-100, 100)
 small = st.floats(-0.5, 0.5)
-values = st.one_of(st.booleans(), st.integers(-(2**60), 2**60), st.floats(allow_nan=False), st.text(max_size=8))
+values = st.one_of(
+    st.booleans(), st.integers(-(2**60), 2**60), st.floats(allow_nan=False, allow_infinity=False), st.text(max_size=8)
+)
 
 
 @st.composite

@@ -46,6 +46,22 @@ def test_lenses_bend_as_those_of_opencv(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("fov_deg", [10, 60, 120])
+def test_a_field_is_what_is_seen_through_the_lens(name: str, fov_deg: float) -> None:
+    """Without tangential distortion, by which it is not the same on both sides."""
+    model, distortion = LENSES[name]
+    if model == "radtan":
+        distortion = (*distortion[:2], 0.0, 0.0, *distortion[4:])
+    farthest = np.inf if model == "none" else radial_table(lens(name))[0][-1]
+    if np.tan(np.radians(fov_deg / 2)) > farthest:
+        with pytest.raises(ValueError, match="is more than this lens sees"):
+            Intrinsics.of_field(SIZE, fov_deg, model, distortion)
+        return
+    camera = Intrinsics.of_field(SIZE, fov_deg, model, distortion)
+    assert camera.fov_deg == pytest.approx(fov_deg, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", LENSES)
 def test_every_pixel_finds_its_ray_again(name: str) -> None:
     camera, grid = lens(name), pixel_grid(SIZE)[::3, ::3]
     rays = rays_of(grid, camera)

@@ -129,6 +129,7 @@ def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pyte
         (f"{CAMERA}size = [true, 480]", "it must be a valid integer"),
         (f"{CAMERA}fov_deg = '60'", "it must be a valid number"),
         (f"{CAMERA}fov_deg = nan", "fov_deg = nan is impossible: it must be a finite number"),
+        (f"{CAMERA}fov_deg = 150\ndistortion_model = 'radtan'\ndistortion = [-3, 0, 0, 0]", "more than this lens sees"),
         (f"{CAMERA}fov_deg = 180", "fov_deg = 180 is impossible: it must be less than or equal to 179"),
         (f"{CAMERA}fov_deg = 60\nfocal_px = [1, 2]", "keep one of them"),
         (f"{CAMERA}centre_px = [1, 2]", "centre_px needs focal_px"),

@@ -10,6 +10,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixel_grid, rays_of
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.world import World
@@ -49,6 +50,26 @@ def ball(tmp_path: Path) -> World:
     file = tmp_path / "ball.toml"
     file.write_text(BALL)
     return World.of(file)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        Intrinsics(size=(60, 60), focal_px=(18, 18), centre_px=(29.5, 29.5), model="equidistant", distortion=(0,) * 4),
+        Intrinsics(size=(60, 60), focal_px=(60, 60), centre_px=(25, 31), model="radtan", distortion=(-1, 0, 0, 0)),
+    ],
+)
+def test_what_a_lens_does_not_see_is_black_and_its_depth_is_not_known(tmp_path: Path, lens: Intrinsics) -> None:
+    file = tmp_path / "inside.toml"
+    file.write_text('[scene]\nambient = 1\n[[objects]]\nname = "all"\nkind = "sphere"\nsize_m = 4\n')
+    seen = np.isfinite(rays_of(pixel_grid((60, 60)), lens)[..., 0])
+    picture = World.of(file).render(0, lens)
+    assert 0.1 < seen.mean() < 0.9
+    np.testing.assert_array_equal(np.isfinite(picture.depth), seen)
+    assert np.isnan(picture.depth[~seen]).all() and np.isfinite(picture.light).all()
+    assert picture.light[seen].min() > 0.05
+    far = ~cv2.dilate(seen.astype(np.uint8), np.ones((3, 3))).astype(bool)
+    assert far.any() and not picture.light[far].any()
 
 
 @pytest.mark.parametrize("name", scene_names())

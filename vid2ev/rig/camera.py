@@ -46,7 +46,7 @@ class Optics(BaseModel):
 
     size: tuple[Side, Side] | None = Field(default=None, description="width and height [px]; left out: the video's")
     fov_deg: Angle | None = Field(
-        default=None, description="horizontal field of view [deg], with the centre in the middle"
+        default=None, description="horizontal field of view [deg] through the lens, with the centre in the middle"
     )
     focal_px: tuple[Positive, Positive] | None = Field(
         default=None, description="focal lengths across and down [px], in place of fov_deg"
@@ -71,6 +71,8 @@ class Optics(BaseModel):
                 f"distortion_model '{self.distortion_model}' takes {wanted} coefficients of distortion, not"
                 f" {len(self.distortion)}"
             )
+        if self.fov_deg is not None:
+            self.lens((1, 1))  # (raises if the lens does not see so far)
         return self
 
     def lens(self, size: tuple[int, int]) -> Intrinsics | None:
@@ -80,7 +82,7 @@ class Optics(BaseModel):
         if self.focal_px is not None:
             centre = self.centre_px or ((width - 1) / 2, (height - 1) / 2)
             return Intrinsics(size=size, focal_px=self.focal_px, centre_px=centre, **own)
-        return Intrinsics.of_field(size, self.fov_deg).model_copy(update=own) if self.fov_deg is not None else None
+        return None if self.fov_deg is None else Intrinsics.of_field(size, self.fov_deg, **own)
 
 
 class Source(Optics):

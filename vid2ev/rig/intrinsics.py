@@ -12,7 +12,6 @@ Sources: the models of OpenCV 4.x, "Camera calibration and 3D reconstruction" an
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -50,11 +49,24 @@ class Intrinsics(BaseModel):
         return self
 
     @classmethod
-    def of_field(cls, size: tuple[int, int], fov_deg: float = 60.0) -> Intrinsics:
-        """Without distortion, square pixels, the centre in the middle, and a horizontal field of view [deg]."""
+    def of_field(
+        cls,
+        size: tuple[int, int],
+        fov_deg: float = 60.0,
+        model: DistortionModel = "none",
+        distortion: tuple[float, ...] = (),
+    ) -> Intrinsics:
+        """Square pixels, the centre in the middle, and a horizontal field of view [deg] through the lens.
+
+        Raises ValueError for a lens that does not see so far.
+        """
         width, height = size
-        focal = width / 2 / math.tan(math.radians(fov_deg) / 2)
-        return cls(size=size, focal_px=(focal, focal), centre_px=((width - 1) / 2, (height - 1) / 2))
+        middle = (width - 1) / 2, (height - 1) / 2
+        unit = cls(size=size, focal_px=(1.0, 1.0), centre_px=middle, model=model, distortion=distortion)
+        from vid2ev.rig.lens import focal_of_field
+
+        focal = focal_of_field(width, fov_deg, model, distortion)
+        return unit.model_copy(update={"focal_px": (focal, focal)})
 
     @property
     def matrix(self) -> np.ndarray:
@@ -65,9 +77,13 @@ class Intrinsics(BaseModel):
 
     @property
     def fov_deg(self) -> float:
-        """The horizontal field of view between the outer borders of the pixels [deg], distortion left aside."""
-        left, right = self.centre_px[0] + 0.5, self.size[0] - 0.5 - self.centre_px[0]
-        return math.degrees(math.atan(left / self.focal_px[0]) + math.atan(right / self.focal_px[0]))
+        """The horizontal field of view through the lens between the outer borders of the pixels [deg]; NaN where it
+        does not see so far."""
+        from vid2ev.rig.lens import rays_of
+
+        ends = np.array([[-0.5, self.centre_px[1]], [self.size[0] - 0.5, self.centre_px[1]]])
+        left, right = np.degrees(np.arctan(rays_of(ends, self)[:, 0]))
+        return float(right - left)
 
     def scaled_to(self, size: tuple[int, int]) -> Intrinsics:
         """The same field seen with other pixels; of another shape, the full width is kept."""

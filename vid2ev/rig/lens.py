@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.intrinsics import DistortionModel, Intrinsics
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -79,13 +79,34 @@ def bent_tensor(plane: Tensor, camera: Intrinsics) -> Tensor:
     return px
 
 
+def focal_of_field(width: int, fov_deg: float, model: DistortionModel, distortion: tuple[float, ...]) -> float:
+    """The focal length [px] with which the middle row, of so many pixels, sees a field [deg] from border to border,
+    what the lens does across its radius (tangential distortion) left aside.
+
+    Raises ValueError for a lens that does not see so far.
+    """
+    plain = Intrinsics(
+        size=(1, 1), focal_px=(1.0, 1.0), centre_px=(0.0, 0.0), model=model, distortion=_radial(model, distortion)
+    )
+    edge = float(bent(np.array([[math.tan(math.radians(fov_deg) / 2), 0.0]]), plain)[0, 0])
+    if not edge > 0:
+        widest = 2 * math.degrees(math.atan(radial_table(plain)[0][-1]))
+        raise ValueError(
+            f"fov_deg {fov_deg:g} is more than this lens sees, {widest:.4g}: make it less, or state focal_px"
+        )
+    return width / 2 / edge
+
+
+def _radial(model: DistortionModel, distortion: tuple[float, ...]) -> tuple[float, ...]:
+    """The coefficients without the tangential ones."""
+    return (*distortion[:2], 0.0, 0.0, *distortion[4:]) if model == "radtan" else distortion
+
+
 @lru_cache(maxsize=64)
 def radial_table(camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
     """Radii on the plane z = 1, rising from 0, and the radii that the lens makes of them, as far as these rise, too."""
     radii = np.tan(np.radians(np.linspace(0, FIELD_DEG, 8192)))
-    radial_only = camera.distortion
-    if camera.model == "radtan":
-        radial_only = (*radial_only[:2], 0.0, 0.0, *radial_only[4:])
+    radial_only = _radial(camera.model, camera.distortion)
     plain = camera.model_copy(update={"focal_px": (1.0, 1.0), "centre_px": (0.0, 0.0), "distortion": radial_only})
     with np.errstate(over="ignore", invalid="ignore"):
         made = _distorted(np.stack([radii, np.zeros_like(radii)], -1), plain)[:, 0]

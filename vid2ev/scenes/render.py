@@ -39,7 +39,7 @@ class Picture(NamedTuple):
     """What a camera sees.
 
     light  float32 [H, W, 3], linear, 1.0 a white surface under ambient light of 1.0
-    depth  float32 [H, W], z in the camera's coordinates [m]; +inf where nothing is
+    depth  float32 [H, W], z in the camera's coordinates [m]; +inf where nothing is, NaN where the lens sees nothing
     thing  int32 [H, W], the number of the thing in the snapshot; -1 where nothing is
     """
 

@@ -80,7 +80,7 @@ class Camera(Part):
 
     size: tuple[int, int] = Field(default=(640, 480), description="width and height [px]")
     fov_deg: float | None = Field(
-        default=None, ge=1, le=170, description="horizontal field of view [deg]; 60 if not given"
+        default=None, ge=1, le=170, description="horizontal field of view [deg] through the lens; 60 if not given"
     )
     focal_px: tuple[float, float] | None = Field(default=None, description="focal lengths instead of fov_deg [px]")
     centre_px: tuple[float, float] | None = Field(
@@ -102,15 +102,12 @@ class Camera(Part):
     @property
     def intrinsics(self) -> Intrinsics:
         """The lens and the pixels."""
-        width, height = self.size
-        plain = Intrinsics.of_field(self.size, 60.0 if self.fov_deg is None else self.fov_deg)
-        return Intrinsics(
-            size=self.size,
-            focal_px=self.focal_px or plain.focal_px,
-            centre_px=self.centre_px or ((width - 1) / 2, (height - 1) / 2),
-            model=self.model,
-            distortion=self.distortion,
-        )
+        own: dict[str, Any] = {"model": self.model, "distortion": self.distortion}
+        fov_deg, middle = self.fov_deg or 60.0, ((self.size[0] - 1) / 2, (self.size[1] - 1) / 2)
+        if self.focal_px is None:
+            plain = Intrinsics.of_field(self.size, fov_deg, **own)
+            return plain.model_copy(update={"centre_px": self.centre_px or middle})
+        return Intrinsics(size=self.size, focal_px=self.focal_px, centre_px=self.centre_px or middle, **own)
 
 
 class Flicker(Part):

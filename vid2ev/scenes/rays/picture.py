@@ -19,10 +19,11 @@ def trace(world, rays, line, column, things, count, light, depth, thing, keys, s
     meeting = meet(world, things, count, x, y, stack)
     shadows = shadows_of(world, meeting, x, y, stack)
     keys[line, column] = key_of(world, meeting[0], meeting[1], meeting[2], shadows, math.inf)
-    depth[line, column] = meeting[1]
+    seen = x == x  # (no ray leads to what a lens does not see)
+    depth[line, column] = meeting[1] if seen else math.nan
     if 0 < line < rays.shape[0] - 1 and 0 < column < rays.shape[1] - 1:
         across, down = steps(rays, line, column)
-        r, g, b = light_of(world, meeting, x, y, across, down, shadows)
+        r, g, b = light_of(world, meeting, x, y, across, down, shadows) if seen else (0.0, 0.0, 0.0)
         light[line - 1, column - 1, 0] = r
         light[line - 1, column - 1, 1] = g
         light[line - 1, column - 1, 2] = b
