@@ -249,6 +249,14 @@ def test_another_seed_is_another_recording_of_a_rig(tmp_path: Path) -> None:
         convert(CLIP, tmp_path / "out", resume=True, **options | {"seed": 4})
 
 
+def test_changes_to_sensors_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    frames = Rig(cameras=(Camera(name="aps", kind="cis"),))
+    with pytest.raises(UsageError, match="'exposure_us=5': expected an event camera to change; keys of frame sensors"):
+        convert(CLIP, tmp_path / "out", rig=frames, overrides=["exposure_us=5"], **OPTIONS)
+    with pytest.raises(UsageError, match="expected a list of texts"):
+        convert(CLIP, tmp_path / "out", overrides="threshold_on=0.2", **OPTIONS)
+
+
 def test_a_seed_that_was_drawn_is_that_of_the_rig_when_it_is_taken_up(tmp_path: Path) -> None:
     options = OPTIONS | {"rig": rig(), "seed": None}
     with pytest.raises(Paused):

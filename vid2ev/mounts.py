@@ -15,7 +15,7 @@ from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.dvs import Dvs
-from vid2ev.sensors.presets import load_cis, load_sensor
+from vid2ev.sensors.presets import check_overrides, load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.toml_text import toml_value
@@ -48,6 +48,7 @@ class Sensors:
     overrides: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        check_overrides(self.overrides)
         for sensor, kind in ((self.dvs, "dvs"), (self.cis, "cis")):
             if isinstance(sensor, Spec) and (texts := self._changes(kind)):
                 raise UsageError(f"overrides {texts}: expected a preset or file to change; change the specification")
@@ -66,9 +67,14 @@ class Sensors:
         return Loaded(str(sensor), (load_sensor if camera.kind == "dvs" else load_cis)(sensor, changes))
 
     def check_changes(self, cameras: Iterable[Camera]) -> None:
-        """Raise UsageError for changes to frame sensors where none of the cameras has one."""
-        if (texts := self._changes("cis")) and all(camera.kind == "dvs" for camera in cameras):
+        """Raise UsageError for changes to sensors of a kind that none of the cameras has."""
+        kinds = {camera.kind for camera in cameras}
+        if "cis" not in kinds and (texts := self._changes("cis")):
             raise UsageError(f"setting '{texts[0]}': expected a frame camera to change; add --frames, or leave it out")
+        if "dvs" not in kinds and (texts := self._changes("dvs")):
+            raise UsageError(
+                f"setting '{texts[0]}': expected an event camera to change; keys of frame sensors begin with cis."
+            )
 
     def _changes(self, kind: str) -> list[str]:
         return [text for text in self.overrides if text.strip().startswith("cis.") == (kind == "cis")]

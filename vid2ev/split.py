@@ -15,6 +15,7 @@ from __future__ import annotations
 import secrets
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from vid2ev.kernels.layout import BLOCK
 from vid2ev.outputs import Outputs
 from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
+from vid2ev.recording.disk import writing
 from vid2ev.recording.folder import begun_job, check_free
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
@@ -68,18 +70,23 @@ def convert_split(
         options["seed"] = begun_part(directory).get("seed", secrets.randbits(32))
     parts, notes = _parts(video, kind, count, dict(options), look)
     folders = tuple(beside / f"{number}-of-{len(parts)}" for number in range(len(parts)))
-    beside.mkdir(parents=True, exist_ok=True)
+    with writing(directory):
+        beside.mkdir(parents=True, exist_ok=True)
     not_in_parts = Outputs.__dataclass_fields__.keys() - {"probe"}
     of_parts = {key: value for key, value in options.items() if key not in not_in_parts}
     calls = [
         partial(_part, video=video, folder=folder, options=of_parts | part)
         for folder, part in zip(folders, parts, strict=True)
     ]
-    share_out([Task(f"{video}, part {number} of {len(parts)}", call) for number, call in enumerate(calls, 1)])
+    try:
+        share_out([Task(f"{video}, part {number} of {len(parts)}", call) for number, call in enumerate(calls, 1)])
+    finally:
+        with suppress(OSError):
+            beside.rmdir()  # (where nothing was begun that could be taken up)
     options |= {"notes": {**(options.get("notes") or {}), **notes}} if notes else {}
     made = Made(folders, in_time=kind != "tiles")
     manifest = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=made, **options)
-    shutil.rmtree(beside)
+    shutil.rmtree(beside, ignore_errors=True)
     return manifest
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 KNOWN = """\
-* Frames of the truth are the light of an instant, without exposure and noise. The frame camera's exposures have their
-  middles at such instants.
+* Frames of the truth are the light of an instant, without exposure and noise.{exposures}
 * Events are simulated from the very light that the truth is made of. That is kinder to every method that uses events
   than a real recording is, to those that add them up most of all.
 * Scenes are independent of each other but for textures: the same photographs come again."""
+EXPOSED = " The frame camera's exposures have their\n  middles at such instants."
+KEYS = " So are those that\n  stand for frames of the camera."
 FILMED = """\
 * {filmed} Frames of the truth between filmed ones are made along the estimated motion, so where a film has fewer than
   {interpolated:g} frames a second after the slowdown, they are no more true than that.
@@ -32,7 +33,7 @@ def card_text(facts: dict[str, Any]) -> str:
         "Seed": spec["seed"],
     }
     table = "\n".join(f"| {name} | {value} |" for name, value in rows.items())
-    known = KNOWN
+    known = KNOWN.format(exposures=EXPOSED if spec["layout"] == "own" else KEYS)
     if videos:
         known += "\n" + FILMED.format(filmed="They are real films.", interpolated=facts["interpolated_fps"])
     left_out = "\n".join(f"* {name}: {reason}" for name, reason in facts["left_out"].items())

@@ -106,7 +106,7 @@ def by_frame(files: Sequence[Path], frames: int, multiple: int) -> dict[int, Pat
         return dict(enumerate(files))
     if len(files) == len(rebuilt) and (gapless or not known or max(numbers) >= frames):
         return dict(zip(rebuilt, files, strict=True))
-    if known and (not gapless or min(numbers) == 0):
+    if known and (not gapless or min(numbers) == 0 or {*numbers} <= {*rebuilt}):
         return dict(zip(numbers, files, strict=True))
     raise DataError(
         f"{files[0].parent}: {len(files)} pictures for {frames} frames, of which {len(rebuilt)} are rebuilt; expected"

@@ -75,8 +75,9 @@ def test_two_limits_of_a_kind_are_refused() -> None:
     "text", ["", "vR", "vR=", "vR=x", "vR=-1", "vR=nan", "us=inf", "distance=1", "vR=0.1;us=3", "time=x"]
 )
 def test_what_is_no_budget_is_refused_in_a_sentence(text: str) -> None:
-    with pytest.raises(UsageError, match=r"^budget '.*': expected .* such as "):
+    with pytest.raises(UsageError, match=r"^budget '.*': expected .* such as ") as refused:
         Budget.parse(text)
+    assert "did you mean" not in str(refused.value)
 
 
 Places = list[tuple[float, float]]

@@ -73,6 +73,14 @@ def test_the_reference_is_exact_whatever_the_sensor_says() -> None:
     assert "timing" not in ladder(sensor="v2e-clean").reference.settings  # (no filter: a line is the response)
 
 
+@pytest.mark.parametrize("sensor", ["ideal", "v2e-clean"])
+def test_where_logarithms_are_straight_the_reference_has_steps_though_nothing_moves(sensor: str) -> None:
+    """Or else it would be one between its logarithm and light that is straight, and a finer one another."""
+    assert ladder(sensor=sensor, steps=1).reference.options == {"subframes": 16}
+    assert ladder(sensor=sensor, steps=12).reference.options == {"subframes": 24}
+    assert ladder(steps=1).reference.options == {"subframes": 2}
+
+
 def test_where_nothing_moves_light_between_the_frames_is_no_question() -> None:
     found = names(ladder(steps=1))
     assert not found & {"straight light", "linear", "at most 2 steps"} and "finest" in found

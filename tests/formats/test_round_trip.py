@@ -55,6 +55,8 @@ def test_windows_and_blocks(tmp_path: Path, name: str) -> None:
     for none in (0, -5):
         with pytest.raises(UsageError, match=f"block {none}: expected at least 1"):
             list(read_events(path, block=none))
+    with pytest.raises(UsageError, match=r"start_us 10000\.0: expected a whole number"):
+        list(read_events(path, 1e4))
 
 
 @pytest.mark.parametrize("name", WRITABLE)

@@ -16,6 +16,7 @@ from interp.commands.dataset import dataset
 from interp.data.dataset import make_scene, write_dataset
 from interp.data.dataset_spec import DatasetSpec, scenes_of
 from interp.data.layouts import open_sequence, windows
+from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.own import Own
 from interp.data.recorded import clip_of
 from vid2ev import DataError, UsageError, open_source
@@ -154,6 +155,11 @@ def test_other_layouts_hold_the_same(tmp_path: Path, layout: str) -> None:
     between = int(ours.times_us[3]), int(ours.times_us[13])
     for name in "txyp":
         np.testing.assert_array_equal(getattr(ours.events(*between), name), getattr(theirs.events(*between), name))
+    path = next((tmp_path / "set" / scene.name / LAYOUTS[layout].events).glob("*5.npz"))
+    scale = 1 if layout == "hsergb" else 32  # (what loaders of each make pixels of)
+    with np.load(path) as part:
+        assert 0 <= part["x"].max() // scale < 32 and 0 <= part["y"].max() // scale < 24
+        assert part["x"].max() // scale > 8
 
 
 def test_workers_change_no_byte(made: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -279,6 +280,12 @@ def test_numbered_predictions_of_which_some_are_missing_are_of_the_frames_of_the
                 assert made is None
             else:
                 np.testing.assert_array_equal(made, true)
+
+
+@pytest.mark.parametrize("numbers", [range(1, 4), range(2, 4), range(5, 8), [3]])
+def test_predictions_of_the_first_gaps_alone_are_known_by_their_numbers(numbers: Iterable[int]) -> None:
+    files = {k: Path(f"{k:06d}.png") for k in numbers}
+    assert by_frame([*files.values()], 213, 4) == files
 
 
 @pytest.mark.parametrize("names", [["a", "b", "c"], ["1", "2", "3", "4"], ["7a7", "8b7", "9c7"]])

@@ -106,6 +106,12 @@ def test_effects_by_name() -> None:
         assert plan_of(seen, spec, effects=names).spec.effects() == ["mismatch", "refractory"]
 
 
+def test_of_poles_that_are_left_out_by_name_with_no_delay_in_their_place_nothing_is_known() -> None:
+    rows = {row.effect: row for row in plan_of(scene("edge"), POLES, effects="photoreceptor").rows}
+    assert rows["follower"].fate == "dropped" and rows["follower"].omission.distance is None
+    assert rows["photoreceptor"].fate == "kept" and rows["photoreceptor"].omission.distance
+
+
 @pytest.mark.parametrize(
     ("effects", "tolerance", "words"),
     [("mismach", 0.01, "did you mean mismatch"), ("auto", 2.0, "tolerance 2.0"), ("auto", float("nan"), "tolerance")],

@@ -160,6 +160,11 @@ def test_dsec_is_read_as_its_page_says(tmp_path: Path) -> None:
     assert [camera.kind for camera in cameras] == ["dvs", "cis", "cis", "dvs"]
     assert [camera.size for camera in cameras] == [(640, 480), (1440, 1080), (1440, 1080), (640, 480)]
     np.testing.assert_allclose([camera.translation_mm[0] for camera in cameras], [0, 40, 550, 600])
+    for index in range(4):  # (as files are that do not say it)
+        del tree["intrinsics"][f"cam{index}"]["camera_type"]
+    (tmp_path / "unsaid.yaml").write_text(yaml.safe_dump(tree))
+    unsaid = read_calibration(tmp_path / "unsaid.yaml").rig.cameras
+    assert [camera.kind for camera in unsaid] == ["dvs", "cis", "cis", "dvs"]
 
 
 def test_rows_of_a_rectified_pair_show_the_same(tmp_path: Path) -> None:

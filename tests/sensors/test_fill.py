@@ -151,6 +151,8 @@ def test_what_cannot_be_is_said() -> None:
         batch.steps(light[::-1], t_ns[::-1])
     with pytest.raises(UsageError, match="each after the one before"):
         NetCounts(SIZE, [0, 5, 5])
+    with pytest.raises(UsageError, match="expected whole numbers of microseconds"):
+        NetCounts(SIZE, [0.5, 1.5])
     with pytest.raises(UsageError, match="expected int8 or int16"):
         NetCounts(SIZE, [0, 5], dtype=np.uint8)
     with pytest.raises(UsageError, match="a start and a later stop"):

@@ -15,6 +15,7 @@ from vid2ev.errors import DataError, UsageError
 if TYPE_CHECKING:
     from distributed import Client
 
+LEAST_BYTES = 128 << 20  # a process that does nothing yet takes half of it, and would be ended again and again
 REACHED_S = 20  # within which a scheduler has to answer
 ONE_THREAD_EACH = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 HERE = {  # of Dask's configuration: a process ends at its limit of memory, and is not paused or spilled to disk before
@@ -32,12 +33,17 @@ class Workers:
     scheduler  address of a Dask scheduler, such as tcp://10.0.0.1:8786; None for processes of this machine
     retries    how often a task is tried again after an error or the death of its worker
     memory     of each process here, such as "4 GiB"; by default its share of the machine's
+    Raises UsageError for a memory in which no process can begin.
     """
 
     jobs: int = 1
     scheduler: str | None = None
     retries: int = 2
     memory: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.memory is not None and has_dask():
+            _bytes_of(self.memory)  # (raises UsageError)
 
     @property
     def alone(self) -> bool:
@@ -107,8 +113,8 @@ def _bytes_of(memory: str) -> int:
         found = parse_bytes(memory)
     except ValueError:
         found = 0
-    if found <= 0:
-        raise UsageError(f"--memory {memory}: expected a size such as 4GiB")
+    if found < LEAST_BYTES:
+        raise UsageError(f"--memory {memory}: expected a size such as 4GiB, at least {LEAST_BYTES >> 20}MiB")
     return found
 
 

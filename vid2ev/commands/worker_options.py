@@ -52,4 +52,7 @@ def workers_of(options: dict[str, Any], jobs: int = 1) -> Workers:
         for name in ("jobs", "memory"):
             if asked[name] is not None:
                 raise UsageError(f"--{name} with --scheduler, whose workers are there already; leave one of them out")
-    return Workers(**asked | {"jobs": asked["jobs"] or (1 if asked["scheduler"] else jobs)})
+    workers = Workers(**asked | {"jobs": asked["jobs"] or (1 if asked["scheduler"] else jobs)})
+    if workers.memory is not None and workers.alone:
+        raise UsageError(f"--memory {workers.memory} of one process, this one, which is not limited; add --jobs")
+    return workers

@@ -59,7 +59,7 @@ class Budget:
             if name not in LIMITS or not found:
                 raise UsageError(
                     f"budget '{part.strip()}': expected NAME=LIMIT with one of {', '.join(LIMITS)}, such as vR=0.05,"
-                    f" us=50 or time=10x{nearest(name, LIMITS)}"
+                    f" us=50 or time=10x{'' if name in LIMITS else nearest(name, LIMITS)}"
                 )
             if name in limits:
                 raise UsageError(f"budget '{text}': {name} is limited twice; expected one limit of each kind")
@@ -144,5 +144,8 @@ def _number(part: str, text: str) -> float:
     except ValueError:
         limit = math.nan
     if not 0 <= limit < math.inf:
-        raise UsageError(f"budget '{part}': expected a limit of at least 0, such as vR=0.05, us=50 or time=10x")
+        raise UsageError(
+            f"budget '{part}': expected a number of at least 0, such as vR=0.05, us=50 or time=10x, with commas between"
+            " several"
+        )
     return limit

@@ -27,6 +27,7 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample import METHODS
 
 MOST_STEPS = 64  # of an interval of the reference
+STEPS_OF_LOG = 16  # at least, where logarithms are straight: what lies between that and light falls with their square
 CAPS = (2, 4, 8, 16, 32)  # of the sub-frames of an interval
 NAMES = {"none": "straight light", "linear": "linear", "flow": "flow"}
 
@@ -93,10 +94,16 @@ def steps_of(recipe: Recipe, seen: Callable[[], object] = lambda: None) -> int:
 def _finest(recipe: Recipe, given: Given, steps: int, dvs: list[DvsSpec]) -> Rung:
     options: dict[str, Any] = {}
     if _may_divide(recipe, given):
-        options["subframes"] = min(2 * steps, max(MOST_STEPS, steps))
+        least = STEPS_OF_LOG if any(_log_is_straight(spec) for spec in dvs) else 2
+        options["subframes"] = min(max(2 * steps, least), max(MOST_STEPS, steps))
     inexact = [spec for spec in dvs if spec.timing != "response" and (spec.pole_taus_us or spec.filter == "before")]
     settings = {"timing": "response"} if inexact and not given.any("timing") else {}
     return Rung("finest", "", options, settings)
+
+
+def _log_is_straight(spec: DvsSpec) -> bool:
+    """Whether it is not light but its logarithm that a sensor takes to be straight from frame to frame."""
+    return spec.filter == "after" or not spec.pole_taus_us
 
 
 def _may_divide(recipe: Recipe, given: Given) -> bool:

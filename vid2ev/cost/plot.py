@@ -127,7 +127,7 @@ def label(axes: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
 
     def covers(box: Any) -> int:
         across = sum(line.intersects_bbox(box, filled=False) for line in lines)
-        outside = not (axes.bbox.containsx(box.x0) and axes.bbox.containsx(box.x1))
+        outside = not all(axes.bbox.contains(*corner) for corner in (box.min, box.max))
         return int(across + 10 * (outside + sum(box.overlaps(other) for other in taken)))
 
     for x, y, name, colour in points:

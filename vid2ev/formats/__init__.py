@@ -73,9 +73,12 @@ def read_events(
 ) -> Iterator[Events]:
     """The events of a file or recording folder with start_us <= t < stop_us, at most `block` at a time.
 
-    Times are absolute, on the clock of the source.  Raises UsageError for a file that is not there or blocks of no
-    events, DataError for a file that is no event file, or damaged.
+    Times are absolute, on the clock of the source.  Raises UsageError for a file that is not there, times that are no
+    whole numbers or blocks of no events, DataError for a file that is no event file, or damaged.
     """
+    for name, t_us in (("start_us", start_us), ("stop_us", stop_us)):
+        if not isinstance(t_us, (int, np.integer, type(None))):
+            raise UsageError(f"{name} {t_us!r}: expected a whole number of microseconds")
     if block < 1:
         raise UsageError(f"block {block}: expected at least 1 event at a time")
     yield from open_events(path).events(start_us, stop_us, block)

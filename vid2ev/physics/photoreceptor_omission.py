@@ -145,7 +145,8 @@ def _delay_instead(
     frozen_nat, after_turns = at_turns
     mean = delayed(scene, variance_s2, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
     mean += later(scene, 1e-6 * late_us) + 1e-6 * rounded_us / DISTANCE_TAU_S
-    why = f"a delay of {delay_us:g} us instead; what is left are rounded bends"
+    both = " of both poles" if off is BOTH_OFF and spec.follower_tau_us else ""
+    why = f"a delay of {delay_us:g} us in place{both}; what is left are rounded bends"
     if late_us > 0.0:
         why += f", and {late_us:.3g} us by the light"
     if spec.timing != "response":

@@ -36,7 +36,11 @@ from vid2ev.stream.scene import Omission, Scene
 class Shading(BaseModel, frozen=True, extra="forbid"):
     """Parameter of the lens shading."""
 
-    shading: tuple[float, ...] = Field((), max_length=16, description="coefficients of r, r^2, ... of the optical gain")
+    shading: tuple[float, ...] = Field(
+        (),
+        max_length=16,
+        description="coefficients of r, r^2, ... of the optical gain, r in widths of the picture from its centre",
+    )
 
 
 def shading_map(coefficients: tuple[float, ...], width: int, height: int) -> np.ndarray:

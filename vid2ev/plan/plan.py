@@ -147,8 +147,8 @@ class Plan:
 
     def in_all(self) -> str:
         """What all that is left out changes, in words."""
-        what = "no bound" if self.distance is None else f"at most {self.distance:.2g}"
-        return f"all that is left out changes the distance by {what}, tolerance {self.tolerance:g}"
+        what = "has no bound" if self.distance is None else f"changes the distance by at most {self.distance:.2g}"
+        return f"all that is left out {what}, tolerance {self.tolerance:g}"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
@@ -218,10 +218,16 @@ def _planned(
     distance = together(*bounds) if len(bounds) == len(_counted(gone)) else None  # type: ignore[arg-type]
     if effects != "auto" and {"photoreceptor", "follower", "delay"} & {*gone}:
         distance = None  # (the bounds of the poles are those of a delay in their place)
+        omissions |= {name: _without_delay(omissions[name]) for name in gone if omissions[name].replace}
     fates = {name: _fate(name, gone, said, effects == "auto") for name, said in omissions.items()}
     rows = tuple(Row(name, fates[name], said, *EFFECTS[name][2:]) for name, said in omissions.items())
     shown = effects if isinstance(effects, str) else ",".join(effects)
     return Plan(shown, tolerance, rows, changed(spec, changes), distance, seen)
+
+
+def _without_delay(omission: Omission) -> Omission:
+    """What is known of leaving a pole out with nothing in its place."""
+    return replace(omission, distance=None, kind="no bound yet", why="all comes earlier: no delay takes its place")
 
 
 def chosen(omissions: dict[str, Any], among: Sequence[str] | None) -> dict[str, Any]:

@@ -57,7 +57,7 @@ class Subframes:
         figure = f"{self.worst_us:.3g} us, {made}"
         limited = f", {self.limited} at the limit of sub-frames" if self.limited else ""
         with_those = " with those made" if self.made else ""
-        why = f"{intervals}; crossings are up to {self.left_us:.3g} us off{with_those}{limited}"
+        why = f"{intervals}; by motion crossings are up to {self.left_us:.3g} us off{with_those}{limited}"
         return Row(
             "subframes", "kept", Omission(None, "estimate", figure, why), NS_PER_PIXEL if self.made else 0.0, 0.0
         )

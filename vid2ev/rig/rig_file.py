@@ -91,9 +91,11 @@ def write_text(path: Path, text: str, overwrite: bool = False) -> None:
 def read_text(path: Path) -> str:
     """The text of a small file.  Raises UsageError if it is not there, DataError if it cannot be read."""
     check_file(path)
+    if path.is_file() and path.stat().st_size > LARGEST:
+        raise DataError(
+            f"{path}: {path.stat().st_size:,} bytes are too many for a rig or calibration file; give another file"
+        )
     try:
-        if path.is_file() and path.stat().st_size > LARGEST:
-            raise DataError(f"{path}: {path.stat().st_size:,} bytes are too many for a rig or calibration file")
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise UsageError(f"{path}: no such file; `vid2ev init rig.toml` writes a rig file to begin with") from error

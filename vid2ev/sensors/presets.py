@@ -90,8 +90,7 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
     """The specification of a sensor of a kind; see `load_sensor`."""
     sensor = read_sensor(name_or_path, kind)
     values = dict(sensor.values)
-    if isinstance(overrides, str) or not all(isinstance(override, str) for override in overrides):
-        raise UsageError(f"overrides {overrides!r}: expected a list of texts, such as [{kind.example!r}]")
+    check_overrides(overrides, kind)
     for override in overrides:
         key, value = setting(override, kind.example)
         values[key.removeprefix(f"{kind.table}.")] = value
@@ -106,6 +105,12 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
         return kind.spec(**values)
     except ValidationError as error:
         raise UsageError(_sentence(error, sensor.name, kind)) from error
+
+
+def check_overrides(overrides: Any, kind: Kind = DVS) -> None:
+    """Raise UsageError for what is no list of texts."""
+    if isinstance(overrides, str) or not all(isinstance(override, str) for override in overrides):
+        raise UsageError(f"overrides {overrides!r}: expected a list of texts, such as [{kind.example!r}]")
 
 
 def read_sensor(name_or_path: str | Path, kind: Kind = DVS) -> SensorFile:

@@ -94,15 +94,22 @@ class Windows:
 
 def edges_of(edges_us: Sequence[int] | np.ndarray) -> np.ndarray:
     """Edges of intervals, int64 [us]; raises UsageError for fewer than two, or such as do not ascend."""
-    edges = np.asarray(edges_us, np.int64)
+    edges = _whole(edges_us)
     if edges.ndim != 1 or len(edges) < 2 or (np.diff(edges) <= 0).any():
         raise UsageError(f"edges of shape {edges.shape}: expected two or more times [us], each after the one before")
     return edges
 
 
+def _whole(times_us: Any) -> np.ndarray:
+    times, given = np.asarray(times_us, np.int64), np.asarray(times_us)
+    if (times != given).any():
+        raise UsageError(f"times {given[times != given][:3].tolist()} ...: expected whole numbers of microseconds")
+    return times
+
+
 def windows_of(windows_us: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     """Windows, int64 [n, 2] [us]; raises UsageError for none, or such as end before they start."""
-    windows = np.asarray(windows_us, np.int64)
+    windows = _whole(windows_us)
     if windows.ndim != 2 or windows.shape[1:] != (2,) or len(windows) == 0 or (windows[:, 0] > windows[:, 1]).any():
         raise UsageError(f"windows of shape {windows.shape}: expected [n, 2], a start and a later stop [us]")
     return windows

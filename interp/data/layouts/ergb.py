@@ -34,11 +34,12 @@ class Names(NamedTuple):
     events: str
     columns: tuple[str, str, str, str]  # x, y, t, p
     events_after: bool  # file n has the events after picture n, not before it
+    scaled: bool  # coordinates are written as pixels times 32
 
 
 LAYOUTS = {
-    "hsergb": Names("images_corrected", "events_aligned", ("x", "y", "t", "p"), False),
-    "bsergb": Names("images", "events", ("x", "y", "timestamp", "polarity"), True),
+    "hsergb": Names("images_corrected", "events_aligned", ("x", "y", "t", "p"), False, False),
+    "bsergb": Names("images", "events", ("x", "y", "timestamp", "polarity"), True, True),
 }
 LATEST_US = 1 << 60
 MOMENT = 0.25  # of the time between pictures

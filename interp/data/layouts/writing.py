@@ -1,8 +1,8 @@
 """Sequences written in the HS-ERGB or BS-ERGB layout, so that what reads the releases reads them too.
 
-Coordinates are whole pixels times 32, as the READMEs of both say, and loaders that do not divide cannot read them
-right. File n of HS-ERGB has the events before picture n, the first one, which is empty, is before the first picture;
-file n of BS-ERGB those after it.
+Coordinates are pixels, float32, in HS-ERGB, as its release has them and Time Lens's loader takes them, and pixels times
+32, uint16, in BS-ERGB.  File n of HS-ERGB has the events before picture n, the first one, which is empty, is before the
+first picture; file n of BS-ERGB those after it.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ def write_sequence(sequence: Sequence, folder: Path, layout: str) -> None:
             f"{sequence.name}: events of {sequence.event_size[0]}x{sequence.event_size[1]} beside pictures of"
             f" {sequence.size[0]}x{sequence.size[1]} pixels; the layout {layout} takes one size, --layout own both"
         )
-    if SCALE * max(sequence.size) > np.iinfo(np.uint16).max:
-        raise UsageError(f"{sequence.name}: pictures of {max(sequence.size)} pixels; expected up to 2047 in {layout}")
     names = LAYOUTS[layout]
+    if names.scaled and SCALE * max(sequence.size) > np.iinfo(np.uint16).max:
+        raise UsageError(f"{sequence.name}: pictures of {max(sequence.size)} pixels; expected up to 2047 in {layout}")
     with writing(folder), whole(folder) as made:
         images, parts = made / names.images, made / names.events
         images.mkdir(parents=True)
@@ -46,5 +46,9 @@ def write_sequence(sequence: Sequence, folder: Path, layout: str) -> None:
         gaps = gaps if names.events_after else [(edges[0], edges[0]), *gaps]
         for k, (start_us, stop_us) in enumerate(gaps):
             t, x, y, p = sequence.events(start_us, stop_us)
-            places = [np.rint(SCALE * values).astype(np.uint16) for values in (x, y)]
+            places = [_written(values, names.scaled) for values in (x, y)]
             write_npz(parts / f"{k:06d}.npz", dict(zip(names.columns, [*places, t, p], strict=True)))
+
+
+def _written(px: np.ndarray, scaled: bool) -> np.ndarray:
+    return np.rint(SCALE * px).astype(np.uint16) if scaled else px.astype(np.float32)

@@ -43,6 +43,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 
 TYPES: dict[str, Kind] = {"event": "dvs", "frame": "cis"}
+UNSAID: dict[str, Kind] = {"cam1": "cis", "cam2": "cis"}  # where a file has no camera_type: as they are in DSEC
 KINDS = {kind: name for name, kind in TYPES.items()}
 
 
@@ -57,7 +58,7 @@ def read(tree: Node) -> list[Calibrated]:
     for index, key in enumerate(keys):
         node = tree["intrinsics"][key]
         name = locations[index] if named else key
-        found.append(Calibrated(name, _intrinsics(node), _from_first(tree, key, keys, found), _kind(node)))
+        found.append(Calibrated(name, _intrinsics(node), _from_first(tree, key, keys, found), _kind(node, key)))
     return found
 
 
@@ -119,8 +120,8 @@ def _location(node: Node) -> str:
     return node["camera_location"].text() if "camera_location" in node else ""
 
 
-def _kind(node: Node) -> Kind:
-    return TYPES.get(node["camera_type"].text(), "dvs") if "camera_type" in node else "dvs"
+def _kind(node: Node, key: str) -> Kind:
+    return TYPES.get(node["camera_type"].text(), "dvs") if "camera_type" in node else UNSAID.get(key, "dvs")
 
 
 def _recognises(tree: Node) -> bool:
