@@ -49,9 +49,6 @@ class SampleSettings(BaseModel):
         return self
 
 
-UNALTERED = SampleSettings(backwards=0, still=0, all_still=0, thinned=0, threshold_error=(1, 1))
-
-
 class Drawn(Dataset[Sample]):
     """Samples 0 ... length - 1 of a pool.
 

@@ -16,7 +16,6 @@ from vid2ev.recording.disk import whole_file
 ROWS = "rows.csv"
 TYPES: dict[str, type] = get_type_hints(Row)
 COLUMNS = tuple(each.name for each in fields(Row))
-TEXTS = {name for name in COLUMNS if TYPES[name] is str}
 NUMBERS = tuple(name for name in COLUMNS if TYPES[name] is float)
 
 

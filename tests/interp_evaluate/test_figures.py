@@ -12,6 +12,7 @@ import pytest
 from interp.evaluate.figures import four_panels, heat_map, moments, worst_patch
 from interp.evaluate.figures.layout import FRAME_PX, GAP_PX
 from interp.evaluate.figures.lettering import ACCENT, GROUND, INK, STRIP_PX, letters, strip
+from interp.evaluate.figures.png import write_png
 from vid2ev.errors import DataError, UsageError
 from vid2ev.pictures.colours import OFF, ON, strength
 
@@ -146,7 +147,7 @@ def test_a_picture_smaller_than_a_patch_is_its_own() -> None:
 
 def test_pictures_are_written_as_they_are(tmp_path: Path) -> None:
     values = np.random.default_rng(0).uniform(0, 99, (HEIGHT, WIDTH))
-    heat_map.write_heat_map(tmp_path / "new" / "map.png", values)
+    write_png(tmp_path / "new" / "map.png", heat_map.panel(values))
     read = cv2.imread(str(tmp_path / "new" / "map.png"))[..., ::-1]
     assert (read == heat_map.panel(values)).all()
 

@@ -10,7 +10,7 @@ from view_rigs import pinhole
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid
 from vid2ev.rig.pose import IDENTITY, Pose, rotation_vector_deg
-from vid2ev.rig.truth import carried, depth_of_plane, depth_seen, flow_of, pixel_map, visible
+from vid2ev.rig.truth import carried, depth_of_plane, depth_seen, pixel_map, visible
 
 A = pinhole()
 B = pinhole((200, 100), 140).model_copy(update={"model": "radtan", "distortion": (-0.1, 0.02, 1e-3, 0.0)})
@@ -40,6 +40,10 @@ def test_the_disparity_of_a_rectified_pair() -> None:
     moved = pixel_map(A, IDENTITY, DEPTH, A, Pose.of((0, 0, 0), (0.12, 0, 0)))
     expected = pixel_grid(A.size) - np.stack([150 * 0.12 / DEPTH, 0 * DEPTH], axis=-1)
     np.testing.assert_allclose(moved, expected, atol=1e-4)
+
+
+def flow_of(camera: Intrinsics, pose_0: Pose, depth_0_m: np.ndarray, pose_1: Pose) -> np.ndarray:
+    return (pixel_map(camera, pose_0, depth_0_m, camera, pose_1) - pixel_grid(camera.size)).astype(np.float32)
 
 
 def test_flow_of_a_camera_that_moves_and_turns() -> None:

@@ -10,9 +10,7 @@ from vid2ev.kernel_compiler import inner
 from vid2ev.kernels.layout import Interval, Numbers
 from vid2ev.physics.log_curve import Curve
 
-SENSOR_FLOATS, SENSOR_INTS = 18, 5
-INTERVAL_FLOATS, INTERVAL_INTS = 19, 6
-RISEN = INTERVAL_FLOATS  # last: what the leak has risen that is taken into the memories before the interval [nat]
+RISEN = 19  # where the last number of an interval is: the leak that goes into the memories before it [nat]
 
 
 def sensor_row(num: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +41,7 @@ def interval_row(iv: Any, risen: float) -> tuple[np.ndarray, np.ndarray]:
         iv.dt_ns, iv.offset_ns, iv.x1, iv.w1, iv.x2, iv.g, iv.w2, iv.a, iv.b, iv.leak0, iv.leak1, iv.gain, iv.shift,
         iv.noise_keep1, iv.noise_mix, iv.noise_keep2, iv.noise_s11, iv.noise_s21, iv.noise_s22, risen,
     ]  # fmt: skip
-    ints = [iv.t0_ns, iv.first_us, iv.last_us, iv.noise_resolved, iv.step, 0]
+    ints = [iv.t0_ns, iv.first_us, iv.last_us, iv.noise_resolved, iv.step]
     return np.array(floats, np.float64), np.array(ints, np.int64)
 
 

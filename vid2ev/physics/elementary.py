@@ -44,12 +44,6 @@ _HALF, _ONE = F(0.5), F(1.0)
 
 
 @compiled
-def exponent_32(x):
-    """The octave [2**k, 2**(k + 1)) that a float32 >= 0 is in; -127 of zero."""
-    return np.int64(bits_32(x) >> np.int32(23)) - 127
-
-
-@compiled
 def log32(x):
     """Natural logarithm of a positive normal float32."""
     bits = bits_32(x)

@@ -21,7 +21,6 @@ be a depth at which there is nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol
@@ -41,10 +40,8 @@ class Depth(Protocol):
 
     plane_m: float | None  # the distance, if it is a plane
 
-    def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """The depth map of frame `index`, or after `share` (0 to 1) of the interval to the next.
-
-        lights   light of frame `index`, and of the next if share > 0; only models look at it
+    def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
+        """The depth map of frame `index`, with this light, which only models look at.
 
         Raises DataError for a file that is missing or cannot be meant.
         """
@@ -95,7 +92,7 @@ class PlaneDepth:
         self.plane_m: float | None = plane_m
         self._map = np.full(size[::-1], plane_m, np.float32)
 
-    def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
+    def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
         """The same map for all."""
         return self._map
 

@@ -17,7 +17,6 @@ KITTI's development kit, "Stereo evaluation 2015".
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +24,11 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
-from vid2ev.rig.depth import DepthScale, between
+from vid2ev.rig.depth import DepthScale
 from vid2ev.untrusted import check_exr, first_line, openexr, read_arrays
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
 NAMES = ("depth", "depths", "disparity", "disparities")
-KEPT = 2  # maps: those of the two frames between which others lie
 
 
 class DepthFiles:
@@ -57,20 +55,14 @@ class DepthFiles:
             self._stack = values if values.ndim == 3 else None
         self.count = len(self._files) if self._stack is None else len(self._stack)
         self._kept: dict[int, np.ndarray] = {}
-        if not (self._read(0) > 0).any() and self.count == 1:
+        if not (self.at(0) > 0).any() and self.count == 1:
             raise DataError(
                 f"{path}: none of its depth is known, all of it is 0, less than that or NaN; correct the map, or the"
                 " scale, shift and kind that are given"
             )
 
-    def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """The map of frame `index`, or after `share` of the interval to the next."""
-        here = self._read(index)
-        if share == 0 or self.count == 1:
-            return here
-        return between(here, self._read(index + 1), share)
-
-    def _read(self, index: int) -> np.ndarray:
+    def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
+        """The map of frame `index`."""
         index = 0 if self.count == 1 else index
         if index >= self.count:
             raise DataError(
@@ -80,7 +72,7 @@ class DepthFiles:
             file = self._files[0 if self._stack is not None else index]
             values = read_values(file) if self._stack is None else self._stack[index]
             depth_m = self._checked(values, file)
-            self._kept = {k: kept for k, kept in self._kept.items() if abs(k - index) < KEPT} | {index: depth_m}
+            self._kept = {index: depth_m}
         return self._kept[index]
 
     def _checked(self, values: np.ndarray, file: Path) -> np.ndarray:

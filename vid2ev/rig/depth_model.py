@@ -16,7 +16,6 @@ Source: L. Yang et al., "Depth Anything V2", NeurIPS 2024; the checkpoint named 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,12 +23,11 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import parse_transfer
-from vid2ev.rig.depth import DepthScale, between
+from vid2ev.rig.depth import DepthScale
 from vid2ev.untrusted import first_line
 
 EXAMPLE = "depth-anything/Depth-Anything-V2-Small-hf"
 METRIC = ("zoedepth", "glpn", "depth_pro")
-KEPT = 2
 
 
 class ModelDepth:
@@ -53,10 +51,13 @@ class ModelDepth:
         self._to_signal = parse_transfer("srgb").to_signal
         self._kept: dict[int, np.ndarray] = {}
 
-    def at(self, index: int, share: float = 0.0, lights: Sequence[np.ndarray] = ()) -> np.ndarray:
-        """The map of frame `index`, or after `share` of the interval to the next, of the lights of these frames."""
-        here = self._of_frame(index, lights[:1])
-        return between(here, self._of_frame(index + 1, lights[1:2]), share) if share else here
+    def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
+        """The map of frame `index`, of its light."""
+        if index not in self._kept:
+            if light is None:
+                raise UsageError(f"model:{self.name}: depth of frame {index} without its picture; give its light")
+            self._kept = {index: self.scale.depth_m(self.values(light))}
+        return self._kept[index]
 
     def values(self, light: np.ndarray) -> np.ndarray:
         """What the model says of light [H, W] or [H, W, 3]: [H, W] float32."""
@@ -72,14 +73,6 @@ class ModelDepth:
             outputs = self._model(**batch)
             made = self._processor.post_process_depth_estimation(outputs, **sizes)[0]["predicted_depth"]
         return made.float().numpy()
-
-    def _of_frame(self, index: int, lights: Sequence[np.ndarray]) -> np.ndarray:
-        if index not in self._kept:
-            if not lights:
-                raise UsageError(f"model:{self.name}: depth of frame {index} without its picture; give its light")
-            depth_m = self.scale.depth_m(self.values(lights[0]))
-            self._kept = {k: kept for k, kept in self._kept.items() if abs(k - index) < KEPT} | {index: depth_m}
-        return self._kept[index]
 
 
 def is_metric(config: Any) -> bool:

@@ -49,13 +49,6 @@ def pixel_map(
     return carried(camera_a, pose_a, depth_a_m, camera_b, pose_b).px
 
 
-def flow_of(camera: Intrinsics, pose_0: Pose, depth_0_m: np.ndarray, pose_1: Pose) -> np.ndarray:
-    """Optical flow [H, W, 2] px from one instant of a moving camera to another; depth at the first."""
-    here = pixel_grid(camera.size)
-    moved = pixel_map(camera, pose_0, depth_0_m, camera, pose_1)
-    return (moved - here).astype(np.float32)
-
-
 def visible(
     camera_a: Intrinsics,
     pose_a: Pose,

@@ -40,7 +40,7 @@ class WithDepth(Edit):
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
         for index, frame in enumerate(self.source.frames(start), start):
-            yield replace(frame, depth=self._depth.at(index, lights=[frame.light]))
+            yield replace(frame, depth=self._depth.at(index, frame.light))
 
 
 def parse_depth(text: str, lens: Intrinsics) -> Depth:

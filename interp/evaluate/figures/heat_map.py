@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 
 from interp.evaluate.figures.layout import check_pictures
 from interp.evaluate.figures.lettering import GROUND, letters, write
-from interp.evaluate.figures.png import write_png
 
 COLOURS = "magma"
 BAR_PX, MARGIN_PX = 10, 6
@@ -56,8 +54,3 @@ def panel(values: np.ndarray, low: float = 0.0, high: float | None = None, unit:
     write(scale, top, 2 * MARGIN_PX + BAR_PX, 0)
     write(scale, bottom, 2 * MARGIN_PX + BAR_PX, max(0, height - letters(bottom).shape[0]))
     return np.concatenate([coloured(values, low, end), scale], axis=1)
-
-
-def write_heat_map(path: Path, values: np.ndarray, **how: float) -> None:
-    """Write a panel as a PNG file; raises DataError."""
-    write_png(path, panel(values, **how))  # type: ignore[arg-type]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from interp.evaluate.figures.heat_map import error_codes, top_of
 from interp.evaluate.figures.heat_map import panel as heat_map
 from interp.evaluate.figures.layout import below, beside, cut, framed, resized, titled
 from interp.evaluate.figures.lettering import strip
-from interp.evaluate.figures.png import write_png
 from vid2ev.errors import UsageError
 
 PATCH_PX = 99
@@ -52,13 +49,6 @@ def panel(
             _named(f"{name} there", heat_map(resized(cut(values, box), width, tall_patch), unit=unit, **scale))
         )
     return below([beside(above), beside(patches)])
-
-
-def write_worst_patch(
-    path: Path, truth: np.ndarray, rebuilt: np.ndarray, corner: tuple[int, int], similarity: np.ndarray | None = None
-) -> None:
-    """Write a panel as a PNG file; raises DataError, and UsageError as `panel`."""
-    write_png(path, panel(truth, rebuilt, corner, similarity))
 
 
 def _named(name: str, picture: np.ndarray) -> np.ndarray:
