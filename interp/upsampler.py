@@ -19,7 +19,7 @@ from interp.methods.of_networks import AT_ONCE_PX, OfFrames, of_weights
 from vid2ev import Frame
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import sha256
-from vid2ev.stream.upload import as_array
+from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval, Subframes, make_upsampler
 from vid2ev.upsample.subframes import instants, steps_for
 
@@ -31,11 +31,15 @@ class NetUpsampling:
     subframes      steps per interval, or "auto"
     max_subframes  the most that "auto" takes
     threshold      contrast threshold [nat]: motion is measured where log light changes by half of it or more
+    upload         to the device on which the network runs, and its frames stay; motion is estimated on the CPU
     Raises UsageError for a network that needs events, DataError for a file that holds none of frames.
     """
 
-    def __init__(self, weights: Path, subframes: Subframes, max_subframes: int, threshold: float):
-        method = of_weights(weights)
+    def __init__(
+        self, weights: Path, subframes: Subframes, max_subframes: int, threshold: float, upload: Upload | None = None
+    ):
+        self._stays, self._upload = upload is not None, upload or Upload("cpu")
+        method = of_weights(weights, self._upload.device)
         if not isinstance(method, OfFrames) or method.needs_events:
             raise UsageError(f"upsampling 'net:{weights}': the network needs events; give one of frames alone")
         self._network = method.network
@@ -57,19 +61,23 @@ class NetUpsampling:
         return Interval(self._made(a, b, times_ns), found.limited, found.shift_px)
 
     def _made(self, a: Frame, b: Frame, times_ns: list[int]) -> Iterator[Frame]:
-        shares = torch.tensor([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns])
+        shares = self._upload.tensor(np.array([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns], np.float32))
         with torch.inference_mode():
-            pair = self._network.prepare(_codes(a), _codes(b))
+            before, after = (_codes(self._upload.light(frame.light)) for frame in (a, b))
+            pair = self._network.prepare(before, after)
         some = max(1, AT_ONCE_PX // int(np.prod(a.light.shape[:2])))
         for first in range(0, len(times_ns), some):
             with torch.inference_mode():
                 images = self._network.at(pair, shares[first : first + some]).images[0]
             for t_ns, image in zip(times_ns[first : first + some], images, strict=True):
-                yield Frame(_light(image, a.light.ndim), t_ns, original=False)
-        yield b
+                light: Any = _light(image, a.light.ndim)
+                yield Frame(light if self._stays else light.numpy(), t_ns, original=False)
+        yield self._upload.frame(b) if self._stays else b
 
 
-def make(weights: str | None, subframes: Subframes, max_subframes: int, threshold: float) -> NetUpsampling:
+def make(
+    weights: str | None, subframes: Subframes, max_subframes: int, threshold: float, upload: Upload | None = None
+) -> NetUpsampling:
     """The upsampler with the weights of a file, or with those that come with vid2ev.  Raises UsageError."""
     path = pretrained.path_of(weights) if weights else pretrained.first(pretrained.OF_FRAMES)
     if path is None:
@@ -77,16 +85,16 @@ def make(weights: str | None, subframes: Subframes, max_subframes: int, threshol
             "upsampling 'net': no network of frames alone comes with this version; give the weights of one with"
             " net:WEIGHTS, or choose flow"
         )
-    return NetUpsampling(path, subframes, max_subframes, threshold)
+    return NetUpsampling(path, subframes, max_subframes, threshold, upload)
 
 
-def _codes(frame: Frame) -> torch.Tensor:
-    """sRGB codes [1, C, H, W]."""
-    light = torch.from_numpy(np.nan_to_num(as_array(frame.light), nan=0.0, posinf=1.0))
+def _codes(light: torch.Tensor) -> torch.Tensor:
+    """sRGB codes [1, C, H, W] of light [H, W] or [H, W, C]."""
+    light = light.nan_to_num(nan=0.0, posinf=1.0)
     planes = light[None] if light.ndim == 2 else light.permute(2, 0, 1)
-    return to_codes(planes[None].float(), "srgb")
+    return to_codes(planes[None], "srgb")
 
 
-def _light(image: torch.Tensor, dimensions: int) -> Any:
+def _light(image: torch.Tensor, dimensions: int) -> torch.Tensor:
     light = to_light(image, "srgb")
-    return light[0].numpy() if dimensions == 2 else np.ascontiguousarray(light.permute(1, 2, 0).numpy())
+    return light[0] if dimensions == 2 else light.permute(1, 2, 0).contiguous()

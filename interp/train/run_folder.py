@@ -18,6 +18,7 @@ No path stands in it but those of the data that it was given, so it can be carri
 from __future__ import annotations
 
 import json
+import math
 import operator
 import os
 import re
@@ -136,13 +137,20 @@ class RunFolder:
         found = read_json(file)
         with as_stated(file):
             return {
-                method: {group: {score: float(number) for score, number in of.items()} for group, of in table.items()}
+                method: {group: {score: _number(value) for score, value in of.items()} for group, of in table.items()}
                 for method, table in found.items()
             }
 
     def write_baselines(self, tables: Mapping[str, Any]) -> None:
-        """Keep them."""
-        self._write("baselines.json", tables)
+        """Keep them; null is no number, as of pixels that move where none does."""
+        plain = {
+            method: {
+                group: {score: value if math.isfinite(value) else None for score, value in of.items()}
+                for group, of in table.items()
+            }
+            for method, table in tables.items()
+        }
+        self._write("baselines.json", plain)
 
     def _check(self, job: Mapping[str, Any], resume: bool) -> None:
         if self.path.exists() and not self.path.is_dir():
@@ -166,6 +174,10 @@ class RunFolder:
     def _write(self, name: str, content: Mapping[str, Any]) -> None:
         with whole_file(self.path / name) as file:
             file.write((json.dumps(content, indent=2) + "\n").encode())
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
 
 
 def begun_job(path: Path) -> dict[str, Any]:

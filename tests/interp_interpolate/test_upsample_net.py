@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from small_takes import images, moving
 
 from interp import pretrained
@@ -15,6 +16,7 @@ from interp.weights import save
 from vid2ev import Frame, convert
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.stream.upload import Upload
 from vid2ev.upsample import make_upsampler, registered
 
 
@@ -47,6 +49,15 @@ def test_frames_come_in_even_steps_and_the_last_is_the_frame_itself(weights: Pat
         between = np.minimum(a.light, b.light) - 1e-4, np.maximum(a.light, b.light) + 1e-4
         assert ((frame.light >= between[0]) & (frame.light <= between[1])).mean() > 0.99
         assert np.abs(frame.light - (a.light + share * (b.light - a.light))).mean() < 0.05
+
+
+@pytest.mark.parametrize("colours", [False, True])
+def test_on_a_device_light_stays_there_and_is_the_same(weights: Path, colours: bool) -> None:
+    a, b = two_frames(colours)
+    here, there = (list(make_upsampler(f"net:{weights}", 3, upload=to).between(a, b)) for to in (None, Upload("cpu")))
+    for one, other in zip(here, there, strict=True):
+        assert isinstance(other.light, torch.Tensor) and one.t_ns == other.t_ns
+        np.testing.assert_array_equal(one.light, other.light.numpy())
 
 
 def test_steps_are_as_motion_asks_and_none_where_nothing_moves(weights: Path) -> None:

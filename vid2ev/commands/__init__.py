@@ -21,7 +21,7 @@ import click
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
-MEMORY_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or --device cpu"
+MEMORY_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
 
 
 @contextmanager

@@ -79,7 +79,7 @@ def make_upsampler(
         )
     if found is not None:
         make, rest = found
-        return make(rest, subframes, max_subframes, threshold)  # type: ignore[no-any-return]
+        return make(rest, subframes, max_subframes, threshold, upload)  # type: ignore[no-any-return]
     if method == "none":
         from vid2ev.upsample.none import NoUpsampling
 

@@ -3,9 +3,10 @@
     [project.entry-points."vid2ev.upsamplers"]
     net = "interp.upsampler:make"
 
-makes `--upsample net` and `--upsample net:ANYTHING` call `make("ANYTHING", subframes, max_subframes, threshold)`, with
-None where nothing is said.  It returns an `Upsampler`, whose light may be on the CPU whatever the device, and raises
-UsageError for what cannot be meant.  An attribute `about`, ready for JSON, goes into the manifest.
+makes `--upsample net` and `--upsample net:ANYTHING` call `make("ANYTHING", subframes, max_subframes, threshold,
+upload)`, with None where nothing is said; `upload` takes light to the device, if there is one.  It returns an
+`Upsampler`, whose light may be on the CPU whatever the device, and raises UsageError for what cannot be meant.  An
+attribute `about`, ready for JSON, goes into the manifest.
 """
 
 from __future__ import annotations
