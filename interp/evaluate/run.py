@@ -178,26 +178,13 @@ def _scored(
     }
     rows, known, total, done = list[Row](), dict[str, Any](), sum(each.expected for each in footage), 0
     for each in footage:
-        about = kept.about(each.name)
-        unfinished = [method for method in methods if about is None or method.name not in about["missing"]]
+
+        def seen(number: int, name: str = each.name, done: int = done) -> None:
+            if report:
+                report(min(done + number, total), total, name)
+
         found = {method.name: dict(before[each.name, method.name]) for method in methods}
-        if unfinished:
-            running = [method.begin(each) for method in unfinished]
-            for group in each.groups():
-                if report:
-                    report(min(done + group.number, total), total, each.name)
-                _score_group(each.name, group, running, found, kept, worst)
-            facts = each.about()
-            whole = facts["groups"] * frames
-            unfit = {method.name: dict(method.unfit) for method in running}
-            missing = {
-                name: whole - sum(map(len, [*found[name].values(), *reasons.values()]))
-                for name, reasons in unfit.items()
-            }
-            lacking = {"missing": missing, "unfit": unfit}
-            about = facts | {key: (about[key] if about else {}) | of for key, of in lacking.items()}
-            kept.finish(each.name, about)
-        assert about is not None
+        about = _scored_sequence(each, methods, frames, kept, found, worst, seen)
         done += each.expected
         known[each.name] = about | {
             key: {method.name: about[key][method.name] for method in methods} for key in ("missing", "unfit")
@@ -206,6 +193,36 @@ def _scored(
     if report:
         report(total, total, "")
     return rows, known
+
+
+def _scored_sequence(
+    footage: Footage,
+    methods: Sequence[Rebuilder],
+    frames: int,
+    kept: KeptRows,
+    found: Mapping[str, dict[int, list[Row]]],
+    worst: Mapping[str, WorstPictures],
+    seen: Callable[[int], None],
+) -> dict[str, Any]:
+    """What is known of a sequence, whose rows are added to those that were `found` before."""
+    about = kept.about(footage.name)
+    unfinished = [method for method in methods if about is None or method.name not in about["missing"]]
+    if about is not None and not unfinished:
+        return about
+    running = [method.begin(footage) for method in unfinished]
+    for group in footage.groups():
+        seen(group.number)
+        _score_group(footage.name, group, running, found, kept, worst)
+    facts = footage.about()
+    unfit = {method.name: dict(method.unfit) for method in running}
+    missing = {
+        name: facts["groups"] * frames - sum(map(len, [*found[name].values(), *reasons.values()]))
+        for name, reasons in unfit.items()
+    }
+    lacking = {"missing": missing, "unfit": unfit}
+    about = facts | {key: (about[key] if about else {}) | of for key, of in lacking.items()}
+    kept.finish(footage.name, about)
+    return about
 
 
 def _score_group(

@@ -23,7 +23,7 @@ def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[
     effects, tolerance = options.pop("effects"), options.pop("tolerance")
     options.pop("notes", None)
     recipe = Recipe.of(video, seed=seed or 0, **options)
-    check_effects(recipe, effects, tolerance)
+    check_effects(effects, tolerance)
     conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}

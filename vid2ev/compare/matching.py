@@ -121,7 +121,7 @@ def _match(a, a_begins, b, b_begins, window, errors, a_most, b_most):  # type: i
         for p in range(2):
             if a_many[p] and b_many[p]:
                 _pair(a_us[p], b_us[p], a_many[p], b_many[p], window, a_kept, b_kept, scratch)
-                _note(a_us[p], b_us[p], a_many[p], b_many[p], a_kept, b_kept, errors)
+                _note(a_us[p], b_us[p], a_many[p], a_kept, b_kept, errors)
                 a_many[p] = _leave(a_us[p], a_many[p], a_kept)
                 b_many[p] = _leave(b_us[p], b_many[p], b_kept)
         for p in range(2):
@@ -142,7 +142,7 @@ def _by_polarity(moments, times, many):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _note(a, b, a_many, b_many, a_kept, b_kept, errors):  # type: ignore[no-untyped-def]
+def _note(a, b, a_many, a_kept, b_kept, errors):  # type: ignore[no-untyped-def]
     """Count the errors of time of the pairs."""
     zero, j = len(errors) // 2, 0
     for i in range(a_many):

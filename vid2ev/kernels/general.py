@@ -255,7 +255,7 @@ def walk_pixel(
             blind_until = -1.0
         elif stop == forced_s:
             on, off, out, n = force(
-                lanes, pixels, pixel, path, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
+                lanes, pixels, pixel, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
             )
             if len(flags.track) and good:
                 blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
@@ -281,7 +281,7 @@ def walk_pixel(
 
 
 @inner
-def force(lanes, pixels, pixel, path, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
+def force(lanes, pixels, pixel, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
     """A forced candidate at s, where the signal is `end`: (c_on, c_off, out, n)."""
     t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)
     blind = num.refractory_ns > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns

@@ -32,7 +32,7 @@ def plans_of(
 
     A camera that goes on and on is not looked at, and auto keeps all of it.  Raises UsageError as `plan_of` does.
     """
-    check_effects(recipe, effects, tolerance)
+    check_effects(effects, tolerance)
     if _is_endless(recipe.source):
         return plans_unseen(recipe, PASSES, effects, tolerance)
     look = Look(recipe, threads)
@@ -121,7 +121,7 @@ def planned(recipe: Recipe, effects: str | Sequence[str], tolerance: float = TOL
     effects it is the same, and there are none.  The source is not looked at."""
     if effects == "all":
         return recipe, {}
-    check_effects(recipe, effects, tolerance)
+    check_effects(effects, tolerance)
     plans = plans_unseen(recipe, ASKED, effects, tolerance)
     return left_of(recipe, plans), plans
 
@@ -135,7 +135,7 @@ def left_of(recipe: Recipe, plans: Plans) -> Recipe:
     return replace(recipe, mounts=tuple(mounts))
 
 
-def check_effects(recipe: Recipe, effects: str | Sequence[str], tolerance: float) -> None:
+def check_effects(effects: str | Sequence[str], tolerance: float) -> None:
     """Raise UsageError for effects that cannot be meant."""
     check_tolerance(tolerance)
     if effects != "auto":

@@ -66,7 +66,7 @@ def thresholds_of(pixels: np.ndarray, planes: Planes, flags: Flags, num: Numbers
     return np.full(len(pixels), num.threshold_on), np.full(len(pixels), num.threshold_off)
 
 
-def maps_of(planes: Planes, flags: Flags, num: Numbers, bad: np.ndarray, size: tuple[int, int]) -> dict[str, Any]:
+def maps_of(planes: Planes, num: Numbers, bad: np.ndarray, size: tuple[int, int]) -> dict[str, Any]:
     """What is frozen in a sensor, each [height, width]: threshold_on, threshold_off [nat, float32]; hot, cold [bool];
     shading [optical gain, float32]."""
     width, height = size

@@ -146,7 +146,7 @@ class Pixels:
 
     def maps(self) -> dict[str, np.ndarray]:
         """What is frozen in them (`Dvs.maps`)."""
-        return maps_of(self.planes, self.flags, self.numbers, self.bad, self.size)
+        return maps_of(self.planes, self.numbers, self.bad, self.size)
 
     def tallied(self) -> dict[str, int]:
         """How many crossings were swallowed, intervals capped, values of light mended."""
