@@ -75,6 +75,7 @@ def test_any_size(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(0)
     cuts_in(list(rng.uniform(0, 1, (3, *shape)).astype(F)))
     cuts_in([np.full(shape, value, F) for value in (np.nan, np.inf, -1, 0)])
+    assert cuts_in([np.full(shape, 0.5, F)] * 4) == []
 
 
 @pytest.mark.parametrize(("name", "cuts"), [("nasa_13013.mp4", [202]), ("intel_car-detection.mp4", [])])

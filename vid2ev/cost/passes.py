@@ -27,7 +27,7 @@ from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 
-MOST_EVENTS = 1 << 26  # of a camera in a pass: 0.9 GB
+MOST_EVENTS = 1 << 26  # of all cameras in a pass: 0.9 GB
 PICTURES = 8  # of each view, kept for comparison
 
 

@@ -110,7 +110,7 @@ class Interval(NamedTuple):
 class Planes(NamedTuple):
     """State of the pixels; a plane that nothing uses has few entries."""
 
-    fast: np.ndarray  # float32, blocks x planes x BLOCK
+    fast: np.ndarray  # float32, blocks x planes x PITCH
     rest: np.ndarray  # float32, blocks x 2 x PITCH: what steep lags have beyond float32 (scan.refine)
     memory: np.ndarray  # float64 [n]: the level that each pixel memorised [nat]
     theta: np.ndarray  # float32 [n, 2]: its ON and OFF threshold [nat], if there is mismatch

@@ -51,6 +51,11 @@ def code_of(i16, least, slope, top, noise):
     return min(max(floor(level + noise + 0.5), 0.0), top)
 
 
+def lsb_per_electron(spec: Any) -> float:
+    """K, the codes of an electron."""
+    return WHITE / (spec.white_e * spec.slope)
+
+
 def lsb_per_light(spec: Any) -> float:
     """How many codes light 1.0 is, black aside."""
     return WHITE * spec.exposure_gain / spec.slope

@@ -33,7 +33,7 @@ from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
 from vid2ev.kernel_intrinsics import floor, sqrt
-from vid2ev.physics.adc import WHITE
+from vid2ev.physics.adc import WHITE, lsb_per_electron
 from vid2ev.physics.elementary import exp64
 from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain
 from vid2ev.physics.random import normal_pair
@@ -92,11 +92,6 @@ def shoot(electrons, high, low):
     for i in range(electrons.size):
         if electrons[i] <= 0.0:
             electrons[i] = poisson_few(-electrons[i], high[i], low[i])
-
-
-def lsb_per_electron(spec: Any) -> float:
-    """K, the codes of an electron."""
-    return WHITE / (spec.white_e * spec.slope)
 
 
 def omission_of_shot_noise(seen: Exposed, spec: Any) -> LevelChange:

@@ -21,7 +21,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.kernel_compiler import compiled
-from vid2ev.physics.adc import WHITE, lsb_per_light
+from vid2ev.physics.adc import lsb_per_electron, lsb_per_light
 from vid2ev.physics.random import FIXED_PATTERN, normal_pair, philox
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change, normal_most, surely_square
 
@@ -60,7 +60,7 @@ def least_gain(spec: Any) -> float:
 
 def omission(seen: Exposed, spec: Any) -> LevelChange:
     """The fixed pattern: one draw for each value of an exposure."""
-    lsb, lsb_per_e = lsb_per_light(spec), WHITE / (spec.white_e * spec.slope)
+    lsb, lsb_per_e = lsb_per_light(spec), lsb_per_electron(spec)
     reach = min(normal_most(2 * seen.values), LIMIT)
     gain, dark = lsb * spec.prnu, lsb_per_e * spec.dsnu
     square = gain**2 * seen.lit_square + dark**2

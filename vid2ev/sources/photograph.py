@@ -89,9 +89,8 @@ class Photograph:
             self.warnings.append(
                 f"up to {speed / float(self._fps):.2g} px of motion from frame to frame; a higher --fps is truer"
             )
-        begin, end = Fraction(str(self._motion.begin_s)), Fraction(str(self._motion.duration_s))
-        self._begin = begin
-        self.frames_expected = math.floor(end * self._fps) + 1
+        self._begin = Fraction(str(self._motion.begin_s))
+        self.frames_expected = math.floor(Fraction(str(self._motion.duration_s)) * self._fps) + 1
         self.duration_expected_s = float((self.frames_expected - 1) / self._fps)
 
     def describe(self) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def write(views: Sequence[Viewpoint]) -> str:
 
 
 def _keys(tree: Node) -> list[str]:
-    """cam0, cam1, ... as far as they go on."""
+    """Those of cameras, cam0, cam1, ... in order of their numbers."""
     keys = [key for key, _ in tree.items() if re.fullmatch(r"cam\d{1,4}", key)]
     return sorted(keys, key=lambda key: int(key[3:]))
 
