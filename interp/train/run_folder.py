@@ -36,6 +36,8 @@ from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
 MOST_STEPS = 1 << 40
+LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
+OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end
 
 
 class RunFolder:
@@ -159,10 +161,7 @@ class RunFolder:
         if not resume:
             if begun:
                 raise UsageError(f"{self.path} holds a run; --resume goes on with it, -o chooses another folder")
-            # (what a run leaves that is killed before it has begun is no reason not to begin, nor are clips, which
-            # another machine may be making already)
-            ours = re.compile(r"clips|lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
-            if self.path.is_dir() and not all(ours.fullmatch(child.name) for child in self.path.iterdir()):
+            if self.path.is_dir() and not all(map(self._is_ours, self.path.iterdir())):
                 raise UsageError(f"{self.path} holds files that are no run; choose another folder with -o")
             return
         changed = difference(begun_job(self.path), job)
@@ -170,6 +169,13 @@ class RunFolder:
             raise UsageError(
                 f"{self.path} was begun with {changed}; --resume needs what it was begun with, -o starts another run"
             )
+
+    def _is_ours(self, child: Path) -> bool:
+        """Whether it is what a run leaves that is killed before it has begun, or clips, which another machine may be
+        making already; neither is a reason not to begin."""
+        if child == self.clips:
+            return child.is_dir() and all(OF_CLIPS.fullmatch(each.name) for each in child.iterdir())
+        return LEFT.fullmatch(child.name) is not None
 
     def _write(self, name: str, content: Mapping[str, Any]) -> None:
         with whole_file(self.path / name) as file:

@@ -9,6 +9,8 @@ import pytest
 import torch
 from small_run import in_a_process, kept, session
 
+from interp.data.pool import Pool
+from interp.data.settings import ClipSettings
 from interp.train.machines import Machines
 from interp.train.run_folder import RunFolder
 from vid2ev.errors import UsageError
@@ -71,9 +73,15 @@ def test_what_it_runs_on_is_known_from_the_start(
 def test_a_machine_that_does_not_lead_may_be_there_first(tmp_path: Path) -> None:
     """And make clips already, while the one that leads begins the run."""
     other = RunFolder(tmp_path / "run", {}, resume=False, first=False)
-    other.clips.mkdir(parents=True)
-    being_written = other.clips / "000003.npy.new"
+    being_written = Pool(other.clips, ClipSettings(), 5).folder / "000003.npy.new"
     being_written.touch()
     first = RunFolder(tmp_path / "run", {}, resume=False)
     assert being_written.exists()
     first.close()
+
+
+def test_a_folder_of_clips_that_is_another_s_is_not_taken(tmp_path: Path) -> None:
+    (tmp_path / "clips").mkdir()
+    (tmp_path / "clips" / "holiday.mp4").touch()
+    with pytest.raises(UsageError, match="holds files that are no run"):
+        RunFolder(tmp_path, {}, resume=False)
