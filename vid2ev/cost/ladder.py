@@ -1,7 +1,8 @@
 """The ladder: which settings are tried on a recipe.
 
     reference   the finest of everything: all effects, exact times, twice the sub-frames that the fastest interval asks
-                for in every interval, lags of light in float64
+                for in every interval (16 at least, where sensors take the logarithm of light to be straight: between
+                that and light is more than motion asks for), lags of light in float64
     finest      the same as people can have it, in float32
     default     what `convert` does when nothing is said
     others      the default with one thing changed, and some with several
