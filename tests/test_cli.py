@@ -297,7 +297,7 @@ def test_a_list_of_videos_is_one_to_all_commands() -> None:
     refused(2, "a list of videos; give one of them", "info", "list.txt")
     Path("list.txt").write_text("clip.mp4\n", encoding="utf-16")
     refused(2, "a list of videos; give one of them", "info", "list.txt")
-    refused(1, "cannot be read as a list of videos", "convert", "list.txt")
+    refused(1, "it is not text; expected a list of videos", "convert", "list.txt")
 
 
 def test_a_place_that_cannot_be_written() -> None:

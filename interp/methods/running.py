@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -68,7 +69,8 @@ PLAIN = Running()
 def compiles(device: str) -> bool:
     """Whether torch can compile for a device here."""
     try:
-        with Running(compiled=True).on(torch.device(device)):
+        with warnings.catch_warnings(), Running(compiled=True).on(torch.device(device)):
+            warnings.simplefilter("ignore")  # (of torch's own parts, as its compiler is imported)
             torch.compile(torch.square)(torch.zeros(2, device=device))
     except UsageError:
         return False

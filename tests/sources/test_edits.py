@@ -303,8 +303,8 @@ def test_colour_is_framed_like_luminance(tmp_path: Path) -> None:
 class NumberedDepth:
     """Every pixel of every frame at a depth of its own [m]."""
 
-    def at(self, index: int, share: float = 0.0, lights=()) -> np.ndarray:
-        return 1 + 1000 * np.float32(index) + np.arange(lights[0].size, dtype=np.float32).reshape(lights[0].shape)
+    def at(self, index: int, light: np.ndarray) -> np.ndarray:
+        return 1 + 1000 * np.float32(index) + np.arange(light.size, dtype=np.float32).reshape(light.shape)
 
 
 def test_depth_is_that_at_the_centres_of_pixels(tmp_path: Path) -> None:

@@ -17,13 +17,16 @@ import numpy as np
 
 from vid2ev.errors import DataError, DiskError, UsageError
 
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
 
 def lock(folder: Path) -> int:
     """Lock a folder until the handle returned is closed or the process ends; raises UsageError if another holds it."""
     handle = os.open(folder / "lock", os.O_CREAT | os.O_RDWR)
-    try:
-        import fcntl
-    except ImportError:  # not on Windows
+    if fcntl is None:
         return handle
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -73,9 +76,10 @@ def whole(path: Path) -> Iterator[Path]:
     """
     aside = path.with_name(f"{path.name}.new")
     made, replaced = aside / path.name, aside / "replaced"
-    aside.mkdir(parents=True, exist_ok=True)
-    handle = lock(aside)
+    handle = None
     try:
+        aside.mkdir(parents=True, exist_ok=True)
+        handle = lock(aside)
         _remove(made)
         yield made
         for file in [*made.rglob("*"), made]:
@@ -83,9 +87,10 @@ def whole(path: Path) -> Iterator[Path]:
         put_in_place(made, path, replaced)
         sync(path.absolute().parent)
     finally:
-        for rest in (made, replaced, aside / "lock"):
-            _remove(rest)
-        os.close(handle)
+        if handle is not None:
+            for rest in (made, replaced, aside / "lock"):
+                _remove(rest)
+            os.close(handle)
         with suppress(OSError):
             aside.rmdir()
 
