@@ -157,7 +157,10 @@ from vid2ev.commands.worker_options import worker_options
 @click.option("--overwrite", is_flag=True, help="Replace the folder if it is a recording.")
 @click.option("--resume", is_flag=True, help="Go on where an interrupted conversion was.")
 @click.option("--dry-run", is_flag=True, help="Check everything, say what would be done, do nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the manifests as JSON for programs.")
+@click.option(
+    "--json", "as_json", is_flag=True,
+    help="Print JSON for programs: the manifest; of several, or with --jobs, what became of each.",
+)  # fmt: skip
 @click.option("-v", "--verbose", is_flag=True, help="Say what is going to be done, too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def convert(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from vid2ev.scenes.blender.renderer import Cycles
+    from vid2ev.scenes.camera_folder import Contents
     from vid2ev.scenes.scene_file import SceneFile
 
 FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elapsed} gone, {remaining} left"
@@ -77,11 +78,11 @@ def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) 
         return
     from vid2ev.toml_text import toml_text
 
-    file = _file(name, options)
+    file, contents = _file(name, options), _contents(options)
     if dry_run:
         click.echo(toml_text(file.resolved(options["seed"]).tables()), nl=False)
         return
-    made = list(_render(file, options, quiet or as_json))
+    made = list(_render(file, contents, options, quiet or as_json))
     if as_json:
         click.echo(json.dumps(made, indent=2))
 
@@ -113,15 +114,19 @@ def _file(name: str, options: dict[str, Any]) -> SceneFile:
     return read_scene(name, settings)
 
 
-def _render(file: SceneFile, options: dict[str, Any], quiet: bool) -> Iterator[dict[str, Any]]:
-    from vid2ev.commands.progress import counting
+def _contents(options: dict[str, Any]) -> Contents:
     from vid2ev.scenes.camera_folder import Contents
+
+    truth = () if options["truth"] == "none" else tuple(options["truth"].split(","))
+    return Contents(options["frames"], truth, options["preview"])
+
+
+def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet: bool) -> Iterator[dict[str, Any]]:
+    from vid2ev.commands.progress import counting
     from vid2ev.scenes.folder import write_scene
     from vid2ev.scenes.source import SceneSource
     from vid2ev.scenes.world import World
 
-    truth = () if options["truth"] == "none" else tuple(options["truth"].split(","))
-    contents = Contents(options["frames"], truth, options["preview"])
     stem, seed, count = Path(file.name).stem, options["seed"], options["count"]
     output = options["output"] or Path(f"{stem}_scene" + "s" * (count is not None))
     directories = (
