@@ -197,7 +197,6 @@ def test_grids_of_a_batch_are_those_of_its_clips(memory):
             voxels = VoxelsOnCard(memory, 2, SIZE, windows, bins, polarity=polarity)
             batch.fill(counts, frames[1:4], t_ns[1:4])
             batch.fill(counts, frames[4:], t_ns[4:])
-            batch.restart(frames[0], t_ns[0])
             batch.renew([spec] * 2, [8, 9])
             batch.restart(frames[0], t_ns[0])
             batch.fill(voxels, frames[1:], t_ns[1:])
@@ -245,6 +244,13 @@ def test_what_cannot_be_is_said():
         DvsBatchOnCard([COMPILED["paper"], COMPILED["nothing"]], SIZE, [1, 2], memory=Simulated())
     with pytest.raises(UsageError, match="delay"):
         DvsBatchOnCard([DvsSpec(delay_us=3.0)], SIZE, [1], memory=Simulated())
+    batch = DvsBatchOnCard([COMPILED["paper"]], SIZE, [1], memory=Simulated())
+    light = np.ones((1, 1, *SIZE[::-1]), np.float32)
+    with pytest.raises(UsageError, match="a batch without light"):
+        batch.steps(light, [[5]])
+    batch.restart(light[0], [5])
+    with pytest.raises(UsageError, match="expected a later one"):
+        batch.restart(light[0], [5])
     card = DvsOnCard(COMPILED["paper"], SIZE, 1, memory=Simulated())
     with pytest.raises(UsageError, match="light of shape"):
         card.steps(np.zeros((2, 3, 3), np.float32), [0, 1])
