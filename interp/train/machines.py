@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from typing import Literal, Self
 
 from vid2ev.errors import UsageError
+from vid2ev.sensors.tiles import usable_cores
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class Machines:
 
     def spare(self, threads: int) -> int:
         """Cores for what makes samples, for each process that trains, which takes so many threads; at least 1."""
-        return max(1, cores() // self.devices - threads)
+        return max(1, usable_cores() // self.devices - threads)
 
     @property
     def first(self) -> bool:
@@ -61,11 +62,6 @@ def check_shares(batch: int, processes: int) -> None:
             f"batches of {batch} cannot be shared out evenly among {processes} processes;"
             " set batch to a multiple, or use fewer --devices"
         )
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_installed() -> None:

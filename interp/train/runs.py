@@ -9,12 +9,13 @@ from pathlib import Path
 from interp.train.checkpoints import read_checkpoint
 from interp.train.fit import Fit, Outcome, Stop
 from interp.train.job import NOTHING, Job
-from interp.train.machines import Machines, cores
+from interp.train.machines import Machines
 from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import RunFolder
 from interp.train.starts import begin
 from vid2ev.commands.progress import counting
 from vid2ev.errors import UsageError
+from vid2ev.sensors.tiles import usable_cores
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 
@@ -53,7 +54,7 @@ def run(
         spare = machines.spare(job.recipe.threads) if workers is None else workers
         try:
             with counting(quiet, CLIPS) as report:
-                feed = feed_of(job, folder.clips, step, spare, cores(), report)
+                feed = feed_of(job, folder.clips, step, spare, usable_cores(), report)
             machines.check_clips(len(feed.validation))
         except UsageError:
             if not resume:

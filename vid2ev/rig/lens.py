@@ -85,9 +85,7 @@ def focal_of_field(width: int, fov_deg: float, model: DistortionModel, distortio
 
     Raises ValueError for a lens that does not see so far.
     """
-    plain = Intrinsics(
-        size=(1, 1), focal_px=(1.0, 1.0), centre_px=(0.0, 0.0), model=model, distortion=_radial(model, distortion)
-    )
+    plain = _radial(model, distortion)
     edge = float(bent(np.array([[math.tan(math.radians(fov_deg) / 2), 0.0]]), plain)[0, 0])
     if not edge > 0:
         widest = 2 * math.degrees(math.atan(radial_table(plain)[0][-1]))
@@ -97,17 +95,17 @@ def focal_of_field(width: int, fov_deg: float, model: DistortionModel, distortio
     return width / 2 / edge
 
 
-def _radial(model: DistortionModel, distortion: tuple[float, ...]) -> tuple[float, ...]:
-    """The coefficients without the tangential ones."""
-    return (*distortion[:2], 0.0, 0.0, *distortion[4:]) if model == "radtan" else distortion
+def _radial(model: DistortionModel, distortion: tuple[float, ...]) -> Intrinsics:
+    """What a lens does along its radius alone, for places on the plane z = 1."""
+    along = (*distortion[:2], 0.0, 0.0, *distortion[4:]) if model == "radtan" else distortion
+    return Intrinsics(size=(1, 1), focal_px=(1.0, 1.0), centre_px=(0.0, 0.0), model=model, distortion=along)
 
 
 @lru_cache(maxsize=64)
 def radial_table(camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
     """Radii on the plane z = 1, rising from 0, and the radii that the lens makes of them, as far as these rise, too."""
     radii = np.tan(np.radians(np.linspace(0, FIELD_DEG, 8192)))
-    radial_only = _radial(camera.model, camera.distortion)
-    plain = camera.model_copy(update={"focal_px": (1.0, 1.0), "centre_px": (0.0, 0.0), "distortion": radial_only})
+    plain = _radial(camera.model, camera.distortion)
     with np.errstate(over="ignore", invalid="ignore"):
         made = _distorted(np.stack([radii, np.zeros_like(radii)], -1), plain)[:, 0]
         rising = np.diff(made) > 0
