@@ -308,19 +308,42 @@ class NumberedDepth:
 
 
 def test_depth_is_that_at_the_centres_of_pixels(tmp_path: Path) -> None:
-    """Not a mean of near and far, at which nothing is."""
     np.save(tmp_path / "a.npy", np.random.default_rng(0).uniform(0, 3, (3, 20, 30)).astype(np.float32))
     picture = np.arange(20 * 30).reshape(20, 30)
     for options, seen in (
         ({"crop": "12x9+4+5", "size": "4x3"}, picture[5:14, 4:16][1::3, 1::3]),
         ({"crop": "8x7+1+2"}, picture[2:9, 1:9]),
-        ({"size": "90x60"}, picture.repeat(3, 0).repeat(3, 1)),
+        ({"crop": "30x20"}, picture),
     ):
         source = open_source(
             tmp_path / "a.npy", fps=1, seen_through=lambda whole, _: WithDepth(whole, NumberedDepth(), "a"), **options
         )
         for index, frame in enumerate(source.frames(1), 1):
             np.testing.assert_array_equal(frame.depth, 1 + 1000 * index + seen)
+
+
+class SlantedDepth:
+    """A slanted plane, before which the left part of a wall is twice as near."""
+
+    def at(self, index: int, light: np.ndarray) -> np.ndarray:
+        y, x = np.indices(light.shape) + 0.5
+        return np.where(x < 12, 0.5, 1 / (0.8 - 0.01 * x + 0.005 * y)).astype(np.float32)
+
+
+@pytest.mark.parametrize("size", ["15x10", "12x8", "90x60", "31x17!", "7x19!"])
+def test_depth_of_another_size_is_that_of_its_surfaces(tmp_path: Path, size: str) -> None:
+    """A plane's is exact at the centres, also of pixels between those there were; none is a mean of near and far."""
+    np.save(tmp_path / "a.npy", np.ones((2, 20, 30), np.float32))
+    source = open_source(
+        tmp_path / "a.npy", fps=1, seen_through=lambda whole, _: WithDepth(whole, SlantedDepth(), "a"), size=size
+    )
+    width, height = source.size
+    depth = next(iter(source.frames(1))).depth
+    x, y = (np.arange(width) + 0.5) * 30 / width, ((np.arange(height) + 0.5) * 20 / height)[:, None]
+    inside = ((x > 0.5) & (x < 29.5) & (abs(x - 12) >= 0.5)) & ((y > 0.5) & (y < 19.5))
+    plane = np.where(x < 12, 0.5, 1 / (0.8 - 0.01 * x + 0.005 * y))
+    np.testing.assert_allclose(depth[inside], plane[inside], rtol=1e-6)
+    assert ((depth == 0.5) | (depth > 1)).all()
 
 
 def test_a_size_may_be_two_numbers(tmp_path: Path) -> None:

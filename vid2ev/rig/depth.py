@@ -136,14 +136,15 @@ def plane_of(text: str | Path | None) -> float | None:
     return _distance_m(rest) if name == "plane" else None
 
 
-def between(before_m: np.ndarray, after_m: np.ndarray, share: float) -> np.ndarray:
-    """The depth map after `share` (0 to 1) of the interval between two."""
+def between(before_m: np.ndarray, after_m: np.ndarray, share: float | np.ndarray) -> np.ndarray:
+    """The depth after `share` (0 to 1) of the way from one map to another, in time or from pixel to pixel."""
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = 1 / before_m, 1 / after_m
         alike = np.maximum(first, second) <= SAME_SURFACE * np.minimum(first, second)
         mean = (1 / ((1 - share) * first + share * second)).astype(np.float32)
-    nearer, other = (before_m, after_m) if share < 0.5 else (after_m, before_m)
-    return np.where(alike, mean, np.where(np.isnan(nearer), other, nearer))
+    nearer, other = np.where(share < 0.5, (before_m, after_m), (after_m, before_m))
+    straight = np.where(share == 0, before_m, mean)  # (1 / (1 / Z) is not always Z)
+    return np.where(alike, straight, np.where(np.isnan(nearer), other, nearer))
 
 
 def _distance_m(text: str) -> float:

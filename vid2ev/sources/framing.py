@@ -20,6 +20,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.light.resample import Taps, resampled, taps_of
+from vid2ev.rig.depth import between
 from vid2ev.rig.intrinsics import Framing
 from vid2ev.sources.edit import Edit
 from vid2ev.stream.frames import Frame
@@ -112,19 +113,25 @@ class Framed(Edit):
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
         for frame in self.source.frames(start):
-            depth = None if frame.depth is None else self._nearest(frame.depth)
+            depth = None if frame.depth is None else self._depth_framed(frame.depth)
             yield replace(frame, light=self._framed(frame.light), depth=depth)
 
     def _framed(self, light: np.ndarray) -> np.ndarray:
-        if self._taps is not None:
-            return resampled(light, *self._taps)
-        x, y, width, height = map(int, self._box)
-        return np.ascontiguousarray(light[y : y + height, x : x + width])
+        return self._cropped(light) if self._taps is None else resampled(light, *self._taps)
 
-    def _nearest(self, depth: np.ndarray) -> np.ndarray:
-        """Depth at the centres of the pixels: a mean of near and far would be where nothing is."""
-        rows = _centres(self._box.y, self._box.height, self._size[1])
-        return np.ascontiguousarray(depth[rows][:, _centres(self._box.x, self._box.width, self._size[0])])
+    def _depth_framed(self, depth_m: np.ndarray) -> np.ndarray:
+        """Depth at the centres of the pixels, straight in 1 / Z on a surface, as planes are; of near and far it is one:
+        in their mean there would be nothing."""
+        if self._taps is None:
+            return self._cropped(depth_m)
+        above, share = _centres(self._box.y, self._box.height, self._size[1], depth_m.shape[0])
+        rows = between(depth_m[above], depth_m[np.minimum(above + 1, depth_m.shape[0] - 1)], share[:, None])
+        left, share = _centres(self._box.x, self._box.width, self._size[0], depth_m.shape[1])
+        return between(rows[:, left], rows[:, np.minimum(left + 1, depth_m.shape[1] - 1)], share)
+
+    def _cropped(self, pixels: np.ndarray) -> np.ndarray:
+        x, y, width, height = map(int, self._box)
+        return np.ascontiguousarray(pixels[y : y + height, x : x + width])
 
 
 def framing_of(source: Source) -> Framing | None:
@@ -132,5 +139,11 @@ def framing_of(source: Source) -> Framing | None:
     return source.framing if isinstance(source, Framed) else None
 
 
-def _centres(begin: Fraction, extent: Fraction, outputs: int) -> np.ndarray:
-    return np.array([math.floor(begin + (2 * i + 1) * extent / (2 * outputs)) for i in range(outputs)], np.int64)
+def _centres(begin: Fraction, extent: Fraction, outputs: int, length: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the centres of output pixels are among those of an axis of `length` pixels: the one before [int64], and the
+    share of the way to the next [float32]."""
+    places = [begin + (2 * i + 1) * extent / (2 * outputs) - Fraction(1, 2) for i in range(outputs)]
+    within = [min(max(place, Fraction(0)), Fraction(length - 1)) for place in places]
+    before = [math.floor(place) for place in within]
+    shares = [float(place - below) for place, below in zip(within, before, strict=True)]
+    return np.array(before, np.int64), np.array(shares, np.float32)
