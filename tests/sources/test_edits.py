@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 from vid2ev.errors import UsageError
 from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.tags import BT709_WEIGHTS
+from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.sources import footage, open_source
 from vid2ev.sources.framing import crop_box, of_shape
-from vid2ev.sources.with_depth import WithDepth
+from vid2ev.sources.with_depth import WithDepth, parse_depth
 
 
 def rising(count: int, shape: tuple[int, int] = (32, 48)) -> list[np.ndarray]:
@@ -303,6 +305,8 @@ def test_colour_is_framed_like_luminance(tmp_path: Path) -> None:
 class NumberedDepth:
     """Every pixel of every frame at a depth of its own [m]."""
 
+    count = None
+
     def at(self, index: int, light: np.ndarray) -> np.ndarray:
         return 1 + 1000 * np.float32(index) + np.arange(light.size, dtype=np.float32).reshape(light.shape)
 
@@ -325,6 +329,8 @@ def test_depth_is_that_at_the_centres_of_pixels(tmp_path: Path) -> None:
 class SlantedDepth:
     """A slanted plane, before which the left part of a wall is twice as near."""
 
+    count = None
+
     def at(self, index: int, light: np.ndarray) -> np.ndarray:
         y, x = np.indices(light.shape) + 0.5
         return np.where(x < 12, 0.5, 1 / (0.8 - 0.01 * x + 0.005 * y)).astype(np.float32)
@@ -344,6 +350,19 @@ def test_depth_of_another_size_is_that_of_its_surfaces(tmp_path: Path, size: str
     plane = np.where(x < 12, 0.5, 1 / (0.8 - 0.01 * x + 0.005 * y))
     np.testing.assert_allclose(depth[inside], plane[inside], rtol=1e-6)
     assert ((depth == 0.5) | (depth > 1)).all()
+
+
+@pytest.mark.parametrize("maps", [1, 4, 6])
+def test_maps_of_depth_that_no_frame_had_are_told(tmp_path: Path, maps: int) -> None:
+    np.save(tmp_path / "a.npy", np.ones((4, 3, 5), np.float32))
+    np.save(tmp_path / "depth.npy", np.ones((maps, 3, 5), np.float32))
+    name = str(tmp_path / "depth.npy")
+    depth = parse_depth(name, Intrinsics.of_field((5, 3), 60))
+    source = open_source(tmp_path / "a.npy", fps=1, seen_through=lambda whole, _: WithDepth(whole, depth, name))
+    assert len(list(islice(source.frames(), 2))) == 2 and not source.warnings
+    assert len(list(source.frames(1))) == 3
+    assert source.warnings == [f"{name}: 6 depth maps, of which only the first 4 had a frame; are they of other times"
+                               " than the frames?"] * (maps == 6)  # fmt: skip
 
 
 def test_a_size_may_be_two_numbers(tmp_path: Path) -> None:

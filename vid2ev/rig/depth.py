@@ -39,6 +39,7 @@ class Depth(Protocol):
     """Depth of the frames of a video."""
 
     plane_m: float | None  # the distance, if it is a plane
+    count: int | None  # how many frames there is a map of; None if of any
 
     def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
         """The depth map of frame `index`, with this light, which only models look at.
@@ -87,6 +88,8 @@ class DepthScale:
 
 class PlaneDepth:
     """A plane that faces the camera."""
+
+    count: int | None = None
 
     def __init__(self, plane_m: float, size: tuple[int, int]):
         self.plane_m: float | None = plane_m

@@ -53,9 +53,10 @@ class DepthFiles:
         else:
             values = read_values(path)
             self._stack = values if values.ndim == 3 else None
-        self.count = len(self._files) if self._stack is None else len(self._stack)
+        maps = len(self._files) if self._stack is None else len(self._stack)
+        self.count = None if maps == 1 else maps
         self._kept: dict[int, np.ndarray] = {}
-        if not (self.at(0) > 0).any() and self.count == 1:
+        if not (self.at(0) > 0).any() and self.count is None:
             raise DataError(
                 f"{path}: none of its depth is known, all of it is 0, less than that or NaN; correct the map, or the"
                 " scale, shift and kind that are given"
@@ -63,8 +64,9 @@ class DepthFiles:
 
     def at(self, index: int, light: np.ndarray | None = None) -> np.ndarray:
         """The map of frame `index`."""
-        index = 0 if self.count == 1 else index
-        if index >= self.count:
+        if self.count is None:
+            index = 0
+        elif index >= self.count:
             raise DataError(
                 f"{self.path}: {self.count} depth maps, but the video has more frames; give one for each or for all"
             )

@@ -38,6 +38,7 @@ class ModelDepth:
     """
 
     plane_m: float | None = None
+    count: int | None = None
 
     def __init__(self, name: str, size: tuple[int, int], scale: DepthScale):
         if not name:

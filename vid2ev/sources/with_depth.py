@@ -31,6 +31,18 @@ class WithDepth(Edit):
     def __init__(self, source: Source, depth: Depth, name: str):
         super().__init__(source)
         self._depth, self._name = depth, name
+        self._frames = 0  # in all, once that is known
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know."""
+        maps, frames = self._depth.count, self._frames
+        if maps is None or not 0 < frames < maps:
+            return super().warnings
+        said = (
+            f"{maps} depth maps, of which only the first {frames} had a frame; are they of other times than the frames?"
+        )
+        return [*super().warnings, f"{self._name}: {said}"]
 
     def edits(self) -> dict[str, Any]:
         """Where the depth is from, and by what its files are known again."""
@@ -39,8 +51,11 @@ class WithDepth(Edit):
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
+        seen = 0
         for index, frame in enumerate(self.source.frames(start), start):
             yield replace(frame, depth=self._depth.at(index, frame.light))
+            seen = index + 1
+        self._frames = seen
 
 
 def parse_depth(text: str, lens: Intrinsics) -> Depth:
