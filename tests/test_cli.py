@@ -232,6 +232,7 @@ def test_an_upsampling_that_nobody_has(source: str) -> None:
         ("within", ["-o", "."]),
         ("from 1 to 65536", ["--subframes", "100000"]),
         ("from 1 to 65536", ["--max-subframes", "100000"]),
+        ("leave it out", ["--subframes", "8", "--upsample", "none"]),
         ("at least 1e-09", ["--set", "frame_rate_hz=1e-30"]),
         ("from 1e-06", ["--fps", "1e-300"]),
         ("loop is a link", ["-o", "loop"]),

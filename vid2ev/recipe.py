@@ -130,6 +130,9 @@ class Recipe:
     def check(self) -> None:
         """Raise UsageError for what does not go together."""
         self.upsampler()
+        if self.upsample == "none" and self.subframes not in ("auto", 1):
+            none = "a source that is as dense as light asks" if self.source.dense else "upsampling 'none'"
+            raise UsageError(f"subframes {self.subframes} with {none}: nothing is made between frames; leave it out")
         if self.cuts not in CUTS:
             raise UsageError(f"cuts '{self.cuts}': expected one of {', '.join(CUTS)}")
         if self.source.dense:
