@@ -24,6 +24,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 # The floor of each room; an import may only go to a lower floor, or stay in its own room.
 FLOORS = {
     "errors": 0,
+    "cores": 0,
     "toml_text": 0,
     "cluster": 1,
     "requests": 1,

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError
 from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
@@ -26,7 +27,7 @@ from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
 from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sensors.tiles import WHOLE, Part, usable_cores
+from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import scene_of
 from vid2ev.sources import short_name
 

@@ -155,12 +155,12 @@ def read_arrays(path: Path, names: Iterable[str] | None = None) -> dict[str, np.
         return found
 
 
-def openexr(path: Path) -> Any:
-    """The library that reads and writes an EXR.  Raises UsageError where it is not installed."""
+def openexr(of: Path | str) -> Any:
+    """The library that reads and writes EXR, which something asks for.  Raises UsageError where it is not installed."""
     try:
         import OpenEXR
     except ImportError as error:
-        raise UsageError(f"{path}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
+        raise UsageError(f"{of}: EXR needs a package that is not installed; pip install 'vid2ev[formats]'") from error
     return OpenEXR
 
 

@@ -70,8 +70,8 @@ def dataset(
     from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import counting
     from vid2ev.commands.worker_options import workers_of
+    from vid2ev.cores import usable_cores
     from vid2ev.errors import UsageError, clause
-    from vid2ev.sensors.tiles import usable_cores
 
     workers = workers_of(options, usable_cores())
     found = tuple(source for video in videos for source in sources_in(video))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Literal, Self
 
+from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
-from vid2ev.sensors.tiles import usable_cores
 
 
 @dataclass(frozen=True, slots=True)

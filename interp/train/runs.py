@@ -14,8 +14,8 @@ from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import RunFolder
 from interp.train.starts import begin
 from vid2ev.commands.progress import counting
+from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
-from vid2ev.sensors.tiles import usable_cores
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Workers:
     @property
     def threads(self) -> int:
         """Threads of each task: its share of the cores here; one on a cluster, whose workers are given cores."""
-        return 1 if self.scheduler else max(1, _usable_cores() // self.jobs)
+        return 1 if self.scheduler else max(1, usable_cores() // self.jobs)
 
     @contextmanager
     def client(self) -> Iterator[Client]:
@@ -116,7 +116,3 @@ def _bytes_of(memory: str) -> int:
     if found < LEAST_BYTES:
         raise UsageError(f"--memory {memory}: expected a size such as 4GiB, at least {LEAST_BYTES >> 20}MiB")
     return found
-
-
-def _usable_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

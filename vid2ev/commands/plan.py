@@ -37,9 +37,9 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
     square of the greatest change of a level, as a share of what rounding to codes changes: 0.01 is 0.029 LSB.  Nothing
     is converted.
     """
+    from vid2ev.cores import usable_cores
     from vid2ev.plan.recordings import described, plans_of
     from vid2ev.recipe import Recipe
-    from vid2ev.sensors.tiles import usable_cores
 
     plans = plans_of(Recipe.of(source, **options), effects, tolerance, usable_cores())
     if as_json:

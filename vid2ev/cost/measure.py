@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vid2ev.cores import usable_cores
 from vid2ev.cost.errors import Errors, Reference
 from vid2ev.cost.front import DEFAULT, DEFAULT_OF_FRAMES, Budget, Row, front, recommended
 from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
@@ -24,7 +25,6 @@ from vid2ev.errors import UsageError
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import machine
-from vid2ev.sensors.tiles import usable_cores
 
 REPEATS = 3
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from vid2ev.compare.statistics import Gathering, Statistics
+from vid2ev.cores import usable_cores
 from vid2ev.gui.light import SIDE, Light, LightTable, duration_s
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.stand_in import Kernels
@@ -25,7 +26,6 @@ from vid2ev.plan.recordings import Look
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.course import Course, course_of
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sensors.tiles import usable_cores
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.views.requests import parse_representation

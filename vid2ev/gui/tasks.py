@@ -38,11 +38,11 @@ def planned(tell: Tell, setup: Setup) -> dict[str, Any]:
     """The plan of each camera for the whole clip, by its name."""
     from contextlib import closing
 
+    from vid2ev.cores import usable_cores
     from vid2ev.instants import instants
     from vid2ev.plan.plan import TOLERANCE
     from vid2ev.plan.recordings import Look
     from vid2ev.recipe import Recipe
-    from vid2ev.sensors.tiles import usable_cores
 
     tell(0, None, "opening the source")
     with tempfile.TemporaryDirectory() as folder:

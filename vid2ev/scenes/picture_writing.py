@@ -15,6 +15,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.light.transfer import parse_transfer
+from vid2ev.untrusted import openexr
 
 Writer = Callable[[np.ndarray, Path], None]
 
@@ -24,7 +25,7 @@ def writer_of(kind: str) -> tuple[Writer, str]:
     if kind not in WRITERS:
         raise UsageError(f"frames '{kind}': expected one of {', '.join(WRITERS)}")
     if kind == "exr":
-        _openexr()
+        openexr("frames 'exr'")
     return WRITERS[kind], {"png16": ".png"}.get(kind, f".{kind}")
 
 
@@ -45,7 +46,7 @@ def _write_tiff(light: np.ndarray, path: Path) -> None:
 
 def _write_exr(light: np.ndarray, path: Path) -> None:
     channels = {name: np.ascontiguousarray(light[..., k], np.float32) for k, name in enumerate("RGB")}
-    exr = _openexr()
+    exr = openexr(path)
     header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
     exr.File(header, channels).write(str(path))
 
@@ -56,14 +57,6 @@ def _write(codes: np.ndarray, path: Path) -> None:
     quick = [cv2.IMWRITE_PNG_COMPRESSION, 2] if path.suffix == ".png" else []
     if not cv2.imwrite(str(path), codes[..., ::-1], quick):
         raise OSError(f"{path.name} cannot be written")
-
-
-def _openexr():  # type: ignore[no-untyped-def]
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise UsageError("frames 'exr' need a package that is not installed; pip install 'vid2ev[formats]'") from error
-    return OpenEXR
 
 
 WRITERS: dict[str, Writer] = {"png": _write_png, "png16": _write_png16, "tiff": _write_tiff, "exr": _write_exr}

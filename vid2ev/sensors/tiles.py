@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -81,8 +80,3 @@ def balanced(cuts: list[int], seconds: list[float]) -> list[int]:
     for part in range(1, count):  # no tile is empty
         fresh[part] = min(max(fresh[part], fresh[part - 1] + 1), cuts[-1] - (count - part))
     return fresh
-
-
-def usable_cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError
 from vid2ev.scenes.render import Picture
+from vid2ev.untrusted import openexr
 
 NOTHING, NOTHING_M = -1, 1e9  # and what is beyond
 DEPTH, INDEX = (".Depth.Z",), (".Object Index.X", ".IndexOB.X")
@@ -40,9 +41,9 @@ def read_answers(paths: Sequence[Path], size: tuple[int, int], larger: np.ndarra
 
 def channels_of(path: Path, wanted: Sequence[Sequence[str]], size: tuple[int, int]) -> list[np.ndarray]:
     """Channels [H, W] float32 of a file, each by the first of some ends of its name."""
-    openexr = openexr_module()
+    library = openexr(path)
     try:
-        with openexr.File(str(path), separate_channels=True, num_threads=0) as file:
+        with library.File(str(path), separate_channels=True, num_threads=0) as file:
             found = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
     except Exception as error:  # (the library raises whatever it comes across)
         raise DataError(f"{path}: not an EXR file that can be read; render it again") from error
@@ -54,14 +55,3 @@ def channels_of(path: Path, wanted: Sequence[Sequence[str]], size: tuple[int, in
     if any(array.shape != (size[1], size[0]) for array in arrays):
         raise DataError(f"{path}: is no picture of {size[0]}x{size[1]} pixels; render it again")
     return arrays
-
-
-def openexr_module():  # type: ignore[no-untyped-def]
-    """The package OpenEXR.  Raises UsageError where it is not installed."""
-    try:
-        import OpenEXR
-    except ImportError as error:
-        raise UsageError(
-            "pictures from Blender need a package that is not installed; pip install 'vid2ev[formats]'"
-        ) from error
-    return OpenEXR

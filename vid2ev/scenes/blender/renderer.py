@@ -22,12 +22,13 @@ from vid2ev.errors import UsageError
 from vid2ev.recording.disk import writing
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
-from vid2ev.scenes.blender.answer import openexr_module, read_answers
+from vid2ev.scenes.blender.answer import read_answers
 from vid2ev.scenes.blender.exchange import Exchange
 from vid2ev.scenes.blender.program import Blender, find_blender
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.snapshot import Snapshot
 from vid2ev.scenes.world import World
+from vid2ev.untrusted import openexr
 
 SAMPLES = 32
 
@@ -53,7 +54,7 @@ class Cycles:
     ):
         if not 1 <= samples <= 1 << 16:
             raise UsageError(f"{samples} samples must be 1 to 65536; {SAMPLES} are usual")
-        openexr_module()
+        openexr("renderer 'blender'")
         self.program, self.samples, self.threads = find_blender(program), samples, threads
         self._temporary = tempfile.TemporaryDirectory(prefix="vid2ev-blender-") if folder is None else None
         self._folder = Path(self._temporary.name) if self._temporary else Path(folder or "")
