@@ -204,7 +204,8 @@ def test_a_dry_run_prints_the_scene_and_does_nothing() -> None:
     Path("again.toml").write_text(result.stdout)
     assert read_scene("again.toml").resolved(0) == read_scene("parallax").resolved(4)
     assert [path.name for path in Path().iterdir()] == ["again.toml"]
-    assert vid2ev("scene", "parallax", "--dry-run", "--truth", "banana").exit_code == 2
+    for wrong in (["--truth", "banana"], ["--samples", "4"], ["--renderer", "blender", "--blender", "no-such-program"]):
+        assert vid2ev("scene", "parallax", "--dry-run", *wrong).exit_code == 2
 
 
 def test_the_listing_loads_no_renderer() -> None:

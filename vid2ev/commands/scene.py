@@ -79,6 +79,7 @@ def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) 
     from vid2ev.toml_text import toml_text
 
     file, contents = _file(name, options), _contents(options)
+    _check_renderer(options)
     if dry_run:
         click.echo(toml_text(file.resolved(options["seed"]).tables()), nl=False)
         return
@@ -150,15 +151,24 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
         yield {"directory": str(directory), "seed": seed, "frames": frames, "duration_s": seconds, "new": new}
 
 
-def _renderer(directory: Path, options: dict[str, Any]) -> AbstractContextManager[Cycles | None]:
-    """Cycles for a folder, or None for the embedded renderer."""
+def _check_renderer(options: dict[str, Any]) -> None:
+    """Raise UsageError for a renderer that is not there, and for options that say nothing to it."""
     from vid2ev.errors import UsageError
 
     if options["renderer"] == "blender":
-        from vid2ev.scenes.blender.renderer import renderer_beside
+        from vid2ev.scenes.blender.program import find_blender
 
-        return renderer_beside(directory, options["samples"], options["blender"])
+        find_blender(options["blender"])
+        return
     for name in ("samples", "blender"):
         if options[name] is not None:
             raise UsageError(f"--{name} {options[name]} says nothing to the embedded renderer; add --renderer blender")
-    return nullcontext()
+
+
+def _renderer(directory: Path, options: dict[str, Any]) -> AbstractContextManager[Cycles | None]:
+    """Cycles for a folder, or None for the embedded renderer."""
+    if options["renderer"] != "blender":
+        return nullcontext()
+    from vid2ev.scenes.blender.renderer import renderer_beside
+
+    return renderer_beside(directory, options["samples"], options["blender"])
