@@ -38,7 +38,7 @@ class After:
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
-            raise UsageError(f"--hdr-network {path} was trained with events, and there are none; leave it out")
+            raise UsageError(f"HDR with {path}, which was trained with events, and there are none; leave it out")
         self._state: HdrState | None = None
         self._rest: torch.Tensor | None = None  # events since the last frame
         self._shot = 0
