@@ -19,7 +19,7 @@ HDR = ("hdr-small", "hdr-tiny")
 
 
 def path_of(weights: str | Path) -> Path:
-    """A file of weights: itself, that of a run's folder, or by its name one that comes with this version.
+    """A file of weights: itself, that of a run's folder, or by its name, with _ or -, one that comes with this version.
 
     Raises UsageError where there is no such file.
     """
@@ -29,12 +29,14 @@ def path_of(weights: str | Path) -> Path:
     if path.exists():
         return path
     here = {file.stem: file for file in sorted(HERE.glob("*.safetensors"))}
-    if str(weights) not in here:
+    asked = str(weights).replace("-", "_")
+    found = next((file for name, file in here.items() if name.replace("-", "_") == asked), None)
+    if found is None:
         raise UsageError(
             f"weights {weights}: no such file, and none of those that come with vid2ev"
             f"{nearest(str(weights), here)}: {', '.join(here)}"
         )
-    return here[str(weights)]
+    return found
 
 
 def first(names: tuple[str, ...]) -> Path | None:

@@ -30,6 +30,7 @@ def test_weights_are_a_file_or_a_run_or_come_by_their_name(tmp_path: Path) -> No
     file.touch()
     assert pretrained.path_of(file) == pretrained.path_of(str(file)) == pretrained.path_of(tmp_path) == file
     assert [pretrained.path_of(path.stem) for path in COME] == COME
+    assert [pretrained.path_of(path.stem.replace("_", "-")) for path in COME] == COME
     with pytest.raises(UsageError, match=f"no such file.*did you mean {COME[0].stem}.*{COME[-1].stem}"):
         pretrained.path_of(COME[0].stem[:-1])
     with pytest.raises(UsageError, match="no such file"):
