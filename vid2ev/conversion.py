@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vid2ev.cluster.task import share_of
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError
 from vid2ev.instants import instants
@@ -147,8 +148,7 @@ def telling(tell: Callable[[Mapping[str, Any]], object]) -> Report:
     """A `report` for `convert` that tells what a live line of tasks wants to know: events, and the share of frames."""
 
     def report(recipe: Recipe, done: Progress) -> None:
-        total = recipe.source.frames_expected
-        tell({"events": done.events} | ({"share": min(done.frames / total, 1.0)} if total else {}))
+        tell({"events": done.events} | share_of(done.frames, recipe.source.frames_expected))
 
     return report
 

@@ -80,7 +80,8 @@ def risen(events: EventCounts, times: torch.Tensor) -> Risen:
     changed = _until(change, seen) + comes * each.gather(1, at)
     numbered = _until(number, seen) + comes
     total, most = change.sum(1, keepdim=True), number.sum(1, keepdim=True)
-    return Risen(*(part[:, :, None] for part in (changed, total - changed, numbered, most - numbered)))
+    more = (most - numbered).clamp(min=0)  # (sums of parts of events are not those of all, to the last bit)
+    return Risen(*(part[:, :, None] for part in (changed, total - changed, numbered, more)))
 
 
 @in_full_precision

@@ -50,8 +50,8 @@ def registered(
     first, last = (torch.log(averaged(light, whole.footprint) + DARK) for light in lights)
     net = _net(whole)
     moved = [_moved(*pictures) for pictures in zip((last - first)[:, 0], net, strict=True)]
-    per_pixel = events.off_on.shape[-1] / width
     places = places_over(events, (height, width))
+    per_pixel = places.new_tensor([events.off_on.shape[-1] / width, events.off_on.shape[-2] / height])
     each = [
         carried(EventCounts(events.off_on[b : b + 1], events.contrast[b : b + 1]), places + per_pixel * flow.to(places))
         for b, flow in enumerate(moved)

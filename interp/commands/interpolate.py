@@ -171,9 +171,10 @@ def _shared(
 def _on_worker(tell: Tell, video: str, directory: Path, taken: Options, options: dict[str, Any]) -> dict[str, Any]:
     """Interpolate a source, as a task; returns the manifest."""
     from interp.interpolate.whole import interpolate as make
+    from vid2ev.cluster.task import share_of
 
     def report(done: int, total: int | None) -> None:
-        tell({"share": done / total} if total else {})
+        tell(share_of(done, total))
 
     directory.parent.mkdir(parents=True, exist_ok=True)
     return make(video, directory, options=taken, report=report, **options)

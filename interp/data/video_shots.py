@@ -24,6 +24,7 @@ from vid2ev.upsample.cuts import CutDetector
 
 TRIES = 8  # places in films that are looked at for one without a cut
 SMALLER = (1, 2, 3)  # pixels of the film per pixel of a clip, across
+NEARER = (1, 1 / 2, 1 / 4, 0)  # to the film's beginning, as shares of where a place was drawn
 THRESHOLD = 0.15  # nat, that motion is looked for with
 
 
@@ -42,8 +43,7 @@ class VideoShot:
             name = settings.video_files[int(draw.integers(len(settings.video_files)))]
             source, begin_s = _opened(name)
             after_s, part = _place(source, name, settings.size, multiple, draw)
-            start_s = begin_s + after_s
-            self._frames = _read(source, start_s, _wanted(multiple), part, settings.size, name)
+            start_s, self._frames = _drawn(source, begin_s, after_s, _wanted(multiple), part, settings.size, name)
             cuts = CutDetector(THRESHOLD)
             if not any(cuts.begins_shot(a, b) for a, b in pairwise(self._frames)):
                 break
@@ -114,10 +114,29 @@ def _fitting(source: Source, name: str, size: tuple[int, int], multiple: int) ->
     return count, seconds, fits
 
 
+def _drawn(
+    source: Source,
+    begin_s: float,
+    after_s: float,
+    count: int,
+    part: tuple[int, int, int, int],
+    size: tuple[int, int],
+    name: str,
+) -> tuple[float, list[Frame]]:
+    """The start [s] and so many frames from there on; earlier, where those of a film at no constant rate come to an end
+    before."""
+    for nearer in NEARER:
+        start_s = begin_s + nearer * after_s
+        frames = _read(source, start_s, count, part, size)
+        if len(frames) == count:
+            return start_s, frames
+    raise UsageError(f"{name}: {len(frames)} frames after {start_s:.3f} s, expected {count}; give a longer film")
+
+
 def _read(
-    source: Source, start_s: float, count: int, part: tuple[int, int, int, int], size: tuple[int, int], name: str
+    source: Source, start_s: float, count: int, part: tuple[int, int, int, int], size: tuple[int, int]
 ) -> list[Frame]:
-    """So many frames of a part of a film, at the size of a clip."""
+    """Up to so many frames of a part of a film, at the size of a clip."""
     from vid2ev.sources.cut import Divisible
 
     left, top, width, height = part
@@ -128,5 +147,5 @@ def _read(
         planes = [coarse(np.ascontiguousarray(light[..., c]), width // size[0]) for c in range(3)]
         frames.append(Frame(np.stack(planes, axis=-1), frame.t_ns))
         if len(frames) == count:
-            return frames
-    raise UsageError(f"{name}: {len(frames)} frames after {start_s:.3f} s, expected {count}; give a longer film")
+            break
+    return frames

@@ -19,7 +19,6 @@ from interp.data.layouts.own import MANIFEST, Own
 from interp.evaluate.group import Cameras
 from vid2ev import open_source
 from vid2ev.errors import Vid2evError
-from vid2ev.recording.exposures import TIMESTAMPS, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.rig.depth import plane_of
 from vid2ev.scenes.scene_file import scene_names
@@ -35,8 +34,7 @@ class CamerasOf:
     def __init__(self, recording: Own):
         self._path = recording.folder / MANIFEST
         self._manifest = read_manifest(self._path)
-        opened = read_spans(recording.keys_folder / TIMESTAMPS)
-        self._exposure_us = float(np.median(opened[:, 1] - opened[:, 0]))
+        self._exposure_us = recording.exposure_us
         self._world: Any = None
         self._plane_m: float | None = None
         with as_stated(self._path):
@@ -46,10 +44,12 @@ class CamerasOf:
                 self._plane_m = plane_of(self._manifest.get("depth"))
                 self._world = _world(self._path, self._manifest["source"]) if self._plane_m is None else None
 
-    def at(self, t_us: int) -> Cameras:
-        """What is known at a time.  Raises DataError for a manifest that does not say what it should."""
+    def at(self, t_us: int, keys: tuple[int, int]) -> Cameras:
+        """What is known at a time, between two key frames.  Raises DataError for a manifest that does not say what it
+        should."""
+        exposure_us = sum(map(self._exposure_us, keys)) / len(keys)
         with as_stated(self._path):
-            return Cameras(self._exposure_us, self._disparity_px(t_us), self._offset_us)
+            return Cameras(exposure_us, self._disparity_px(t_us), self._offset_us)
 
     @property
     def _apart_m(self) -> float:

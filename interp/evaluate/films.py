@@ -8,8 +8,9 @@ each other in time: the field's have 240 frames a second (GoPro) and 150 or so (
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -66,12 +67,23 @@ class Film:
         if not source.rewindable:
             raise UsageError(f"{video} can be read once only; save it as a file to score methods on it")
         about = source.describe()
-        self.size, self.frames, self.curve = source.size, source.frames_expected or 0, curve_of(about)
+        self.size, self.curve = source.size, curve_of(about)
         self._stored = str(about.get("pixel_format", ""))
-        count = max(self.frames - 1, 0) // protocol.multiple
+        count = max((source.frames_expected or 0) - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
         path = Path(video)
         self.identity: dict[str, Any] = {"video": path.name, **contents(path)} if path.exists() else {"video": video}
+
+    @cached_property
+    def frames(self) -> int:
+        """How many it has: headers do not always say, so that a video is read for it."""
+        source, count = self._simulated.opened(self.video), 0
+        if is_scene(self.video) and source.frames_expected is not None:
+            return source.frames_expected
+        with suppress(DataError):  # (of a damaged one as many as there are)
+            for _ in source.frames():
+                count += 1
+        return count
 
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; groups across a cut are counted."""
@@ -81,6 +93,9 @@ class Film:
         try:
             with closing(self._simulated.seen(self.video, source)) as coming:
                 for seen in coming:
+                    if told.groups == self._limit:
+                        told.remarks.append(f"limited to the first {self._limit} groups")
+                        break
                     told.see(seen.t_us)
                     part.append(seen)
                     if len(part) <= self.multiple:
@@ -92,12 +107,8 @@ class Film:
                         yield self._group(number, part, events)
                         told.groups += 1
                     late, part, number = _after(events, seen.t_us), [seen], number + 1
-                    if told.groups == self._limit:
-                        told.remarks.append(f"limited to the first {self._limit} groups")
-                        break
         except DataError as error:
             told.remarks.append(f"ended early: {error}")
-        self.frames = told.frames
         told.remarks += source.warnings
         if left := len(part) - 1:
             told.remarks.append(f"{left} frames after the last complete group of {self.multiple} are not rebuilt")

@@ -15,7 +15,7 @@ from interp.representation.event_counts import EventCounts
 class Cameras(NamedTuple):
     """What is known of the cameras; NaN where it is not.
 
-    exposure_us    of a key frame
+    exposure_us    of the key frames, in the mean
     disparity_px   mean disparity between frame and event camera [px of the frames]
     offset_us      by how much the events' clock is late
     """
@@ -61,16 +61,18 @@ class Footage(Protocol):
 
     name        by which it is called, and its files
     expected    number of groups, for progress; may be an estimate
-    frames      how many it has, key frames included; may be an estimate before `groups` has come to its end
     multiple    frames per key frame
     identity    what tells it from another, ready for JSON
     """
 
     name: str
     expected: int
-    frames: int
     multiple: int
     identity: dict[str, Any]
+
+    @property
+    def frames(self) -> int:
+        """How many it has, key frames included."""
 
     def groups(self) -> Iterator[Group]:
         """Its groups, in order, those that can be scored; again from the start each time."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, Self
@@ -40,7 +40,7 @@ class Rebuilder(Protocol):
 
     @property
     def sequential(self) -> bool:
-        """Whether groups must come in their order, and none may be left out."""
+        """Whether groups must come in their order, all that there are."""
 
     @property
     def unfit(self) -> Mapping[str, Sequence[str]]:
@@ -53,9 +53,12 @@ class Rebuilder(Protocol):
         """Pictures at the positions of a group, uint8 [H, W, 3]; None for those that are not there."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class OfMethod:
-    """A method under a name, and the protocol that says for which times it is asked."""
+    """A method under a name, and the protocol that says for which times it is asked.
+
+    Where groups are left out, across a cut or for want of events, it begins anew.
+    """
 
     name: str
     identity: dict[str, Any]
@@ -63,6 +66,7 @@ class OfMethod:
     protocol: protocols.Protocol
     device: str = "cpu"
     unfit = NOTHING
+    _next: int = field(default=0, init=False)
 
     @property
     def sequential(self) -> bool:
@@ -75,6 +79,9 @@ class OfMethod:
 
     def frames(self, group: Group) -> Sequence[np.ndarray | None]:
         """See `Rebuilder`."""
+        if group.number != self._next:
+            self.method = self.method.begin()
+        self._next = group.number + 1
         keys = as_tensor(shown(group.keys, group.curve)).to(self.device)
         gap = Gap(keys[0], keys[1], group.events.to(self.device), group.gap_us)
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)

@@ -76,7 +76,7 @@ class Recording:
         seen, _ = sequence.events(start_us, stop_us).within(sequence.event_size)
         counts = count_events(seen, sequence.event_size, start_us, stop_us, protocol.steps)
         number = (first - self._begin) // protocol.multiple
-        known = cameras.at((start_us + stop_us) // 2) if cameras else Cameras()
+        known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
         events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart)
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
 
@@ -88,7 +88,7 @@ class Recording:
             remarks.append(f"{left} frames after the last complete group of {multiple} are not rebuilt")
         if self._begin:
             remarks.append(f"{self._begin} frames before the first key frame are not rebuilt")
-        used = [k for first in self._firsts for k in (first, first + multiple)]
+        used = {k for first in self._firsts for k in (first, first + multiple)}
         if self._own_keys and (others := sum(k not in self._own_keys for k in used)):
             apart = self._own_keys[1] - self._own_keys[0] if len(self._own_keys) > 1 else 0
             remarks.append(

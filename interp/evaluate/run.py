@@ -32,7 +32,7 @@ from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.worst import WorstPictures, prune
 from interp.methods import METHODS
-from vid2ev.cluster.task import Task, Tell
+from vid2ev.cluster.task import Task, Tell, share_of
 from vid2ev.cluster.work import Share, outcomes
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
@@ -162,7 +162,7 @@ def _share_out(
 
 def _score_sequence(each: Footage, methods: Sequence[Rebuilder], frames: int, kept: KeptRows, tell: Tell) -> None:
     """Score a sequence, as a task."""
-    _scored([each], methods, frames, kept, lambda done, count, _: tell({"share": done / count}))
+    _scored([each], methods, frames, kept, lambda done, count, _: tell(share_of(done, count)))
 
 
 def _scored(

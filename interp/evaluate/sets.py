@@ -36,7 +36,7 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
         found, broken = _places(dataset)
         places += [(dataset, place) for place in found]
         unusable |= broken
-    footage, sets = list[Footage](), dict[str, list[str]]()
+    footage, sets, called = list[Footage](), dict[str, list[str]](), set_names([*dict.fromkeys(datasets)])
     names = apart([_called(place) for _, place in places])
     for (dataset, place), name in zip(places, names, strict=True):
         try:
@@ -45,10 +45,19 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
             unusable[place if isinstance(place, str) else str(place.folder)] = str(error)
             continue
         footage.append(made)
-        sets.setdefault(plain(Path(dataset).name), []).append(name)
+        sets.setdefault(called[dataset], []).append(name)
     if not footage:
         raise DataError(f"nothing in {', '.join(datasets)} can be scored: {'; '.join(list(unusable.values())[:3])}")
     return Found(footage, sets, unusable)
+
+
+def set_names(datasets: Sequence[str]) -> dict[str, str]:
+    """What data sets are called: by the ends of their paths, as long as it takes to tell them apart."""
+    parts = [(each,) if is_scene(each) else Path(each).resolve().parts for each in datasets]
+    longest = max(map(len, parts))
+    ends = (["/".join(each[-length:]) for each in parts] for length in range(1, longest + 1))
+    told = next((names for names in ends if len({*map(plain, names)}) == len(names)), list(datasets))
+    return dict(zip(datasets, apart(told), strict=True))
 
 
 def _opened(place: str | Recorded, protocol: Protocol, name: str, simulated: Simulated, limit: int | None) -> Footage:
@@ -67,7 +76,9 @@ def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
         found, unusable = opened_in(dataset)
     except UsageError:
         return [*sources_in(dataset)], {}
-    return [*found], unusable
+    recordings = {Path(dataset), *(each.folder for each in found), *map(Path, unusable)}
+    beside = [each for each in sources_in(dataset) if Path(each) not in recordings]
+    return [*found], unusable | dict.fromkeys(beside, "no recording, in a folder of such; give it by itself")
 
 
 def _called(place: str | Recorded) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +69,8 @@ class Simulated:
 
     def describe(self) -> dict[str, Any]:
         """It as JSON."""
-        return {"name": self.name, "seed": self.seed, "parameters": self.spec.model_dump(mode="json")} | self.options
+        options = {name: str(value) if isinstance(value, Fraction) else value for name, value in self.options.items()}
+        return {"name": self.name, "seed": self.seed, "parameters": self.spec.model_dump(mode="json")} | options
 
     def edited(self, video: str) -> dict[str, Any]:
         """The options of `open_source` for a film."""

@@ -14,7 +14,9 @@ class EventCursor:
     """Reads forwards; what lies before the last stretch is read again from the beginning.
 
     size          width and height of the sensor [px]; where the file does not state it, the smallest that holds all
-    covered_us    from the first event to the last, or as the file says
+    covered_us    from where the file begins, 0 if it does not say, to its last event, or as it says
+    seen_us       from the first event to the end; None without events
+    silent_us     before that it has no event, and does not say that there were none
     Raises UsageError for a path where nothing is, DataError for what is no event file.
     """
 
@@ -25,14 +27,11 @@ class EventCursor:
         self.count = self._recording.count
         begin_us = self._recording.start_us
         self.covered_us = begin_us, begin_us + self._recording.duration_us
+        first = next(self._recording.blocks(), None)
+        self.seen_us = None if first is None else (int(first.t[0]), self.covered_us[1])
+        self.silent_us = begin_us if self.seen_us is None or self.file.start_us else self.seen_us[0]
         self._blocks: Iterator[Events] = iter(())
         self._held, self._from_us = Events.empty(), None if self.count else begin_us
-
-    @property
-    def seen_us(self) -> tuple[int, int] | None:
-        """From the first event to the end; None without events."""
-        first = next(self._recording.blocks(), None)
-        return None if first is None else (int(first.t[0]), self.covered_us[1])
 
     def between(self, start_us: int, stop_us: int) -> Events:
         """The events in (start_us, stop_us]."""

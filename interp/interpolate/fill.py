@@ -87,19 +87,22 @@ class Fill:
     def fill(self, stretch: Stretch) -> Work:
         """The frames of a stretch."""
         shot = self.shot
-        self.shot += stretch.between == CUT
+        if stretch.between == CUT:
+            self.shot += 1
+            self.method = self.method.begin()  # (what it remembers is of another shot)
         asked = any(instant.share or not stretch.first.known for instant in stretch.instants)
         held = stretch.between == CUT or (stretch.between == UNRELATED and not self.method.needs_events)
         remark = stretch.between * (held and asked)
-        if stretch.second is None or stretch.between == CUT or not (self.events or (asked and not held)):
+        looked_at = self.events or ((asked or self.method.sequential) and not held)
+        if stretch.second is None or stretch.between == CUT or not looked_at:
             return Work(self._held(stretch, shot), remark)
         gap = self._gap(stretch, stretch.second)
         events = _laid(gap) if self.events else None
         if held:
             return Work(self._held(stretch, shot), remark, events)
-        if asked and self.method.needs_events and gap.events is None:
-            return Work(self._made(stretch, gap, self.fallback, shot), NO_EVENTS)
-        return Work(self._made(stretch, gap, self.method, shot), events=events)
+        unknown = self.method.needs_events and gap.events is None
+        method = self.fallback if unknown else self.method
+        return Work(self._made(stretch, gap, method, shot), NO_EVENTS * (asked and unknown), events)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What the method has to remember of the stretches so far."""
@@ -114,9 +117,9 @@ class Fill:
         instants = [instant for instant in stretch.instants if instant.share or not stretch.first.known]
         if len(instants) < len(stretch.instants):
             yield Filled(stretch.instants[0], True, shot, stretch.first.codes)
-        some = max(1, len(instants) if method.sequential else AT_ONCE // gap.frame_0.numel())
-        for first in range(0, len(instants), some):
-            group = instants[first : first + some]
+        some = max(1, AT_ONCE // gap.frame_0.numel())
+        groups = [instants[first : first + some] for first in range(0, len(instants), some)]
+        for group in [instants] if method.sequential else groups:  # (what remembers sees gaps without instants)
             times = torch.tensor([float(instant.share) for instant in group], device=self.device)
             images = method.between(gap, times, self.tiling).movedim(1, -1).cpu().numpy()
             for instant, image in zip(group, images, strict=True):
@@ -153,10 +156,13 @@ def _laid(gap: Gap) -> EventCounts | None:
 
 
 def steps_for(parts: int | None) -> int:
-    """In how many sub-intervals events are counted, so that frames lie at the ends of some."""
+    """In how many sub-intervals events are counted: so that frames lie at the ends of some, or of up to MOST of them as
+    many as do."""
     if parts is None:
         return 2 * FEWEST
-    return FEWEST if parts > MOST else parts * ceil(FEWEST / parts)
+    if parts <= MOST:
+        return parts * ceil(FEWEST / parts)
+    return max((steps for steps in range(FEWEST, MOST + 1) if parts % steps == 0), default=MOST)
 
 
 def _tensor(key: Key) -> torch.Tensor:

@@ -19,7 +19,7 @@ from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.take import Take
 from interp.light import to_light
-from interp.own_codes import recoded
+from interp.own_codes import recoded, shown
 from vid2ev.errors import UsageError
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.light.transfer import parse_transfer
@@ -60,7 +60,7 @@ class Pictures:
             return light if light.shape[2] == 3 else np.repeat(light, 3, axis=2)
         codes = np.clip(codes if codes.shape[2] == 3 else codes[..., 0], 0, 1)
         if self._table is not None:
-            return self._table[np.rint(codes * np.float32(TABLE)).astype(np.uint16)]
+            return self._table[_places(codes)]
         top = np.float32(2**self.bits - 1)
         signal = recoded(torch.from_numpy(np.ascontiguousarray(codes)), self.curve).numpy()
         return np.rint(signal * top).astype(np.uint8 if self.bits == 8 else np.uint16)
@@ -105,7 +105,15 @@ def of_film(rate: Fraction) -> Fraction:
     return slow.limit_denominator(max(1, min(FINEST, TERMS // ceil(slow))))
 
 
-def _by_curve(curve: str) -> np.ndarray:
-    """The code of 8 bits [uint8] by a curve of each sRGB code of `TABLE`."""
+def _by_curve(curve: str) -> np.ndarray | None:
+    """The code of 8 bits [uint8] by a curve of each sRGB code of `TABLE`; None where these are too coarse in the dark
+    to tell the codes of the curve apart."""
     light = parse_transfer("srgb").to_light(np.arange(TABLE + 1) / TABLE)
-    return np.rint(255 * np.clip(parse_transfer(curve).to_signal(light), 0, 1)).astype(np.uint8)
+    table = np.rint(255 * np.clip(parse_transfer(curve).to_signal(light), 0, 1)).astype(np.uint8)
+    own = np.arange(256, dtype=np.uint8)
+    return table if np.array_equal(table[_places(shown(own, curve))], own) else None
+
+
+def _places(codes: np.ndarray) -> np.ndarray:
+    """Where sRGB codes, 0 ... 1, are in a table."""
+    return np.rint(codes * np.float32(TABLE)).astype(np.uint16)

@@ -13,7 +13,7 @@
 Each gives its terms weighted, so that their sum is the loss and each can be looked at.
 
 Sources: Super SloMo's weights, which its paper gives for codes to 255 (0.8, 0.4, 0.005, 1),
-https://github.com/avinashpaliwal/Super-SloMo; E2VID's and FireNet's,
+https://github.com/avinashpaliwal/Super-SloMo, of features at relu4_3 in place of its conv4_3; E2VID's and FireNet's,
 https://github.com/TimoStoff/event_cnn_minimal; HDR's of time and features, Lai et al. (2018), and of L1 as much as of
 time.
 """
@@ -53,9 +53,11 @@ def flows(
 
 
 def carried(made: Interpolated, frame_0: torch.Tensor, frame_1: torch.Tensor, truth: torch.Tensor) -> Terms:
-    """Terms for the flows of two frames [B, C, H, W], by what they carry where; truth [B, N, C, H, W]."""
+    """Terms for the flows of two frames [B, C, H, W], by what they carry where, before they are refined; truth
+    [B, N, C, H, W]."""
     assert made.flows is not None
-    warps = 2 * absolute(made.warps, truth[:, :, None]) + between_frames(made.flows, frame_0, frame_1)
+    by_first = made.warps if made.before is None else made.before
+    warps = 2 * absolute(by_first, truth[:, :, None]) + between_frames(made.flows, frame_0, frame_1)
     return {
         "warps": 102 * warps,
         "smoothness": smoothness(made.flows[:, :2]) + smoothness(made.flows[:, 2:]),

@@ -49,5 +49,5 @@ class Method(Protocol):
 
     def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
         """Images [N, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second.
-        Gaps of a sequence come in their order if the method is `sequential`.  What takes much memory is done tile by
-        tile, if there are tiles.  Raises UsageError without events that it needs."""
+        Gaps of a sequence come in their order if the method is `sequential`, those without a time, too.  What takes
+        much memory is done tile by tile, if there are tiles.  Raises UsageError without events that it needs."""

@@ -92,6 +92,8 @@ class OfEvents:
         voxels = gap.events.voxels(edges[:, :-1], edges[:, 1:], bins)
         with self.running.on(voxels.device):
             images, self.states = self.network.sequence(voxels, self.states)
+        if not len(times):
+            return gap.frame_0.new_zeros(0, *gap.frame_0.shape)
         laid = F.interpolate(images[0, :-1].float(), gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
         return _finite(self, laid.expand(-1, len(gap.frame_0), -1, -1))
 

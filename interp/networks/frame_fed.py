@@ -65,6 +65,7 @@ class Interpolated:
     warps      [B, N, 2, C, H, W]: both frames, warped by these
     weights    [B, N, K, H, W] of the pictures blended
     blend      [B, N, C, H, W]: of the two warps alone
+    before     like warps, by the flows before they were refined; None of networks that do not refine them
     """
 
     images: torch.Tensor
@@ -73,6 +74,7 @@ class Interpolated:
     warps: torch.Tensor
     weights: torch.Tensor
     blend: torch.Tensor
+    before: torch.Tensor | None = None
 
 
 class FrameFed(nn.Module):
@@ -209,7 +211,12 @@ def _cut_back(made: Interpolated, pair: Pair) -> Interpolated:
     def codes(part: torch.Tensor) -> torch.Tensor:
         return cut(part).mean(-3, keepdim=True) if pair.grey else cut(part)
 
-    flows = None if made.flows is None else cut(made.flows)
     return Interpolated(
-        codes(made.images), flows, cut(made.flows_at), codes(made.warps), cut(made.weights), codes(made.blend)
+        codes(made.images),
+        None if made.flows is None else cut(made.flows),
+        cut(made.flows_at),
+        codes(made.warps),
+        cut(made.weights),
+        codes(made.blend),
+        None if made.before is None else codes(made.before),
     )

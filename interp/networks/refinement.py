@@ -6,12 +6,28 @@ dF_t0, dF_t1, V = UNet(I0, I1, F_01, F_10, F_t1, F_t0, g(I1, F_t1), g(I0, F_t0),
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import torch
 from torch import nn
 
 from interp.networks.frame_fed import Pair, run, warped
 from interp.warp import flows_at
+
+
+class Refined(NamedTuple):
+    """What a refinement comes to, at N times.
+
+    flows    [B, N, 4, H, W] px
+    warps    [B, N, 2, C, H, W]: both frames, warped by these
+    visible  [B, N, 1, H, W] logits
+    before   [B, N, 2, C, H, W]: both frames, warped by the flows that were refined
+    """
+
+    flows: torch.Tensor
+    warps: torch.Tensor
+    visible: torch.Tensor
+    before: torch.Tensor
 
 
 def refined(
@@ -22,8 +38,8 @@ def refined(
     flow_scale: float,
     first: torch.Tensor | None = None,
     unsure: torch.Tensor | float = 1.0,
-) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Refined flows at times [B, N, 4, H, W] px, both frames warped by them, and logits of what is visible.
+) -> Refined:
+    """Refined flows at times [B, N], both frames warped by them, and what is visible.
 
     beside   what else the UNet takes, after its 8 channels of flows and four pictures
     first    flows at times to refine; those that the flows between the frames stand for unless given
@@ -35,4 +51,4 @@ def refined(
     parts = [pair.frame_0, pair.frame_1, pair.flows, at[:, :, 2:], at[:, :, :2], warps[:, :, 1], warps[:, :, 0]]
     found = unsure * run(unet, [*parts, *beside])
     at = at + found[:, :, :4] * flow_scale
-    return at, warped(pair, at), found[:, :, 4:]
+    return Refined(at, warped(pair, at), found[:, :, 4:], warps)

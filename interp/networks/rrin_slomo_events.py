@@ -125,7 +125,7 @@ class RrinSlomoEvents(FrameFed):
             return self._guided(
                 pair, times, guide_of(pair, times, self.spec.transfer, gate_of(pair)), [*events, *beside]
             )
-        at, warps, visible = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
+        at, warps, visible, _ = refined(self.combined, pair, times, [*events, *beside], self.spec.flow_scale)
         carried, weights = blend(warps, F.logsigmoid(visible), shares_at(times))
         image = carried
         if self.residue is not None:
@@ -134,7 +134,7 @@ class RrinSlomoEvents(FrameFed):
 
     def _guided(self, pair: Pair, times: torch.Tensor, guide: Guide, beside: list[torch.Tensor]) -> Interpolated:
         """Images at times [B, N], from the closed form on."""
-        at, warps, visible = refined(
+        at, warps, visible, _ = refined(
             self.combined, pair, times, [guide.light, *beside], self.spec.flow_scale, guide.flows, guide.unsure
         )
         agreed = guide.agreement(warps)

@@ -58,7 +58,7 @@ class SuperSlomo(FrameFed):
     def synthesise(self, pair: Pair, times: torch.Tensor) -> Interpolated:
         """Images at times [B, N]."""
         events = self.event_input.at(pair, pair.once, times)
-        at, warps, visible = refined(self.refine, pair, times, events, self.spec.flow_scale)
-        logits = torch.cat([visible, torch.zeros_like(visible)], 2)
-        image, weights = blend(warps, logits, shares_at(times))
-        return Interpolated(image, pair.flows, at, warps, weights, image)
+        found = refined(self.refine, pair, times, events, self.spec.flow_scale)
+        logits = torch.cat([found.visible, torch.zeros_like(found.visible)], 2)
+        image, weights = blend(found.warps, logits, shares_at(times))
+        return Interpolated(image, pair.flows, found.flows, found.warps, weights, image, found.before)

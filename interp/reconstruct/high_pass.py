@@ -65,5 +65,7 @@ class HighPass:
 def _add(t, x, y, p, level, last_us, per_us, off, on):  # type: ignore[no-untyped-def]
     for k in range(t.size):
         i, j = y[k], x[k]
-        level[i, j] = level[i, j] * np.exp(-per_us * (t[k] - last_us[i, j])) + (on if p[k] > 0 else off)
+        if level[i, j] != 0:  # (before its first event a pixel has no time to decay from)
+            level[i, j] *= np.exp(-per_us * (t[k] - last_us[i, j]))
+        level[i, j] += on if p[k] > 0 else off
         last_us[i, j] = t[k]

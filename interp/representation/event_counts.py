@@ -86,10 +86,10 @@ class EventCounts:
         return replace(self, off_on=F.pad(self.off_on.float(), (0, right, 0, below)))
 
     def pooled(self, factor: int) -> EventCounts:
-        """Means of squares of pixels, as a sensor of larger pixels would count."""
+        """Means of squares of pixels, as a sensor of larger pixels would count; at edges of those there are."""
         if factor == 1:
             return self
-        counts = F.avg_pool2d(self.off_on.float().flatten(1, 2), factor)
+        counts = F.avg_pool2d(self.off_on.float().flatten(1, 2), factor, ceil_mode=True, count_include_pad=False)
         return replace(self, off_on=counts.unflatten(1, (2, self.steps)))
 
     def reversed(self) -> EventCounts:

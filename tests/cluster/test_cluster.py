@@ -14,7 +14,7 @@ import shared_tasks as made
 
 from vid2ev import UsageError, convert
 from vid2ev.cluster import workers as workers_module
-from vid2ev.cluster.task import Task
+from vid2ev.cluster.task import Task, share_of
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 
@@ -123,3 +123,8 @@ def test_two_programs_share_work_out_at_once() -> None:
     # (each says in an error if it finds a port taken; what Dask says of that is an error in tests)
     with Workers(jobs=1).client() as one, Workers(jobs=1).client() as other:
         assert [one.submit(int, "1").result(), other.submit(int, "2").result()] == [1, 2]
+
+
+def test_how_much_of_nothing_is_done_is_not_said() -> None:
+    assert share_of(0, 0) == share_of(3, None) == {}
+    assert share_of(1, 4) == {"share": 0.25} and share_of(5, 4) == {"share": 1.0}

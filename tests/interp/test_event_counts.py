@@ -171,3 +171,12 @@ def test_larger_pixels_count_the_means_of_theirs() -> None:
     assert pooled.off_on.shape == (1, 2, 16, 2, 3)
     padded = some.padded(3, 1)
     assert padded.off_on.shape[-2:] == (5, 9) and padded.off_on.sum() == some.off_on.sum()
+
+
+@pytest.mark.parametrize(("side", "factor"), [(641, 2), (89, 9), (7, 10)])
+def test_pixels_at_the_edge_of_a_sensor_count_where_they_do_not_fill_a_larger_one(side: int, factor: int) -> None:
+    one = EventCounts.none(1, (4 * factor, side))
+    one.off_on[..., -1] = 1
+    pooled = one.pooled(factor).off_on
+    assert pooled.shape[-2:] == (4, -(-side // factor))
+    torch.testing.assert_close(pooled[..., -1], torch.full_like(pooled[..., -1], 1 / (side % factor or factor)))

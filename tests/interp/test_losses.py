@@ -17,7 +17,7 @@ from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
 from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks import make
-from interp.warp import warp
+from interp.warp import flows_at, warp
 from vid2ev import DataError, UsageError
 
 
@@ -149,6 +149,20 @@ def test_super_slomo_is_weighed_as_published() -> None:
     torch.testing.assert_close(terms["warps"], 102 * warps)
     torch.testing.assert_close(terms["image"], 204 * absolute(made.images, truth))
     assert float(terms["smoothness"].detach()) == 0 and set(terms) == {"image", "warps", "features", "smoothness"}
+
+
+def test_super_slomo_learns_flows_before_they_are_refined() -> None:
+    network = make("superslomo", flow_scale=4)
+    for part in (network.flow, network.refine):
+        torch.nn.init.normal_(part.head.bias, std=0.5)
+    pair = frames(1, (16, 16))
+    made, truth = network(*pair, [0.25]), torch.rand(1, 1, 3, 16, 16)
+    terms = objectives.carried(made, *pair, truth)
+    at = flows_at(made.flows, torch.tensor([[0.25]]))
+    carried = [absolute(warp(frame, at[:, 0, k : k + 2]), truth[:, 0]) for frame, k in zip(pair, (0, 2), strict=True)]
+    expected = sum(carried) + between_frames(made.flows, *pair)
+    torch.testing.assert_close(terms["warps"], 102 * expected)
+    assert not torch.allclose(at, made.flows_at)
 
 
 def test_warps_are_looked_at_while_training_begins() -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interp.candidates.bridge import DARK, bridge
-from interp.candidates.ramps import ramps, risen
+from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_codes, to_light
+from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 
 C = 0.2
@@ -121,3 +123,18 @@ def test_parts_of_events_are_parts_of_what_events_say(seed: int, part: float, t:
     found = risen(EventCounts(torch.from_numpy(many), contrast), times)
     assert found.number.min() >= -1e-5 and found.more.min() >= -1e-5
     assert torch.isfinite(found.channels()).all()
+
+
+@pytest.mark.parametrize(("events", "frames"), [((50, 75), (101, 151)), ((47, 63), (100, 134))])
+def test_of_pixels_between_pixels_both_ends_are_still_the_key_frames(
+    events: tuple[int, int], frames: tuple[int, int]
+) -> None:
+    draw = torch.Generator().manual_seed(0)
+    counts = EventCounts(torch.poisson(torch.full((1, 2, 32, *events), 0.3), generator=draw), torch.full((1, 2), 0.2))
+    first, last = torch.rand(2, 1, 3, *frames, generator=draw)
+    laid, times = over(counts, frames), torch.tensor([[0.0, 0.5, 1.0]])
+    found = risen(laid, times)
+    assert found.more.min() >= 0 and found.drift(times).max() <= 1
+    assert torch.isfinite(in_doubt(first, last, found, times)).all()
+    made = ramps(first, last, laid, times)
+    torch.testing.assert_close(made[0, [0, 2]], torch.cat([first, last]), atol=1e-4, rtol=0)

@@ -94,3 +94,22 @@ def test_noise_is_not_matched_with_noise() -> None:
     frames = torch.rand(2, 1, 3, *SIZE)
     noise = EventCounts(torch.poisson(torch.full((1, 2, 4, *SIZE), 0.05)), torch.full((1, 2), C))
     assert torch.equal(registered(*frames, noise).off_on, noise.off_on)
+
+
+@pytest.mark.parametrize("wider", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("shift", [(6, 0), (0, 6)])
+def test_pixels_that_are_longer_one_way_are_moved_as_far_as_others(
+    wider: tuple[int, int], shift: tuple[int, int]
+) -> None:
+    """A sensor whose pixels are two of the frames' high, or two wide."""
+    size = (SIZE[0] // 2 * 2, SIZE[1] // 2 * 2)
+
+    def coarser(counts: EventCounts) -> EventCounts:
+        parts = counts.off_on[..., : size[0], : size[1]].flatten(1, 2)
+        return EventCounts(F.avg_pool2d(parts, wider).unflatten(1, (2, -1)), counts.contrast)
+
+    first, last, beside = seen(1, shift)
+    first, last = (each[..., : size[0], : size[1]] for each in (first, last))
+    here = over(coarser(seen(1, (0, 0))[2]), size)
+    made = registered(first, last, coarser(beside))
+    assert apart(made, here) < 0.4 * apart(over(coarser(beside), size), here)

@@ -52,6 +52,15 @@ def test_a_film_whose_clock_does_not_begin_at_0_is_drawn_from_all_over(tmp_path:
         np.testing.assert_array_equal(one.off_on, other.off_on)
 
 
+def test_a_film_at_no_constant_rate_has_clips_wherever_one_is_drawn(tmp_path: Path) -> None:
+    frames = np.load(film(tmp_path / "film.npz", 120))["frames"]
+    times_us = np.cumsum([0, *[4_000] * 100, *[90_000] * 19])
+    np.savez(tmp_path / "film.npz", frames=frames, timestamps=times_us)
+    settings = ClipSettings(**FILMS, video_files=(str(tmp_path / "film.npz"),))
+    starts = [made(settings, 0, number).about["start_s"] for number in range(16)]
+    assert max(starts) > 0.4
+
+
 @pytest.mark.parametrize("multiple", [4, 8, 16, 32])
 def test_cameras_see_a_film_in_its_order_from_before_the_gap_on(tmp_path: Path, multiple: int) -> None:
     """A film that grows brighter from frame to frame, of which the first key frame is one."""

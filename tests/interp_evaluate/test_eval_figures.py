@@ -8,7 +8,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from footage_made import SIZE, pictures, write_hsergb, write_predictions
+from footage_made import SIZE, pictures, write_film, write_hsergb, write_predictions
 
 from interp.evaluate.figures import of_evaluation
 from interp.evaluate.figures.of_evaluation import FILM_PX, film_panels, patch_of
@@ -16,6 +16,8 @@ from interp.evaluate.group import Cameras, Group
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.run import evaluate
 from interp.representation.event_counts import EventCounts
+from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.recording.exposures import write_codes
 
 
 @pytest.fixture
@@ -53,6 +55,23 @@ def test_figures_are_of_the_first_gaps_and_the_same_each_time(data: Path) -> Non
     assert len(frames) == 3 * 2 and frames[0].shape[1] >= 2 * FILM_PX[0]
     evaluate([str(data / "data")], folder, resume=True, figures=True, **options(data))
     assert contents(folder / "figures") == made and (folder / "report.html").read_bytes() == report
+
+
+def test_figures_of_a_film_are_of_the_gaps_that_have_scores(tmp_path: Path) -> None:
+    """Predictions of the second gap and the third, of a film that is scored up to there."""
+    truth = pictures(21)
+    write_film(tmp_path / "film.npz", truth)
+    folder = tmp_path / "ours" / "film"
+    folder.mkdir(parents=True)
+    for k in (5, 6, 7, 9, 10, 11):
+        write_codes(folder / f"{k}.png", srgb_codes(truth[k] / 255))
+    options = {"baselines": [], "predictions": [tmp_path / "ours"], "protocol": Protocol(3, 3), "limit": 3}
+    found = evaluate([str(tmp_path / "film.npz")], tmp_path / "report", figures=True, **options)
+    assert {row.group for row in found.rows} == {1, 2} and {row.psnr_255 for row in found.rows} == {100.0}
+    made = contents(tmp_path / "report" / "figures")
+    assert sorted(made) == ["film/errors.png", "film/moments.png", "film/ours.mp4"]
+    with av.open(str(tmp_path / "report" / "figures" / "film" / "ours.mp4")) as film:
+        assert len(list(film.decode(video=0))) == 6
 
 
 def test_panels_hold_the_events_since_the_frame_before(monkeypatch: pytest.MonkeyPatch) -> None:

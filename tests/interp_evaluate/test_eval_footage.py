@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterable
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
 from interp.evaluate.predictions import by_frame, predictions_in
 from interp.evaluate.protocol import Protocol
+from interp.evaluate.rebuilders import methods_of
 from interp.evaluate.recordings import Recording
 from interp.evaluate.remarks import left_out
 from interp.evaluate.run import evaluate
@@ -26,10 +29,12 @@ from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
 from interp.representation.event_counts import count_events
 from vid2ev import DataError, Events, UsageError, convert, events_of, open_source
+from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.recording.exposures import write_codes
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.source import SceneSource
+from vid2ev.sources import Source
 
 
 def test_groups_of_a_recording_are_its_frames_and_events(tmp_path: Path) -> None:
@@ -171,6 +176,13 @@ def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path) -> None:
     assert expected_px > 0.1 and group.cameras.disparity_px == pytest.approx(expected_px, rel=0.1)
 
 
+def test_key_frames_of_the_truth_have_its_exposure(own: Path) -> None:
+    """Of every 32nd frame the camera's own, of the rest the instants of the truth."""
+    groups = list(Recording(open_sequence(own), Protocol(7, 7), "own").groups())
+    exposed = [group.cameras.exposure_us for group in groups[:4]]
+    assert exposed == pytest.approx([4e6 / 960 / 2, 0, 0, 4e6 / 960 / 2], abs=2)
+
+
 def test_other_key_frames_than_the_frame_camera_has_are_named(own: Path) -> None:
     remarks = Recording(open_sequence(own), Protocol(15, 15), "own").about()["remarks"]
     assert any("2 of 8 key frames" not in each and "--skip 31 takes its own" in each for each in remarks)
@@ -229,6 +241,11 @@ def test_slow_films_and_cuts_are_named(tmp_path: Path) -> None:
     assert fast.about()["rate_hz"] == pytest.approx(240) and fast.about()["remarks"] == []
 
 
+def test_rates_that_are_fractions_are_said_as_such() -> None:
+    simulated = Simulated.of("clean", fps=Fraction(240000, 1001))
+    assert json.loads(json.dumps(simulated.describe()))["fps"] == "240000/1001"
+
+
 def test_a_scene_is_rendered_denser_than_its_truth() -> None:
     film = Film("scene:flicker,size=32x24,scene.duration_s=0.05", Protocol(3, 3), "scene", Simulated.of("clean"), 1)
     (group,) = film.groups()
@@ -248,6 +265,70 @@ def test_predictions_are_paired_by_position(tmp_path: Path, with_keys: bool) -> 
     recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
     for group in recording.groups():
         np.testing.assert_array_equal(np.stack(found[0].begin(recording).frames(group)), group.truth)
+
+
+@pytest.mark.parametrize(("first", "rebuilt"), [(0, False), (1, True), (0, True)])
+def test_predictions_of_a_film_are_paired_by_the_frames_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first: int, rebuilt: bool
+) -> None:
+    """Whatever its header says, and however far it was gone through before."""
+    truth = pictures(14)
+    write_film(tmp_path / "film.npz", truth)
+    opened = Simulated.opened
+
+    def estimated(self: Simulated, video: str) -> Source:
+        source = opened(self, video)
+        source.frames_expected = 16  # type: ignore[misc]
+        return source
+
+    monkeypatch.setattr(Simulated, "opened", estimated)
+    kept = [k for k in range(13) if k % 4] if rebuilt else range(14)
+    folder = tmp_path / "results" / "film"
+    folder.mkdir(parents=True)
+    for number, k in enumerate(kept, first):
+        write_codes(folder / f"{number:03d}.png", srgb_codes(truth[k] / 255))
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"), limit=2)
+    (ours,) = predictions_in(tmp_path / "results")
+    for _ in range(2):
+        running, groups = ours.begin(film), 0
+        for group in film.groups():
+            np.testing.assert_array_equal(np.stack(running.frames(group)), group.truth)
+            groups += 1
+        assert groups == 2 and not running.unfit
+
+
+@pytest.mark.parametrize(("limit", "said"), [(2, True), (3, False), (4, False)])
+def test_a_film_is_said_to_be_limited_where_it_has_more(tmp_path: Path, limit: int, said: bool) -> None:
+    write_film(tmp_path / "film.npz", pictures(13))
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"), limit)
+    assert len(list(film.groups())) == min(limit, 3)
+    assert any("limited" in each for each in film.about()["remarks"]) == said
+
+
+def test_what_a_method_remembers_is_of_the_shot_that_it_is_asked_about(tmp_path: Path) -> None:
+    draw = np.random.default_rng(0)
+    one, other = (np.kron(draw.integers(0, 256, (8, 12, 3)), np.ones((8, 8, 1), int)) for _ in range(2))
+    shots = [np.stack([np.roll(each, k, 1) for k in range(9)]).astype(np.uint8) for each in (one, other)]
+    write_film(tmp_path / "film.npz", np.concatenate(shots))
+    film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"))
+    (method,) = methods_of([], ["firenet-paper"], Protocol(3, 3))
+    groups = list(film.groups())
+    assert [group.number for group in groups] == [0, 1, 3]
+    running, alone, remembering = (method.begin(film) for _ in range(3))
+    made = [running.frames(group) for group in groups]
+    np.testing.assert_array_equal(made[2], alone.frames(groups[2]))
+    remembering.frames(groups[0])
+    assert not np.array_equal(made[2], remembering.frames(replace(groups[2], number=1)))
+
+
+def test_videos_in_a_folder_of_recordings_are_named(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "data" / "seq", pictures(9))
+    write_film(tmp_path / "data" / "film.npz", pictures(9))
+    found = footage_of([str(tmp_path / "data")], Protocol(), Simulated.of("clean"))
+    assert [each.name for each in found.footage] == ["seq"]
+    assert found.unusable == {
+        str(tmp_path / "data" / "film.npz"): "no recording, in a folder of such; give it by itself"
+    }
 
 
 def test_hidden_files_are_no_predictions(tmp_path: Path) -> None:
@@ -350,6 +431,8 @@ def test_data_sets_of_all_kinds_have_names_that_differ(tmp_path: Path) -> None:
     asked = [str(tmp_path / name) for name in ("close", "far", "x.npz")]
     found = footage_of(asked, Protocol(), Simulated.of("clean"))
     assert [each.name for each in found.footage] == ["x", "x_2", "x_3"]
+    alike = footage_of([str(tmp_path / name) for name in ("close/x", "far/x")], Protocol(), Simulated.of("clean"))
+    assert alike.sets == {"close-x": ["x"], "far-x": ["x_2"]}
     assert found.sets == {"close": ["x"], "far": ["x_2"], "x.npz": ["x_3"]}
     write_film(tmp_path / "films" / "b.npz", pictures(9))
     write_film(tmp_path / "films" / "a.npz", pictures(9))

@@ -17,9 +17,12 @@ from interp import pretrained
 from interp.commands.interpolate import interpolate as command
 from interp.interpolate import frames, interpolate
 from interp.interpolate.choice import choice
-from interp.interpolate.pictures import SLOWEST_HZ
+from interp.interpolate.fill import Filled
+from interp.interpolate.instants import Instant
+from interp.interpolate.pictures import SLOWEST_HZ, Pictures
 from interp.interpolate.take import Options
 from interp.networks import make
+from interp.own_codes import shown
 from interp.representation.carried import footprint_of
 from interp.weights import save
 from vid2ev import open_source
@@ -43,6 +46,14 @@ def test_key_frames_are_there_bit_for_bit(tmp_path: Path, multiple: object, ever
     for k in keys:
         np.testing.assert_array_equal(out[int(k * float(str(multiple)))], frames[k])
         assert times[int(k * float(str(multiple)))] == STEP_US * k
+
+
+@pytest.mark.parametrize("curve", ["srgb", "bt709", "gamma:2.2", "gamma:2.8", "gamma:10"])
+@pytest.mark.parametrize("kind", ["png", "mp4"])
+def test_codes_of_key_frames_are_those_of_their_curve(kind: str, curve: str) -> None:
+    codes = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, 2)
+    key = Filled(Instant(0, 0, Fraction(0)), True, 0, shown(codes, curve))
+    np.testing.assert_array_equal(Pictures(kind, 8, curve).picture(key), codes)
 
 
 def test_frames_of_16_bits_and_grey_ones_stay_what_they_are(tmp_path: Path) -> None:

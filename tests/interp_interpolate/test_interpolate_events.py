@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 import torch
 from scipy.io import savemat
-from small_takes import SIZE, STEP_US, images, moving
+from small_takes import SIZE, STEP_US, images, moving, recording
 
 from interp.data.layouts import open_sequence
 from interp.interpolate.event_cursor import EventCursor
+from interp.interpolate.fill import FEWEST, MOST, steps_for
 from interp.interpolate.take import Options, open_take
 from interp.interpolate.whole import frames, interpolate
 from interp.methods.gap import Gap
+from interp.methods.of_networks import OfEvents
 from interp.methods.one_frame import OneFrame
 from interp.networks import make
 from interp.networks.hdr import Hdr
@@ -119,6 +121,59 @@ def test_events_in_a_file_of_their_own_are_those_of_a_recording(tmp_path: Path) 
             np.testing.assert_array_equal(one, moving(4)[k // 3])
     part = interpolate(both, tmp_path / "part", multiple=1, options=Options(start_s=0.03, stop_s=0.07))
     assert part["key_frames"] == 2 and part["start_us"] == STEP_US
+
+
+@pytest.mark.parametrize("grid", [{"multiple": "1/2"}, {"multiple": "2/3"}, {"multiple": 2}, {"fps": "7"}])
+def test_what_remembers_sees_each_event_of_a_shot_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grid: dict[str, Any]
+) -> None:
+    """Those of gaps in which nothing is made, too; after a cut it begins anew."""
+    save(tmp_path / "some.safetensors", "firenet", make("firenet"))
+    seen: list[tuple[int, bool]] = []
+    between = OfEvents.between
+
+    def counted(self: OfEvents, gap: Gap, *asked: Any) -> torch.Tensor:
+        assert gap.events is not None
+        seen.append((int(gap.events.off_on.sum()), bool(self.states)))
+        return between(self, gap, *asked)
+
+    monkeypatch.setattr(OfEvents, "between", counted)
+    source = recording(tmp_path / "in", [*moving(4, seed=1), *moving(3, seed=2)])
+    interpolate(source, tmp_path / "out", network=tmp_path / "some.safetensors", **grid)
+    assert seen == [(400, False), (400, True), (400, True), (400, False), (400, True)]
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_a_file_that_states_no_beginning_knows_nothing_of_the_time_before_its_events(
+    tmp_path: Path, stated: bool
+) -> None:
+    """And one that does knows that there were none."""
+    begin_us = 1_000_000
+    source = images(tmp_path / "in", moving(7), start_us=begin_us)
+    some = drawn()
+    events = Events(some.t + begin_us + 3 * STEP_US, some.x, some.y, some.p)
+    late = Recording(
+        SIZE, begin_us * stated, int(events.t[-1]) - begin_us * stated, len(events), lambda: iter([events])
+    )
+    write = format_named("npz").write
+    assert write is not None
+    write(tmp_path / "late.npz", late)
+    told = interpolate(
+        source, tmp_path / "out", multiple=2, method="bridge", options=Options(events=tmp_path / "late.npz")
+    )
+    seconds = [(begin_us + STEP_US * k) / 1e6 for k in range(4)]
+    unknown = [[seconds[k], seconds[k + 1]] for k in range(3)]
+    assert told["gaps_s"] == ({} if stated else {"events that are not known": unknown})
+
+
+@pytest.mark.parametrize("parts", [1, 2, 7, 32, 33, 100, 128, 129, 160, 250, 256, 997, 5000])
+def test_frames_lie_at_the_ends_of_sub_intervals_or_of_as_many_as_can_be(parts: int) -> None:
+    steps = steps_for(parts)
+    assert FEWEST <= steps <= MOST
+    if parts <= MOST:
+        assert steps % parts == 0
+    else:
+        assert parts % steps == 0 or (steps == MOST and not any(parts % k == 0 for k in range(FEWEST, MOST)))
 
 
 @pytest.mark.parametrize("related", [True, False])

@@ -70,6 +70,16 @@ def test_a_pixel_is_the_log_of_its_light_high_pass_filtered() -> None:
         np.testing.assert_allclose(others, GREY, rtol=1e-6)
 
 
+@pytest.mark.parametrize("begin_us", [-(10**12), -2_000_000, 10**12])
+def test_pictures_do_not_depend_on_what_the_clock_says(begin_us: int) -> None:
+    some, pictures = drawn(us=100_000), []
+    for since_us in (0, begin_us):
+        high_pass = HighPass(SIZE, (0.2, 0.3), 100.0)
+        high_pass.add(Events(some.t + since_us, some.x, some.y, some.p), since_us, since_us + 100_000)
+        pictures.append(high_pass.picture(since_us + 100_000))
+    np.testing.assert_array_equal(*pictures)
+
+
 def test_a_filter_that_forgets_nothing_gives_light_back_to_a_threshold() -> None:
     seen = HighPass(SIZE, (0.1, 0.1), cutoff_hz=0)
     seen.add(events_at(list(range(1, 8)), [1] * 7), 0, 10)

@@ -44,6 +44,10 @@ def test_a_step_and_a_flash_happen_when_they_should() -> None:
     assert step == [np.float32(0.1)] * 5 + [np.float32(0.5)] * 6
     flash = parse_synthetic("flash,size=1x1,fps=10,at_s=0.3,length_s=0.15")
     assert [frame.light[0, 0] for frame in flash.frames()] == [0, 0, 0, 1e6, 1e6, 0, 0, 0, 0, 0, 0]
+    for at in range(0, 500, 7):
+        flash = parse_synthetic(f"flash,size=1x1,fps=1000,duration_s=1,at_s={at / 1000},length_s=0.05")
+        lit = [k for k, frame in enumerate(flash.frames()) if frame.light[0, 0] > 0]
+        assert lit == list(range(at, at + 50))
 
 
 def test_an_edge_crosses_when_it_says() -> None:

@@ -43,6 +43,11 @@ class GoOn:
     call: Callable[[Tell], Any]
 
 
+def share_of(done: float, total: float | None) -> dict[str, float]:
+    """How much of a task is done, as `Tell` takes it; nothing where nobody knows of how much, or it is of nothing."""
+    return {"share": min(done / total, 1.0)} if total else {}
+
+
 def done_on_worker(task: Task, folder: str, topic: str) -> Any:
     """What the task gives, perhaps `GoOn`, or `Refused`; its errors go to Dask, which tries again."""
     from distributed import get_worker

@@ -183,7 +183,8 @@ class Flash(SyntheticClip):
     length_s: float = 0.05
 
     def light(self, t_ns: int) -> np.ndarray:
-        return self._even(self.bright if 0 <= t_ns * 1e-9 - self.at_s < self.length_s else self.dark)
+        begin_ns, length_ns = round(1e9 * self.at_s), round(1e9 * self.length_s)
+        return self._even(self.bright if 0 <= t_ns - begin_ns < length_ns else self.dark)
 
 
 SYNTHETIC: dict[str, type[SyntheticClip]] = {clip.name: clip for clip in (Ramp, Sine, Step, MovingEdge, Black, Flash)}

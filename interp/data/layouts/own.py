@@ -87,6 +87,10 @@ class Own:
         """The frame of the slow camera at that instant, if there is one."""
         return self._keys.rgb(self._key_of[k]) if k in self._key_of else self.frame(k)
 
+    def exposure_us(self, k: int) -> float:
+        """How long the camera that took key frame k exposes a frame."""
+        return (self._keys if k in self._key_of else self._frames).exposure_us
+
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""
         parts = list(read_events(self.events_folder, start_us + 1, stop_us + 1))
@@ -169,6 +173,7 @@ class _Pictures:
             self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
         opened = read_spans(self._folder / TIMESTAMPS)
         self.times_us = opened.sum(axis=1) // 2  # the middles of the exposures
+        self.exposure_us = float(np.median(opened[:, 1] - opened[:, 0]))
 
     def codes(self, number: int) -> np.ndarray:
         """Codes uint8, [H, W] or [H, W, 3]."""

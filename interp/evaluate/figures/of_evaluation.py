@@ -10,7 +10,7 @@ Pictures are made again for them, as an evaluation keeps none but the worst.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -59,8 +59,14 @@ def _of_sequence(folder: Path, footage: Footage, methods: Sequence[Rebuilder], r
     hardest = min(gaps, key=lambda gap: pooled((row for row in rows if row.group == gap), "psnr_255").mean)
     running = [method.begin(footage) for method in methods]
     panels: dict[str, list[np.ndarray]] = {}
-    for group in islice(footage.groups(), len(gaps)):
-        made = whole({method.name: method.frames(group) for method in running})
+    for group in footage.groups():
+        if group.number > gaps[-1]:
+            break
+        drawn = group.number in gaps
+        pictures_of = {method.name: method.frames(group) for method in running if drawn or method.sequential}
+        if not drawn:
+            continue
+        made = whole(pictures_of)
         for name, pictures in made.items():
             panels.setdefault(name, []).extend(film_panels(group, name, pictures))
         if group.number == hardest and made:
