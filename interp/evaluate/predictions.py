@@ -128,10 +128,14 @@ def _read(path: Path, shape: tuple[int, ...]) -> np.ndarray:
     import cv2
 
     try:
-        picture = next(iter(decoded(path, cv2.IMREAD_COLOR)), None)
+        picture = next(iter(decoded(path, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)), None)
     except DataError as error:
         raise DataError(str(error).removeprefix(f"{path}: ")) from error
     if picture is None or picture.shape != shape:
         size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
         raise DataError(f"{size}, expected a picture of {shape[1]}x{shape[0]}")
+    if picture.dtype == np.uint16:
+        picture = np.rint(picture / 257).astype(np.uint8)
+    if picture.dtype != np.uint8:
+        raise DataError(f"{picture.dtype} pixels, expected codes of 8 or 16 bits")
     return picture[..., ::-1]

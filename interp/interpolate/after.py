@@ -1,15 +1,17 @@
-"""HDR post-processing of all frames, key frames too: one after the other, in linear light.
+"""HDR post-processing of all frames, key frames too, in linear light.
 
-Between two frames the network is told of the events since the earlier one, or of the frame before processing, as its
-weights have it.  It starts afresh after a cut, and works on whole frames.
+What the network remembers goes from key frame to key frame, with all events between them; frames in between are seen
+from the key frame before, with the events since.  So key frames do not depend on how many are made between them, which
+no sensor took: where a key frame is clipped, these are near the top of its range, and would be believed there.
+Weights for frames alone are told of the frame before processing.  All starts afresh after a cut, on whole frames.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,6 +20,7 @@ from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
 from interp.networks.hdr import Hdr, HdrState
+from interp.representation.event_counts import EventCounts
 from interp.weights import load
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import sha256
@@ -40,29 +43,25 @@ class After:
         if self.needs_events and not events:
             raise UsageError(f"HDR with {path}, which was trained with events, and there are none; leave it out")
         self._state: HdrState | None = None
-        self._rest: torch.Tensor | None = None  # events since the last frame
+        self._rest: torch.Tensor | None = None  # events since the key frame that the state is of
         self._shot = 0
 
     @torch.inference_mode()
     def frames(self, work: Work) -> Iterator[Filled]:
         """The frames of a stretch, processed."""
-        events, since = work.events, torch.zeros(1, device=self.device)
+        if work.shot != self._shot:
+            self._shot, self._state, self._rest = work.shot, None, None
+        first, state = None, None
+        if work.first.known:
+            first, state = self._processed(work.first.codes, self._rest, self._state)
         for frame in work.frames:
-            light = to_light(torch.from_numpy(np.ascontiguousarray(np.moveaxis(frame.codes, -1, 0))), "srgb")
-            light = light[None].to(self.device)
-            share = torch.full((1,), float(frame.instant.share), device=self.device)
-            window = self._window(events, since, share, light)
-            if frame.shot != self._shot:
-                self._shot, self._state, window = frame.shot, None, torch.zeros_like(window)
-            second = window if self.needs_events else light
-            made, self._state = self.network(light.expand(-1, self.network.spec.colours, -1, -1), second, self._state)
-            codes = to_codes(made.clamp(min=0), "srgb")[0]
-            codes = codes if len(codes) == frame.codes.shape[2] else codes.mean(0, keepdim=True)
-            yield replace(frame, key=False, codes=codes.movedim(0, -1).cpu().numpy())
-            since, self._rest = share, None
-        if events is not None:
-            rest = self._voxels(events, since, torch.ones_like(since))
-            self._rest = rest if self._rest is None else self._rest + rest
+            if frame.key and frame.shot == work.shot and first is not None:
+                yield replace(frame, key=False, codes=first)
+                continue
+            since = self._voxels(work.events, frame.instant.share) if frame.shot == work.shot and state else None
+            codes, _ = self._processed(frame.codes, since, state if frame.shot == work.shot else None)
+            yield replace(frame, key=False, codes=codes)
+        self._state, self._rest = state, self._voxels(work.events, 1)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What it has to remember after a stretch."""
@@ -77,13 +76,23 @@ class After:
             self._shot = int(shot)
             self._state = None if kept is None else HdrState(*kept)
 
-    def _window(self, events: Any, since: torch.Tensor, share: torch.Tensor, light: torch.Tensor) -> torch.Tensor:
-        """The events since the frame before."""
-        bins = self.network.spec.bins
-        found = light.new_zeros(1, bins, *light.shape[2:])
-        if events is not None and bool(share > since):
-            found = self._voxels(events, since, share)
-        return found if self._rest is None else found + self._rest
+    def _processed(
+        self, codes: np.ndarray, since: torch.Tensor | None, state: HdrState | None
+    ) -> tuple[np.ndarray, HdrState]:
+        """A frame [H, W, C], with the events since the one that a state is of, and the state after it."""
+        light = to_light(torch.from_numpy(np.ascontiguousarray(np.moveaxis(codes, -1, 0))), "srgb")[None].to(
+            self.device
+        )
+        window = light.new_zeros(1, self.network.spec.bins, *light.shape[2:]) if since is None else since
+        second = window if self.needs_events else light
+        made, after = self.network(light.expand(-1, self.network.spec.colours, -1, -1), second, state)
+        found = to_codes(made.clamp(min=0), "srgb")[0]
+        found = found if len(found) == codes.shape[2] else found.mean(0, keepdim=True)
+        return found.movedim(0, -1).cpu().numpy(), after
 
-    def _voxels(self, events: Any, since: torch.Tensor, until: torch.Tensor) -> torch.Tensor:
-        return events.voxels(since[None], until[None], self.network.spec.bins)[:, 0]
+    def _voxels(self, events: EventCounts | None, until: Fraction | int) -> torch.Tensor | None:
+        """The events of a gap, from its key frame on; None where they are not known."""
+        if events is None:
+            return None
+        edges = torch.tensor([[0.0], [float(until)]], device=self.device)
+        return events.voxels(edges[:1], edges[1:], self.network.spec.bins)[:, 0]

@@ -57,11 +57,15 @@ class Filled:
 class Work:
     """The frames of a stretch, in order of time, to be taken once.
 
+    first    the key frame that it begins with, whether or not it is one of the frames
+    shot     how many cuts there were before that
     remark   why the method was not asked; empty if it was
     events   what the events of the stretch say, laid over the frames, where anybody asks for them and they are known
     """
 
     frames: Iterator[Filled]
+    first: Key
+    shot: int
     remark: str = ""
     events: EventCounts | None = None
 
@@ -95,14 +99,15 @@ class Fill:
         remark = stretch.between * (held and asked)
         looked_at = self.events or ((asked or self.method.sequential) and not held)
         if stretch.second is None or stretch.between == CUT or not looked_at:
-            return Work(self._held(stretch, shot), remark)
+            return Work(self._held(stretch, shot), stretch.first, shot, remark)
         gap = self._gap(stretch, stretch.second)
         events = _laid(gap) if self.events else None
         if held:
-            return Work(self._held(stretch, shot), remark, events)
+            return Work(self._held(stretch, shot), stretch.first, shot, remark, events)
         unknown = self.method.needs_events and gap.events is None
         method = self.fallback if unknown else self.method
-        return Work(self._made(stretch, gap, method, shot), NO_EVENTS * (asked and unknown), events)
+        made = self._made(stretch, gap, method, shot)
+        return Work(made, stretch.first, shot, NO_EVENTS * (asked and unknown), events)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What the method has to remember of the stretches so far."""

@@ -134,6 +134,6 @@ def _within(cursor: EventCursor, start_us: int, stop_us: int) -> Events | None:
     """The events of a gap; None if that is not within what the file holds."""
     begin_us, end_us = cursor.covered_us
     moment_us = (stop_us - start_us) // MOMENT
-    if start_us < begin_us - moment_us or stop_us > end_us + moment_us or stop_us <= cursor.silent_us:
+    if start_us < max(begin_us, cursor.silent_us) - moment_us or stop_us > end_us + moment_us:
         return None
     return cursor.between(start_us, stop_us)

@@ -331,6 +331,18 @@ def test_videos_in_a_folder_of_recordings_are_named(tmp_path: Path) -> None:
     }
 
 
+def test_predictions_of_16_bits_are_brought_to_the_nearest_of_8(tmp_path: Path) -> None:
+    truth = pictures(13)
+    write_hsergb(tmp_path / "seq", truth)
+    draw = np.random.default_rng(0)
+    deep = truth.astype(np.int64) * 257 + draw.integers(-128, 129, truth.shape)
+    write_predictions(tmp_path / "results" / "seq", np.clip(deep, 0, 65535).astype(np.uint16))
+    (ours,) = predictions_in(tmp_path / "results")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
+    for group in recording.groups():
+        np.testing.assert_array_equal(np.stack(ours.begin(recording).frames(group)), group.truth)
+
+
 def test_hidden_files_are_no_predictions(tmp_path: Path) -> None:
     # (macOS puts them beside those that it writes to disks of others)
     truth = pictures(13)

@@ -13,6 +13,7 @@ from scipy.io import savemat
 from small_takes import SIZE, STEP_US, images, moving, recording
 
 from interp.data.layouts import open_sequence
+from interp.interpolate.after import After
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.fill import FEWEST, MOST, steps_for
 from interp.interpolate.take import Options, open_take
@@ -178,14 +179,20 @@ def test_frames_lie_at_the_ends_of_sub_intervals_or_of_as_many_as_can_be(parts: 
 
 @pytest.mark.parametrize("related", [True, False])
 @pytest.mark.parametrize("grid", [{"multiple": "1/2"}, {"multiple": "2/3"}, {"multiple": 2}, {"fps": "10.0001"}])
-def test_hdr_is_told_of_all_events_between_frames(
+def test_hdr_is_told_at_key_frames_of_all_events_between_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grid: dict[str, Any], related: bool
 ) -> None:
     """However few frames are made, and where they are held because pictures have nothing in common."""
     shown = moving(7) if related else list(np.random.default_rng(0).integers(0, 256, (7, *SIZE[::-1], 3), np.uint8))
     source, events = images(tmp_path / "in", shown), drawn(us=6 * STEP_US)
     path = written(tmp_path / "a.npz", events)
-    told, forward = [], Hdr.forward
+    told, begun, forward, processed = [], [], Hdr.forward, After.frames
+
+    def noted(after: After, work: Any) -> Any:
+        begun.append(len(told))  # (its first picture is the key frame's)
+        yield from processed(after, work)
+
+    monkeypatch.setattr(After, "frames", noted)
 
     def heard(network: Hdr, frame: torch.Tensor, second: torch.Tensor, state: Any = None) -> Any:
         told.append(second.double().sum((0, 1)))
@@ -195,12 +202,31 @@ def test_hdr_is_told_of_all_events_between_frames(
     save(tmp_path / "hdr.safetensors", "hdr", make("hdr"))
     given = {"method": "flow", "hdr": tmp_path / "hdr.safetensors"}
     options = Options(events=path, contrast=(0.15, 0.3))
-    times = [frame.instant.t_us for frame in frames(source, **given, **grid, options=options)]
+    for _ in frames(source, **given, **grid, options=options):
+        pass
     wanted = np.zeros(SIZE[::-1])
-    inside = (events.t > times[0]) & (events.t <= times[-1])
-    np.add.at(wanted, (events.y[inside], events.x[inside]), np.where(events.p[inside], 0.3, -0.15) / 0.45)
-    assert times[-1] > 5 * STEP_US
-    np.testing.assert_allclose(torch.stack(told).sum(0), wanted, atol=1e-5)
+    np.add.at(wanted, (events.y, events.x), np.where(events.p, 0.3, -0.15) / 0.45)
+    assert len(begun) == 7
+    np.testing.assert_allclose(torch.stack([told[k] for k in begun]).sum(0), wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("second", ["events", "frames"])
+def test_hdr_makes_the_same_of_key_frames_however_many_are_between(tmp_path: Path, second: str) -> None:
+    network = make("hdr", second=second)
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    source, events = images(tmp_path / "in", moving(5)), written(tmp_path / "a.npz", drawn(us=4 * STEP_US))
+    made = {}
+    for multiple in (1, 2, 5):
+        options = Options(events=events, contrast=(0.15, 0.3))
+        for frame in frames(
+            source, multiple=multiple, method="bridge", hdr=tmp_path / "hdr.safetensors", options=options
+        ):
+            made[multiple, frame.instant.t_us] = frame.codes
+    for multiple in (2, 5):
+        for k in range(5):
+            np.testing.assert_allclose(made[multiple, STEP_US * k], made[1, STEP_US * k], atol=1e-4)  # (other sums)
+    assert not np.array_equal(made[2, STEP_US], made[2, 0])
 
 
 def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tmp_path: Path) -> None:

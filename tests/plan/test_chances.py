@@ -9,7 +9,7 @@ import pytest
 
 from vid2ev.plan.measure import scene_of
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream.chances import surely
+from vid2ev.stream.chances import _pixels, surely
 from vid2ev.stream.scene import Scene
 
 from .clips import clip
@@ -68,3 +68,16 @@ def test_the_fewer_pixels_may_send_something_the_higher_is_the_bound(whole: bool
     seen = scene(np.array([0, 400, 300, 200, *[10] * 30]))
     bounds = [surely(seen, 0.002, share, whole=whole) for share in np.geomspace(1.0, 1e-9, 40)]
     assert bounds == sorted(bounds) and bounds[-1] > 1e6
+
+
+def test_busy_pixels_do_not_take_memory_for_each_of_their_events() -> None:
+    """Nor does that they are counted to three digits make a bound smaller, or much larger."""
+    many = np.zeros(3_000_000)
+    many[[10, 1_000, 50_001, 2_999_999]] = 4, 30, 20, 2
+    assert len(_pixels(scene(many))[0]) == 4
+    crowded = np.ones(100_000)
+    most, sent = _pixels(scene(crowded))
+    assert len(most) < 6000 and sent.sum() == pytest.approx(np.arange(100_000).sum())
+    exact = np.bincount(np.searchsorted(most, np.arange(100_000) + 2), np.arange(100_000), len(most))
+    np.testing.assert_allclose(sent, exact)
+    assert (np.diff(most) <= np.maximum(1, most[1:] / 300)).all()

@@ -370,3 +370,76 @@ def test_where_nothing_moves_the_photoreceptors_noise_sends_events() -> None:
     held(spec, (32, 24), frames, "photoreceptor_noise", "mismatch", "crossing_noise", "refractory", "cold", "delay")
     plan = plan_of(scene_of(spec, (32, 24), frames), spec, 0.5)
     assert not {"crossing_noise", "refractory"} & {*plan.gone}
+
+
+def scrolling(px_s: float, fps: float, seconds: float, size: tuple[int, int] = (48, 32)) -> list[Frame]:
+    """Blocks of 4 pixels, bright and dark as 19 to 1, that scroll to the left."""
+    blocks = np.random.default_rng(5).random((size[1] // 4, 150)) < 0.5
+    wide = 0.05 + 0.9 * np.kron(blocks, np.ones((4, 4)))
+    frames = []
+    for k in range(round(seconds * fps) + 1):
+        whole, part = divmod(px_s * k / fps, 1)
+        shown = [wide[:, int(whole) + by : int(whole) + by + size[0]] for by in (0, 1)]
+        light = (1 - part) * shown[0] + part * shown[1]
+        frames.append(Frame(light.astype(np.float32), round(1e9 * k / fps)))
+    return frames
+
+
+@pytest.mark.parametrize("theta", [0.15, 0.05, 0.02])
+@pytest.mark.parametrize("mismatch", [0.0, 0.3])
+@pytest.mark.parametrize(("px_s", "fps"), [(120, 120), (3000, 6000)])
+def test_where_signals_are_several_levels_apart_their_number_counts_squared(
+    theta: float, mismatch: float, px_s: float, fps: float
+) -> None:
+    frames = scrolling(px_s, fps, min(0.4, 240 / fps))
+    spec = DvsSpec(
+        threshold_on=theta, threshold_off=theta, mismatch=mismatch * theta, crossing_noise=0.0, refractory_us=0
+    )
+    held(spec, (48, 32), frames, "follower", "photoreceptor", *["mismatch"] * (mismatch > 0))
+
+
+@pytest.mark.parametrize("dt_us", [30, 100, 300, 1000])
+@pytest.mark.parametrize("taus_us", [(300.0, 100.0), (0.0, 18.0), (40.0, 0.0)])
+def test_shots_that_end_before_the_poles_have_answered(dt_us: int, taus_us: tuple[float, float]) -> None:
+    """Where a delay in their place lets nothing through."""
+    draw = np.random.default_rng(3)
+    lights = [draw.uniform(0.1, 1.0, (24, 32)).astype(np.float32) for _ in range(2)]
+    frames = [Frame(light, 1000 * dt_us * k) for k, light in enumerate(lights)]
+    spec = DvsSpec(photoreceptor_tau_us=taus_us[0], follower_tau_us=taus_us[1], refractory_us=0)
+    held(spec, (32, 24), frames, *["follower"] * (taus_us[1] > 0), *["photoreceptor"] * (taus_us[0] > 0))
+
+
+@pytest.mark.parametrize(("rounding", "border_us"), [("causal", 0), ("nearest", 500)])
+def test_at_a_fixed_rate_what_comes_a_little_later_may_come_a_period_later(rounding: str, border_us: int) -> None:
+    """Light that moves for a tenth of each period of the readout, and ends just before the border of event frames."""
+    texture, level = np.random.default_rng(1).uniform(0.3, 1, (24, 32)), 0.0
+    frames = [Frame(texture.astype(np.float32), 0)]
+    for k in range(1, 600):
+        begin, end = 1000 * k + border_us - 110, 1000 * k + border_us - 10
+        frames.append(Frame((texture * np.exp(level)).astype(np.float32), 1000 * begin))
+        level += 0.002 if k // 300 % 2 == 0 else -0.002
+        frames.append(Frame((texture * np.exp(level)).astype(np.float32), 1000 * end))
+    spec = DvsSpec(
+        frame_rate_hz=1000, rounding=rounding, photoreceptor_tau_us=0.0, follower_tau_us=10.0, refractory_us=0
+    )
+    held(spec, (32, 24), frames, "follower")
+
+
+@pytest.mark.parametrize("thresholds", [(0.03, 0.03), (0.1, 0.03), (0.15, 0.15)])
+def test_of_thresholds_as_wide_as_they_are_spread_nothing_is_said_by_levels(thresholds: tuple[float, float]) -> None:
+    draw = np.random.default_rng(8)
+    texture = np.random.default_rng(7).uniform(0.02, 1, (36, 48))
+    codes = [np.clip(np.rint(255 * (texture + draw.normal(0, 0.01, texture.shape))), 0, 255) for _ in range(80)]
+    frames = [Frame((each / 255).astype(np.float32), 12_000_000 * k) for k, each in enumerate(codes)]
+    spec = DvsSpec(
+        threshold_on=thresholds[0], threshold_off=thresholds[1], mismatch=0.7 * thresholds[1],
+        crossing_noise=0.7 * thresholds[1], refractory_us=0,
+    )  # fmt: skip
+    held(spec, (48, 36), frames, "follower", "photoreceptor", "mismatch", "crossing_noise")
+
+
+def test_a_change_of_every_event_is_its_mean_however_few_there_are() -> None:
+    size, frames = clip("edge")
+    seen = scene_of(POLES, size, frames)
+    for mean in (1e-9, 1e-6, 1e-3, 0.5):
+        assert surely(seen, mean) >= mean

@@ -47,7 +47,8 @@ from vid2ev.physics.log_curve import light_per_nat_32, log_level_32
 
 F = np.float32
 LEAST, MOST, STEEPEST = range(3)  # of a block; the rest are sums of `play`
-# A turn from slope r to -r' falls short by tau r' ln(1 + r/r') <= tau sqrt(r r'), where the reach is tau/e.
+# A turn from slope r to -r' falls short by tau r' ln(1 + r/r') <= tau sqrt(r r'), where the reach is tau/e; and signals
+# are tau r exp(-t / tau) apart a time t after a bend.
 ROUNDED = F(2.7182818)
 
 
@@ -184,7 +185,8 @@ def look(own, scratch, flagged, halves, n, curve, num):
         bend, bends = abs(slope - slope0) * per, own[BENDS * PITCH + i]
         turned = min(bend, ROUNDED * np.sqrt(abs(slope * slope0)) * per)
         smooth, play, half = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i], halves[i]
-        own[LIGHT * PITCH + i], own[SLOPE * PITCH + i], own[BENDS * PITCH + i] = seen, slope, (bends + bend) * keep
+        own[LIGHT * PITCH + i], own[SLOPE * PITCH + i] = seen, slope
+        own[BENDS * PITCH + i] = (bends + ROUNDED * bend) * keep
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
         own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend
         scratch[UNBENT + i] = abs(slope0) * per

@@ -26,9 +26,11 @@ LANES = 16 * PITCH
 TRAVELLED, AT_LEAST, PUSHED_S, TURNED, BEND, TURN_BEND, OFF_PEAKS, DENSE = range(3, 11)
 FIGURES = 11
 # How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
-BY_SLOPE, BY_TURNS, BY_BENDS, BY_PEAKS, BY_LIGHT, BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS = range(8)
-BY_ALL, BY_JUMPS = 5, 8  # how many there are, without and with memories that jump
+BY_SLOPE, BY_TURNS, BY_BENDS, BY_PEAKS, BY_LIGHT, BY_FELT, BY_FELT_AT_TURNS = range(7)
+BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS = range(7, 10)
+BY_ALL, BY_JUMPS = 7, 10  # how many there are, without and with memories that jump
 QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
+OF_ONE = F(0.36787945)  # 1/e
 PER_MS2 = F(1e-6)  # of 1/s^2, so that sums are within the quarters
 
 
@@ -42,6 +44,14 @@ def left_of(dt_s, tau_s):
 def first_tau(light, num):
     """Time constant of the first pole at a light [s], where it depends on that."""
     return F(num.tau1_s) * (F(1.0) + F(num.dark)) / (light + F(num.dark))
+
+
+@inner
+def reach_behind(tau1_s, tau2_s):
+    """E (D - E D)+ of the delay D of two poles at most, or of one [s]."""
+    if tau1_s * tau2_s > F(0.0):
+        return F(0.5) * np.sqrt(tau1_s * tau1_s + tau2_s * tau2_s)
+    return max(tau1_s, tau2_s) * OF_ONE
 
 
 @inner

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernels.layout import PITCH
+from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measured import (
     AT_HALF,
     AT_LEAST,
@@ -22,9 +22,12 @@ from vid2ev.kernels.measured import (
     AT_SMOOTH,
     BEFORE,
     BEND,
+    BENDS,
     BENT,
     BUNCHED,
     BY_BENDS,
+    BY_FELT,
+    BY_FELT_AT_TURNS,
     BY_LIGHT,
     BY_PEAKS,
     BY_SLOPE,
@@ -46,6 +49,7 @@ from vid2ev.kernels.measured import (
     OFF_PEAKS,
     PEAKS,
     PER_MS2,
+    PLANES,
     PLAY,
     PUSHED,
     PUSHED_S,
@@ -67,6 +71,7 @@ from vid2ev.kernels.measured import (
     WIDE,
     first_tau,
     note,
+    reach_behind,
 )
 from vid2ev.kernels.pace import STEP_NAT, paced, push
 from vid2ev.physics.peaks import taken
@@ -98,14 +103,22 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
         way = own[WAY * PITCH + i]
         bend = weight * (scratch[FELT + i] if way == F(0.0) else scratch[BENT + i])
         bends += bend
+        reach = reach_of(i, num, own, scratch)
+        felt = scratch[FELT + i] * reach / (half + half)
+        if felt > F(1.0):
+            note(spread, BY_FELT, felt, weight * scratch[FELT + i])
         if len(num.tracks):
             own[STIRS * PITCH + i] += PER_MS2 * bend * scratch[STEEPER + i] / (half + half)
         if way != F(0.0) and pushed != way:
             turned = weight * scratch[IF_TURNED + i]
             turns += weight
-            lower = weight * lowered(i, num, own, scratch)
+            nat = lowered(i, num, own, scratch)
+            lower = weight * nat
             turn_bends += turned
-            off_peaks += lower
+            off_peaks += lower * (F(1.0) + np.floor(nat / (half + half)))  # (levels between, squared)
+            felt = scratch[IF_TURNED + i] * reach / (half + half)
+            if felt > F(1.0):
+                note(spread, BY_FELT_AT_TURNS, felt, turned)
             own[TURNS * PITCH + i] += weight
             own[TURNED_BENDS * PITCH + i] += turned
             own[PEAKS * PITCH + i] += lower
@@ -142,6 +155,37 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     tile[TURN_BEND] += turn_bends
     tile[OFF_PEAKS] += off_peaks
     tile[DENSE] += dense
+
+
+@inner
+def reach_of(i, num, own, scratch):
+    """How far behind their mean delay the poles may be of a slope that has bent [s]: `photoreceptor_omission`."""
+    tau1 = F(num.tau1_s)
+    if len(num.by_light):
+        tau1 = first_tau(min(own[LIGHT * PITCH + i], scratch[LIT + i]), num)
+    return reach_behind(tau1, F(num.tau2_s))
+
+
+@compiled
+def end_measure(num, state, tiles, spread):
+    """The end of a shot is a turn of what is pushed: poles have not come as far by then as they would, and a delay in
+    their place lets nothing more through."""
+    mean, tau1, tau2 = F(num.half), F(num.tau1_s), F(num.tau2_s)
+    for k in range(len(tiles)):
+        own = state[k * PLANES * PITCH : (k + 1) * PLANES * PITCH]
+        for i in range(BLOCK):
+            if own[WAY * PITCH + i] == F(0.0):
+                continue
+            width, bends = F(2.0) * num.halves[i], own[BENDS * PITCH + i]
+            if len(num.by_light):
+                tau1 = first_tau(own[LIGHT * PITCH + i], num)
+            weight, late = (mean + mean) / width, bends * reach_behind(F(0.0), tau2)
+            felt = bends * reach_behind(tau1, tau2) / width
+            tiles[k, TURNED] += weight
+            tiles[k, TURN_BEND] += weight * bends
+            tiles[k, OFF_PEAKS] += weight * late * (F(1.0) + np.floor(late / width))
+            if felt > F(1.0):
+                note(spread[k], BY_FELT_AT_TURNS, felt, weight * bends)
 
 
 @inner

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.physics.omission import late_noise
+from vid2ev.physics.omission import late_noise, readout_shifts
 from vid2ev.stream.bounds import unlike
 from vid2ev.stream.chances import surely
 from vid2ev.stream.events import Events
@@ -36,7 +36,7 @@ class Delay(BaseModel, frozen=True, extra="forbid"):
 
 def omission(scene: Scene, spec: Any) -> Omission:
     """The delay: that of a pair of events costs no more than its share of tau, and those near it as much again."""
-    share = spec.delay_us * 1e-6 / DISTANCE_TAU_S
+    share = spec.delay_us * 1e-6 / DISTANCE_TAU_S * readout_shifts(scene, spec)
     distance = surely(scene, min(1.0, share) * unlike(scene)) + late_noise(scene, spec, spec.delay_us)
     why = "all times are later; never left out"
     return Omission(distance, "99.9 % bound", f"{spec.delay_us:g} us", why)

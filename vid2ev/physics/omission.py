@@ -22,6 +22,8 @@ from vid2ev.stream.bounds import off_by, unlike
 from vid2ev.stream.chances import at_least, at_most, surely
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 
+SPREAD_MOST = 1 / 3  # of a threshold: up to there levels lie as evenly as bounds take them to
+
 
 def tracks(spec: Any) -> bool:
     """Whether the memory jumps to the signal after each event."""
@@ -48,6 +50,8 @@ def obstacle(spec: Any) -> str:
     """Why the bounds by levels do not hold for a sensor; "" where they do."""
     if spec.photoreceptor_noise > 0:
         return "noise that trembles sends events wherever levels are, and others if these move"
+    if spread_of(spec) > SPREAD_MOST * min(spec.threshold_on, spec.threshold_off):
+        return "thresholds are spread so far that levels crowd where light trembles"
     if not spec.random_phase and not (spec.mismatch > 0 or spec.crossing_noise > 0):
         return "all pixels start in step, so nothing is known of how far their levels are"
     return ""
@@ -88,6 +92,12 @@ def tau_at(light: np.ndarray, spec: Any) -> np.ndarray:
     if spec.bandwidth == "constant":
         return constant
     return constant * (1.0 + spec.bandwidth_dark) / (light + spec.bandwidth_dark)
+
+
+def levels_between(nat: np.ndarray, spec: Any) -> np.ndarray:
+    """How many levels are between two signals so far apart at most, for each that is there on average."""
+    often = 1.0 / spread_thresholds(min(spec.threshold_on, spec.threshold_off), spec, STEPS)
+    return (1.0 + np.floor(np.multiply.outer(nat, often))) @ often / often.sum()
 
 
 def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -146,6 +156,14 @@ def unsent(scene: Scene, spec: Any) -> float:
     slopes, seen = slopes_of(scene, spec), np.flatnonzero(travel)
     chances = [soon(slopes[k] * blind_s + leaked, spec)[0] for k in seen]
     return min(float(np.dot(chances, travel[seen])) / float(travel.sum()), most_too_soon(scene, blind_s, spec))
+
+
+def readout_shifts(scene: Scene, spec: Any) -> float:
+    """By how many times more than by itself a shift in time counts at a fixed rate, at most: a signal that goes in an
+    interval of the light meets its levels evenly in that time, and of so many event frames each has its border."""
+    if spec.frame_rate_hz == 0:
+        return 1.0
+    return 1.0 + 1.0 / (spec.frame_rate_hz * scene.shortest_s)
 
 
 def _missing(scene: Scene, spec: Any) -> float:
@@ -247,6 +265,7 @@ def omitted(
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
         sent = 1.0 - unsent(scene, spec)
+        mean *= readout_shifts(scene, spec)
         near = (mean + (1.0 - sent) * unlike(scene, lag_s)) * crowded
         per_event = scene.events / max(sent * max(scene.events - _missing(scene, spec), 0.0) + noise, 1e-9)
         if near * per_event < distance:

@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vid2ev.physics.log_curve import curve_of
-from vid2ev.physics.omission import echoes, late_noise, omitted, tau_at, taus_of, tracks
+from vid2ev.physics.omission import echoes, late_noise, levels_between, omitted, tau_at, taus_of, tracks
 from vid2ev.physics.slopes import slopes_at
-from vid2ev.stream.bounds import delayed, later
+from vid2ev.stream.bounds import PIXELS_DIFFER, delayed, later, steeper
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 
 FOLLOWER_OFF: dict[str, Any] = {"follower_tau_us": 0.0}
@@ -33,12 +33,25 @@ BOTH_OFF: dict[str, Any] = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0,
 
 def omission_of_follower(scene: Scene, spec: Any) -> Omission:
     """The second pole alone, replaced by its mean delay."""
-    square_s2 = (spec.follower_tau_us * 1e-6) ** 2
-    variance_s2 = np.full(len(scene.travel), square_s2)
-    at_turns = scene.off_peaks, scene.by_peaks
-    return _delay_instead(
-        scene, spec, spec.follower_tau_us, variance_s2, at_turns, 0.0, FOLLOWER_OFF, stir_s2=square_s2
+    tau2_s = spec.follower_tau_us * 1e-6
+    fastest_s = 1e-6 * float(taus_of(scene, spec)[0].min())
+    share = float(_reach_s(0.0, tau2_s) / _reach_s(fastest_s, tau2_s))
+    left_out = LeftOut(
+        spec.follower_tau_us,
+        np.full(len(scene.travel), tau2_s**2),
+        scene.off_peaks,
+        scene.by_peaks,
+        0.5 * tau2_s**2 * steeper(scene.by_felt, share),
+        0.0,  # (of peaks that is counted)
+        tau2_s**2,
     )
+    return _delay_instead(scene, spec, left_out, 0.0, FOLLOWER_OFF)
+
+
+def _reach_s(tau1_s: Any, tau2_s: float) -> Any:
+    """E (D - E D)+ of two poles at most, or of one."""
+    slower_s = np.maximum(tau1_s, tau2_s)
+    return np.where(np.minimum(tau1_s, tau2_s) > 0.0, 0.5 * np.hypot(tau1_s, tau2_s), slower_s / math.e)
 
 
 def _rounded_off(scene: Scene, reach_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -53,12 +66,19 @@ def omission(scene: Scene, spec: Any) -> Omission:
     _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
     tau2_s = spec.follower_tau_us * 1e-6
     variance_s2 = slowest_s**2 + tau2_s**2
-    reach_s = 0.5 * np.sqrt(variance_s2) if tau2_s else slowest_s / math.e
+    reach_s = _reach_s(slowest_s, tau2_s)
     usual_us, late_us = delay_at_events(scene, spec)
     late_us += _changing_us(scene, spec)
     stir_s2 = float(variance_s2.max()) + _left_by_light(spec, slowest_s)
-    poles_us, at_turns = usual_us + spec.follower_tau_us, _rounded_off(scene, reach_s)
-    return _delay_instead(scene, spec, poles_us, variance_s2, at_turns, late_us, BOTH_OFF, stir_s2=stir_s2)
+    left_out = LeftOut(
+        usual_us + spec.follower_tau_us,
+        variance_s2,
+        *_rounded_off(scene, reach_s),
+        0.5 * float(variance_s2.max()) * steeper(scene.by_felt, 1.0),
+        float(reach_s.max()) * steeper(scene.by_felt_at_turns, 1.0),
+        stir_s2,
+    )
+    return _delay_instead(scene, spec, left_out, late_us, BOTH_OFF)
 
 
 def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
@@ -98,8 +118,15 @@ def _late(scene: Scene, spec: Any, late_us: float) -> float:
     _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
     stir_s2 = _left_by_light(spec, slowest_s)
     frozen_nat, after_turns = _rounded_off(scene, slowest_s / math.e)
+    frozen_nat = frozen_nat * levels_between(2.0 * scene.slope_max * slowest_s / math.e, spec)
     rounded = delayed(scene, 0.0 * slowest_s, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
-    return rounded + later(scene, 1e-6 * late_us)
+    return rounded + _at_other_times(scene, spec, late_us)
+
+
+def _at_other_times(scene: Scene, spec: Any, late_us: float) -> float:
+    """Bound on the mean distance where events are early or late, by so much on average."""
+    apart_nat = PIXELS_DIFFER * 1e-6 * late_us * scene.slope_max
+    return later(scene, 1e-6 * late_us, levels_between(apart_nat, spec))
 
 
 def lag_s(scene: Scene, spec: Any) -> np.ndarray:
@@ -124,27 +151,42 @@ def delay_at_events(scene: Scene, spec: Any, chosen_us: float | None = None) -> 
     return chosen_us, float(np.dot(np.abs(taus - chosen_us), travel)) / max(float(travel.sum()), 1e-300)
 
 
-def _delay_instead(
-    scene: Scene,
-    spec: Any,
-    poles_us: float,
-    variance_s2: np.ndarray,
-    at_turns: tuple[np.ndarray, np.ndarray],
-    late_us: float,
-    off: dict[str, Any],
-    *,
-    stir_s2: float,
-) -> Omission:
-    spread = f"{math.sqrt(variance_s2.max()) * 1e6:.3g} us of spread"
+class LeftOut(NamedTuple):
+    """Poles that are left out.
+
+    mean_us, variance_s2         of their delay, the variance [tiles]
+    frozen_nat, after_turns      what signals differ by at turns, and the travel after that (`delayed`)
+    steep_nat_s, steep_nat       likewise
+    stir_s2                      what a bend leaves in memories
+    """
+
+    mean_us: float
+    variance_s2: np.ndarray
+    frozen_nat: np.ndarray
+    after_turns: np.ndarray
+    steep_nat_s: float
+    steep_nat: float
+    stir_s2: float
+
+
+def _delay_instead(scene: Scene, spec: Any, poles: LeftOut, late_us: float, off: dict[str, Any]) -> Omission:
+    spread = f"{math.sqrt(poles.variance_s2.max()) * 1e6:.3g} us of spread"
     if spec.photoreceptor_noise > 0:
         return Omission(None, "no bound yet", spread, "photoreceptor noise needs both poles")
     if scene.still:
         return Omission(0.0, "99.9 % bound", spread, "nothing moves")
-    delay_us = float(f"{spec.delay_us + poles_us:.6g}")
+    delay_us = float(f"{spec.delay_us + poles.mean_us:.6g}")
     rounded_us = abs(delay_us - math.floor(delay_us + 0.5))
-    frozen_nat, after_turns = at_turns
-    mean = delayed(scene, variance_s2, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
-    mean += later(scene, 1e-6 * late_us) + 1e-6 * rounded_us / DISTANCE_TAU_S
+    mean = delayed(
+        scene,
+        poles.variance_s2,
+        poles.frozen_nat,
+        echoes(spec) * poles.after_turns,
+        steep_nat_s=poles.steep_nat_s,
+        steep_nat=poles.steep_nat,
+        stir_s2=poles.stir_s2,
+    )
+    mean += _at_other_times(scene, spec, late_us) + 1e-6 * rounded_us / DISTANCE_TAU_S
     both = " of both poles" if off is BOTH_OFF and spec.follower_tau_us else ""
     why = f"a delay of {delay_us:g} us in place{both}; what is left are rounded bends"
     if late_us > 0.0:
@@ -152,4 +194,4 @@ def _delay_instead(
     if spec.timing != "response":
         mean, why = math.inf, f"timing {spec.timing} takes the signal at the frames"
     said = omitted(scene, spec, mean, spread, why, (*off.items(), ("delay_us", delay_us)), lag_s=lag_s(scene, spec))
-    return replace(said, distance=(said.distance or 0.0) + late_noise(scene, spec, poles_us))
+    return replace(said, distance=(said.distance or 0.0) + late_noise(scene, spec, poles.mean_us))

@@ -12,7 +12,18 @@ from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
 from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
-from vid2ev.kernels.measured import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, TRAVEL
+from vid2ev.kernels.measured import (
+    BY_ALL,
+    BY_JUMPS,
+    FIGURES,
+    LANES,
+    LIGHT,
+    PLANES,
+    QUARTERS,
+    SCRATCH,
+    TRAVEL,
+)
+from vid2ev.kernels.play import end_measure
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import tracks
@@ -60,9 +71,10 @@ class Measure:
         self._tau1_s, self._tau2_s = spec.photoreceptor_tau_us * 1e-6, spec.follower_tau_us * 1e-6
         self._by_light = spec.bandwidth == "light" and self._tau1_s > 0
         self._blind_s = spec.refractory_us * 1e-6 if tracks(spec) else 0.0
-        self._frames, self._ns = 0, 0
+        self._frames, self._ns, self._shortest_ns = 0, 0, math.inf
         self._t_ns: int | None = None
         self._dt_s = math.inf
+        self._pace: Pace | None = None  # of the last interval of a shot
         self._last: np.ndarray | None = None  # the light of the last frame, as it was given
 
     def see(self, frame: Frame) -> None:
@@ -74,34 +86,43 @@ class Measure:
             raise UsageError(f"frame time {frame.t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames")
         light = np.ascontiguousarray(frame.light, np.float32).reshape(-1)
         if self._t_ns is None or frame.cut:
+            self._end(self._found.tiles, self._found.spread)
             below = self._wide if self.spec.random_phase else 0.0
             settle_measure(light, self._shade, self._curve, self._halves, below, self._found)
-            self._dt_s = math.inf
+            self._dt_s, self._pace = math.inf, None
         else:
             self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
+            self._shortest_ns = min(self._shortest_ns, frame.t_ns - self._t_ns)
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
         self._frames, self._t_ns, self._last = self._frames + 1, frame.t_ns, frame.light
 
     def scene(self) -> Scene:
         """What was seen so far."""
-        travel = self._plane(TRAVEL)
+        travel, tiles, spread = self._plane(TRAVEL), self._found.tiles.copy(), self._found.spread.copy()
+        self._end(tiles, spread)
         bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
         return Scene(
             size=self.size,
             frames=self._frames,
             seconds=self._ns * 1e-9,
+            shortest_s=self._shortest_ns * 1e-9,
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
             by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
-            **dict(zip(SPREAD, _spread(self._found.spread, len(SPREAD)), strict=True)),
+            **dict(zip(SPREAD, _spread(spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
-            **dict(zip(OF_TILES, self._found.tiles.T.copy(), strict=True)),
+            **dict(zip(OF_TILES, tiles.T.copy(), strict=True)),
             **dict(zip(OF_BARE, bare.tiles.T.copy(), strict=True)),
             by_bare=_spread(bare.spread, 1)[0],
         )
+
+    def _end(self, tiles: np.ndarray, spread: np.ndarray) -> None:
+        """Add the end of a shot to the sums."""
+        if self._pace is not None:
+            end_measure(self._pace, self._found.state, tiles, spread)
 
     def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
@@ -130,7 +151,7 @@ class Measure:
                 first, last, light, told, self._shade, self._curve, pace, self._found, self._work[k]
             )
         )
-        self._dt_s = dt_s
+        self._dt_s, self._pace = dt_s, pace
 
     def _plane(self, plane: int) -> np.ndarray:
         """A plane of the state [tiles, PITCH]; beyond the pixels there is nothing."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vid2ev.stream.scene import DISTANCE_TAU_S, Scene
+from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Scene
 
 PIXELS_DIFFER = 4.0  # how much more than the mean of its tile a pixel's signals may differ for, where that counts
 
@@ -33,30 +33,51 @@ def _sides(share: np.ndarray) -> np.ndarray:
 
 
 def delayed(
-    scene: Scene, variance_s2: np.ndarray, frozen_nat: np.ndarray, after_turns: np.ndarray, *, stir_s2: float = 0.0
+    scene: Scene,
+    variance_s2: np.ndarray,
+    frozen_nat: np.ndarray,
+    after_turns: np.ndarray,
+    *,
+    steep_nat_s: float = 0.0,
+    steep_nat: float = 0.0,
+    stir_s2: float = 0.0,
 ) -> float:
     """Bound on the mean distance where a low-pass gives way to its mean delay.
 
     A bend of the slope by r is rounded off: the area between the two signals is r variance / 2.  At turns they differ
     by frozen_nat, the sum of each tile; after_turns [2, quarters] is the travel that counts by the sum of that before
-    it, none where recordings that disagree go on alike.  Where memories jump to the signal, a bend leaves up to
-    r slope stir_s2 / theta in them (`Scene`).
+    it, none where recordings that disagree go on alike.  Where several levels are between the two signals, their number
+    counts squared: steep_nat_s and steep_nat are what that adds to all areas and to what is frozen (`steeper`).  Where
+    memories jump to the signal, a bend leaves up to r slope stir_s2 / theta in them (`Scene`).
     """
     if scene.still:
         return 0.0
     area = 0.5 * variance_s2 * scene.bend
     often = (area / np.maximum(scene.pushed_s, 1e-30) + frozen_nat / np.maximum(scene.turns, 1.0)) / scene.threshold
     change = _sides(PIXELS_DIFFER * often) * (area / DISTANCE_TAU_S + frozen_nat)
-    mean = float(change.sum() / scene.travel.sum()) + _stirred(scene, stir_s2)
+    steep = 2.0 * (steep_nat_s / DISTANCE_TAU_S + steep_nat)
+    mean = (float(change.sum()) + steep) / float(scene.travel.sum()) + _stirred(scene, stir_s2)
     return mean + _echo(scene, after_turns, 1.0)
 
 
-def later(scene: Scene, late_s: float) -> float:
-    """Bound on the mean distance where events are early or late, by so much on average."""
+def steeper(felt: np.ndarray, share: float) -> float:
+    """What it adds to a sum of bends [nat/s] that there are several levels between two signals, where these are a share
+    as far apart as `Scene.by_felt` or `by_felt_at_turns` says.
+
+    Of x levels on average, at a phase that is even, there are floor(x) or one more: squared x + x^2 - x + 1/4 at most.
+    """
+    levels = share * QUARTER_EDGES[1:]
+    return float(np.dot(felt[0], np.where(levels > 1.0, np.minimum(levels - 0.75, np.floor(levels)), 0.0)))
+
+
+def later(scene: Scene, late_s: float, levels: np.ndarray) -> float:
+    """Bound on the mean distance where events are early or late, by so much on average; so many levels are between the
+    two signals in a tile, for each that is on average."""
     if scene.still:
         return 0.0
     often = late_s * float(scene.travel.sum()) / max(float(scene.pushed_s.sum()) * scene.threshold, 1e-30)
-    return float(_sides(np.array(PIXELS_DIFFER * often))) * late_s / DISTANCE_TAU_S
+    many = min(float(np.dot(levels, scene.travel) / scene.travel.sum()), scene.bunched)
+    return float(_sides(np.array(PIXELS_DIFFER * often))) * many * late_s / DISTANCE_TAU_S
 
 
 def _stirred(scene: Scene, stir_s2: float) -> float:

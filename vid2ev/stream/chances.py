@@ -28,6 +28,7 @@ from vid2ev.stream.scene import Scene
 RARE = math.log(1000)  # a chance of 1 in 1000
 CELLS = 1 << 14
 WEIGHED = 20.0
+FEW = 512  # events of a pixel: more are counted to a share of this
 OFTEN = 0.4  # a pixel may change with a chance of this at most for the distribution to be looked at
 
 
@@ -38,13 +39,23 @@ def surely(scene: Scene, mean: float, share: float = 1.0, *, whole: bool = False
         return mean
     if share <= 0.0:
         return math.inf
-    most = np.arange(len(scene.by_pixel)) + 2.0  # events
-    means = mean * scene.by_pixel / scene.threshold  # [events]
+    most, sent = _pixels(scene)
+    means = mean * sent
     events, chance = _chernoff(most, share * means, whole), 2.0 * mean
     if chance < OFTEN and not whole:
         of_all = _chernoff(most, means, whole)  # (of fewer pixels no more change)
         events = min(events, _counted(most, means * (-math.log1p(-chance) / chance), of_all), of_all)
-    return events / (share * scene.events)
+    return max(events / (share * scene.events), mean)  # (what changes every event a little is its mean)
+
+
+def _pixels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """How many events pixels send at most, and how many all those together that send so many: of busy ones to three
+    digits, so that there are few."""
+    numbers = np.flatnonzero(scene.by_pixel)
+    of = np.where(numbers < FEW, numbers, FEW + np.ceil(FEW * np.log2(np.maximum(numbers, FEW) / FEW)).astype(np.int64))
+    _, first, group = np.unique(of[::-1], return_index=True, return_inverse=True)
+    most = numbers[::-1][first] + 2.0
+    return most, np.bincount(group, scene.by_pixel[numbers][::-1]) / scene.threshold
 
 
 def _chernoff(most: np.ndarray, means: np.ndarray, whole: bool) -> float:

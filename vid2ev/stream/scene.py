@@ -18,6 +18,8 @@ time A and turn C times, and signals that differ by e,
 
     distance <= (1 + min(1, 2 e/theta)) (e A / tau + e C) / (n theta)
 
+More where they are several levels apart: x on average are x + x^2 - x + 1/4 squared, at most.
+
 Where thresholds differ from pixel to pixel or crossing to crossing, two recordings of a pixel that disagree at a turn
 go on with other levels: each event after it is up to theta / |dy/dt| early or late (`echo`).  A signal that stays
 within theta moves the pixels whose thresholds are lower, and these send the more, and more densely.  So each pixel is
@@ -82,6 +84,8 @@ SPREAD = (
     "by_bends",
     "by_peaks",
     "by_light",
+    "by_felt",
+    "by_felt_at_turns",
     "by_stirs",
     "by_stirs_before",
     "by_stirs_at_turns",
@@ -118,6 +122,7 @@ class Scene:
     """What a sensor sees of a clip: extremes and sums over all pixels, by tiles of 2048 pixels in row-major order.
 
     size, frames, seconds     width and height, and how much was measured; seconds without the intervals before cuts
+    shortest_s                the shortest of the intervals; infinite without any
     threshold                 that events are counted with [nat]: the lesser mean
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
@@ -125,14 +130,16 @@ class Scene:
     travel_at_least           [tiles] that of the play as wide as levels may be apart [nat]
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
-    bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns [nat/s]
-    off_peaks                 [tiles] what the second pole takes from peaks [nat]
+    bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns and ends [nat/s]
+    off_peaks                 [tiles] what the second pole takes from peaks, as often as there are levels in it [nat]
     dense                     [tiles] travel x travel of the same pixel within tau [nat^2]
     by_slope                  [2, quarters of octaves] travel, and travel x slope, by the slope there [nat/s]
     by_turns, by_bends, by_peaks   the same by the number of turns before it, by the sum of the bends at these, and of
                               what the second pole takes there [nat]; of travel that which counts if levels are no
                               longer the same
     by_light                  the same by the light there
+    by_felt, by_felt_at_turns   of bends that bring signals behind the poles and delayed ones more than a threshold
+                              apart, and of such turns: the sums of bends felt there [nat/s] by how many thresholds
     by_stirs ...              of memories that jump to the signal, the same by what bends have left in them, the sum of
                               bend x slope / threshold [nat/ms^2]: by it times the time that a nat takes; of the travel
                               that counts by its sum at turns; and of the turns themselves
@@ -149,6 +156,7 @@ class Scene:
     size: tuple[int, int]
     frames: int
     seconds: float
+    shortest_s: float
     threshold: float
     light_min: np.ndarray
     light_max: np.ndarray
@@ -166,6 +174,8 @@ class Scene:
     by_bends: np.ndarray
     by_peaks: np.ndarray
     by_light: np.ndarray
+    by_felt: np.ndarray
+    by_felt_at_turns: np.ndarray
     by_stirs: np.ndarray
     by_stirs_before: np.ndarray
     by_stirs_at_turns: np.ndarray
