@@ -96,6 +96,8 @@ def train(
     job = _taken_up(path, options, starts) if resume else _job(options, starts)
     check_installed()
     machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
+    if machines.accelerator == "cpu":
+        job = job.trained_by(machines.devices)
     machines.check_batch(job.recipe.batch)
     check_fits(job.clips, job.samples.size)
     for reason in unusable(job.clips, job.validation.videos):

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from vid2ev.recording.manifest import machine, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8
+UNEVEN = 1.05  # times the shortest gap is the longest of frames at a constant rate, whose times are rounded
 LINE = {"key_us": int, "remark": str, "shot": int}  # of each stretch
 
 
@@ -104,7 +106,7 @@ def interpolate(
         _fill(shelf, ready, pictures, report)
         seconds = time.perf_counter() - started
         run = {"seconds": round(seconds, 3), "frames": shelf.count - there, "device": str(where), "machine": machine()}
-        manifest = shelf.job | _result(shelf, take) | {"run": run}
+        manifest = shelf.job | _result(shelf, take, grid) | {"run": run}
         shelf.publish(manifest)
     return manifest
 
@@ -230,7 +232,18 @@ def _of(name: str, memory: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {key.removeprefix(f"{name}."): array for key, array in memory.items() if key.startswith(f"{name}.")}
 
 
-def _result(shelf: Shelf, take: Take) -> dict[str, Any]:
+def _unevenly(shelf: Shelf, grid: Grid) -> list[str]:
+    """That a film plays frames evenly which are not, if it does."""
+    gaps_us = [after["key_us"] - line["key_us"] for line, after in pairwise(shelf.done)]
+    if shelf.kind != "mp4" or not isinstance(grid, Times) or not gaps_us or max(gaps_us) <= UNEVEN * min(gaps_us):
+        return []
+    return [
+        f"frames lie {min(gaps_us) / 1000:g} to {max(gaps_us) / 1000:g} ms apart, and the film plays what is made of"
+        " them evenly; --fps, or a folder of pictures, keeps their times"
+    ]
+
+
+def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:
     """What the manifest says of what was made."""
     named: dict[str, list[list[float]]] = {}
     for line, after in zip(shelf.done, [*shelf.done[1:], None], strict=True):
@@ -244,6 +257,6 @@ def _result(shelf: Shelf, take: Take) -> dict[str, Any]:
         "start_us": shelf.done[0]["key_us"],
         "stop_us": shelf.done[-1]["key_us"],
         "gaps_s": named,
-        "remarks": list(take.remarks),
+        "remarks": [*take.remarks, *_unevenly(shelf, grid)],
         "manifest": str(manifest_of(shelf.output, shelf.kind)),
     }

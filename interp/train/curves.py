@@ -52,8 +52,10 @@ class Curves(Logger):
                 self._add(name, {"step": f"{step}"} | {key: f"{value:.6g}" for key, value in mine.items()})
 
     def _add(self, name: str, row: dict[str, str]) -> None:
-        if not set(row) <= set(self._columns.get(name, [])):
-            self._write(name, [*read_curve(self.folder / name), row])
+        again = name == FILES["validation"]  # (one that is measured again, as a run that is done goes on, counts once)
+        if again or not set(row) <= set(self._columns.get(name, [])):
+            before = read_curve(self.folder / name)
+            self._write(name, [*(each for each in before if not again or each["step"] != row["step"]), row])
             return
         with open(self.folder / name, "a", newline="", encoding="utf-8") as file:
             csv.DictWriter(file, self._columns[name], lineterminator="\n").writerow(row)

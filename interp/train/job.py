@@ -107,6 +107,10 @@ class Job(BaseModel):
         named = {"network": network, "size": size, "options": options, "starts": digests(starts)}
         return _valid(cls, named | parts, "")
 
+    def trained_by(self, processes: int) -> Self:
+        """The same by so many processes, without a GPU: that decides the last bits."""
+        return self.model_copy(update={"recipe": self.recipe.model_copy(update={"processes": processes})})
+
     def kept(self) -> dict[str, Any]:
         """It as JSON, as a run's folder keeps it."""
         return self.model_dump(mode="json", exclude=None if self.starts else {"starts"})

@@ -86,7 +86,8 @@ class Learner(LightningModule):
         parts = self.parts(batch)
         loss = torch.stack(list(parts.values())).sum()
         self.log("step", self.trainer.global_step + 1.0)  # (what Lightning puts the others over)
-        self.log_dict({f"train/{name}": part.detach() for name, part in ({"loss": loss} | parts).items()})
+        said = {f"train/{name}": part.detach() for name, part in ({"loss": loss} | parts).items()}
+        self.log_dict(said, sync_dist=True)  # (of the whole batch, whoever has which part)
         return loss
 
     def configure_gradient_clipping(self, optimizer: Optimizer, *_: Any, **__: Any) -> None:

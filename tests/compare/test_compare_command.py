@@ -127,6 +127,17 @@ def test_clocks_that_differ_are_laid_on_one_another_on_request() -> None:
     assert found["distance"] == 0 and found["reference_shifted_us"] == -(10**9) and found["events"] == 1000
 
 
+@pytest.mark.parametrize("name", ["csv", "rpg"])
+def test_what_says_no_beginning_is_laid_on_another_by_its_first_event(name: str) -> None:
+    events = busy(1000, SIZE)
+    here = write(moved(events, 500_000), "here.h5", start_us=500_000)
+    late = write(moved(events, 3_500_000), "late.h5", start_us=3_000_000)
+    for path, shift_us in ((here, 0), (late, -3_000_000)):
+        reformat(path, f"{path}{format_named(name).suffix}", name)
+        found = compare(here, f"{path}{format_named(name).suffix}", "--align", "start")
+        assert found["distance"] == 0 and found["reference_shifted_us"] == shift_us and found["events"] == 1000
+
+
 def test_sensors_of_different_sizes_are_refused_but_not_a_file_that_does_not_say() -> None:
     events = busy(100, (10, 10))
     small, large = write(events, "small.h5", (10, 10)), write(events, "large.h5", (12, 10))

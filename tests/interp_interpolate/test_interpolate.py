@@ -146,6 +146,16 @@ def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
         np.testing.assert_allclose(key, light, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("uneven", [False, True])
+def test_a_film_that_plays_frames_evenly_which_are_not_says_so(tmp_path: Path, uneven: bool) -> None:
+    source = images(tmp_path / "in", moving(4))
+    times_us = [0, 20_000, 53_000, 70_000] if uneven else [0, 33_333, 66_667, 100_000]
+    (source / "timestamps.txt").write_text("# us\n" + "".join(f"{t}\n" for t in times_us))
+    for output, grid in (("a.mp4", {"multiple": 3}), ("b.mp4", {"fps": 90}), ("c", {"multiple": 3})):
+        told = interpolate(source, tmp_path / output, method="linear", **grid)
+        assert any("17 to 33 ms apart" in text for text in told["remarks"]) == (uneven and output == "a.mp4")
+
+
 def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
 
     said: list[str] = []

@@ -71,6 +71,16 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
+def test_the_processes_that_train_are_the_runs(tmp_path: Path) -> None:
+    """Which decide the last bits: a run goes on with those that it was begun with."""
+    job = json.loads(run("--dry-run", "--json", "--cpu", "--devices", "4").output)
+    assert job["recipe"]["processes"] == 4
+    assert run("-o", "run", *FEW, "--devices", "1").exit_code == 0
+    assert json.loads(Path("run/run.json").read_text())["job"]["recipe"]["processes"] == 1
+    refused = run("-o", "run", "--resume", "--cpu", "--devices", "2")
+    assert refused.exit_code == 2 and "was begun with recipe.processes = 1, not 2" in refused.output, refused.output
+
+
 def test_the_help_names_every_network_that_can_be_trained() -> None:
     shown = next(option.help for option in train.params if option.name == "network")
     assert {name.replace("_", "-") for name in names()} == set(re.findall(r"[\w-]+", shown))
@@ -97,6 +107,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--set", 'clips.scene_names=["rom"]'], "scene 'rom'"),
         (["--dry-run", "--set", 'clips.textures=["cofee"]'], "texture 'cofee' (did you mean coffee?): no picture"),
         (["--dry-run", "--set", 'clips.environments=["sky.hdr"]'], "environment 'sky.hdr': no picture"),
+        (["--dry-run", "--network", "hdr", "--data", "."], "recordings have codes of 8 bits, where light"),
         (["--dry-run", "--set", "clips.textures=[]"], "setting clips.textures = [] is impossible"),
         (["--dry-run", "--set", "clips.coarser=[0]"], "setting clips.coarser.0 = 0 is impossible"),
         (["--dry-run", "--set", "clips.gap_ms=[0,8]"], "gap_ms (0.0, 8.0): expected times above 0"),

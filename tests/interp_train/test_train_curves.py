@@ -44,3 +44,12 @@ def test_a_new_run_has_no_curves(tmp_path: Path) -> None:
     Curves(tmp_path)
     assert read_curve(tmp_path / "training.csv") == []
     assert not list(tmp_path.iterdir())
+
+
+def test_validation_that_is_measured_again_has_one_row(tmp_path: Path) -> None:
+    for psnr in (20.0, 21.0):
+        curves = Curves(tmp_path, 7)
+        curves.log_metrics({"validation/psnr": psnr}, 7)
+        curves.log_metrics({"train/loss": 1.0}, 7)
+    assert [(row["step"], row["psnr"]) for row in read_curve(tmp_path / "validation.csv")] == [("7", "21")]
+    assert len(read_curve(tmp_path / "training.csv")) == 2

@@ -23,8 +23,8 @@ from vid2ev.compare.comparison import Comparison, Tally
 from vid2ev.compare.matching import WINDOW_US
 from vid2ev.compare.statistics import Statistics, statistics_of
 from vid2ev.errors import UsageError
-from vid2ev.formats import open_events, survey
-from vid2ev.formats.event_file import Recording
+from vid2ev.formats import open_events, recognise, survey
+from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.stream.events import Events
 
 LIMIT = 1 << 25  # events in memory at a time: 0.7 GB
@@ -105,7 +105,8 @@ def compare_recordings(
 ) -> Compared:
     """Compare an event file or recording's folder with a reference; both are read, whatever their formats.
 
-    align       "clock": times are on one clock; "start": the beginnings are laid on one another
+    align       "clock": times are on one clock; "start": the beginnings are laid on one another, or the first events
+                where a format says no beginning
     statistics  whether to gather those of each recording alone, too; the files are read once more
     report      called with a recording of as many events as will be read, and how many were read
 
@@ -116,7 +117,8 @@ def compare_recordings(
     one, other = (_Side(str(path), survey(file)) for path, file in zip((recording, reference), files, strict=True))
     size = _size(one, other, *(file.size for file in files))
     if align == "start":
-        other = replace(other, shift_us=one.recording.start_us - other.recording.start_us)
+        begins_us, other_us = _beginnings((one, other), files)
+        other = replace(other, shift_us=begins_us - other_us)
     span_us = _common(one, other, window_us)
     tally = Tally(size, span_us, window_us=window_us)
     sides = one, other
@@ -136,6 +138,16 @@ def compare_recordings(
         f"{side.path}: {text}" for side, file in zip(sides, files, strict=True) for text in dict.fromkeys(file.warnings)
     ]
     return Compared((one.path, other.path), comparison, left_out, other.shift_us, warnings, alone)
+
+
+def _beginnings(sides: tuple[_Side, _Side], files: tuple[EventFile, EventFile]) -> list[int]:
+    """When each begins by its own clock: as it says, or with its first event where one of them cannot say."""
+    kinds = [recognise(file.path) for file in files]
+    said = all(kind is None or "start" in kind.keeps for kind in kinds)
+    firsts = [None if said else next(side.recording.blocks(), None) for side in sides]
+    return [
+        side.recording.start_us if first is None else int(first.t[0]) for side, first in zip(sides, firsts, strict=True)
+    ]
 
 
 class _Progress:
