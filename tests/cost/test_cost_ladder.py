@@ -36,7 +36,8 @@ def test_the_paper_s_sensor_has_everything_in_play() -> None:
         "half the size", "light", "lighter", "least",
     }  # fmt: skip
     assert found.reference.float64 and not found.reference.offered
-    assert found.reference.options == {"subframes": 24}
+    assert found.reference.options == {"subframes": 48}
+    assert next(rung for rung in found.rungs if rung.name == "finest").options == {"subframes": 24}
     least = next(rung for rung in found.rungs if rung.name == "least")
     assert least.options == {"effects": "none", "upsample": "none"} and least.settings == {"timing": "frame"}
 
@@ -56,7 +57,7 @@ def test_each_name_is_there_once() -> None:
         ((), {"overrides": ["timing=linear"]}, {"times on a line", "times of frames"}),
         ((), {"overrides": ["dvs.filter=after"]}, {"filter after log"}),
         (("size",), {"size": "24x16"}, {"half the size"}),
-        ((), {"sensor": "ideal"}, {"filter after log", "times on a line", "effects none", "finest"}),
+        ((), {"sensor": "ideal"}, {"filter after log", "times on a line", "effects none"}),
     ],
 )
 def test_what_is_given_or_not_there_is_left_as_it_is(given: tuple[str, ...], options: dict, gone: set[str]) -> None:
@@ -76,9 +77,11 @@ def test_the_reference_is_exact_whatever_the_sensor_says() -> None:
 @pytest.mark.parametrize("sensor", ["ideal", "v2e-clean"])
 def test_where_logarithms_are_straight_the_reference_has_steps_though_nothing_moves(sensor: str) -> None:
     """Or else it would be one between its logarithm and light that is straight, and a finer one another."""
-    assert ladder(sensor=sensor, steps=1).reference.options == {"subframes": 16}
-    assert ladder(sensor=sensor, steps=12).reference.options == {"subframes": 24}
-    assert ladder(steps=1).reference.options == {"subframes": 2}
+    for steps, finest in ((1, 16), (12, 24), (64, 64), (100, 100)):
+        found = ladder(sensor=sensor, steps=steps)
+        assert found.rungs[0].name == "finest" and found.rungs[0].options == {"subframes": finest}
+        assert found.reference.options == {"subframes": 2 * finest} and not found.reference.offered
+    assert ladder(steps=1).reference.options == {"subframes": 4}
 
 
 def test_where_nothing_moves_light_between_the_frames_is_no_question() -> None:

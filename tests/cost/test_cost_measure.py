@@ -50,7 +50,7 @@ def test_times_are_those_of_the_clock_in_multiples_of_the_clip(cost: Cost) -> No
 def test_errors_are_those_of_the_events_that_convert_writes(clip: str, cost: Cost) -> None:
     """Against `events_of` with the options that a setting is said to stand for."""
     options = {"sensor": "ideal", "fps": 50}
-    reference = Events.concatenate(events_of(clip, subframes=max(2 * cost.steps, 16), **options))
+    reference = Events.concatenate(events_of(clip, subframes=2 * max(2 * cost.steps, 16), **options))
     assert cost.reference.events == len(reference) > 1000
     changes: dict[str, dict[str, Any]] = {
         "default": {},

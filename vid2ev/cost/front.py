@@ -115,8 +115,9 @@ def refusal(rows: Sequence[Row], budget: Budget) -> str:
 
 
 def front(rows: Sequence[Row]) -> list[Row]:
-    """The settings than which none is as fast and more accurate, nor as accurate and faster; from the fastest on."""
-    return ahead(filter(_is_seen, rows), lambda row: row.time, _error)
+    """Of the settings that may be recommended those than which none is as fast and more accurate, nor as accurate and
+    faster; from the fastest on."""
+    return ahead((row for row in rows if row.rung.offered and _is_seen(row)), lambda row: row.time, _error)
 
 
 def ahead(rows: Iterable[T], time: Callable[[T], float], error: Callable[[T], float]) -> list[T]:

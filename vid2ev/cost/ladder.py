@@ -1,9 +1,10 @@
 """The ladder: which settings are tried on a recipe.
 
-    reference   the finest of everything: all effects, exact times, twice the sub-frames that the fastest interval asks
+    finest      the finest of everything: all effects, exact times, twice the sub-frames that the fastest interval asks
                 for in every interval (16 at least, where sensors take the logarithm of light to be straight: between
-                that and light is more than motion asks for), lags of light in float64
-    finest      the same as people can have it, in float32
+                that and light is more than motion asks for)
+    reference   twice the sub-frames of that, so that what it is itself away from its limit is less than the finest is
+                away from it; and lags of light in float64
     default     what `convert` does when nothing is said
     others      the default with one thing changed, and some with several
 
@@ -27,7 +28,7 @@ from vid2ev.sensors.cis_spec import NOISELESS, CisSpec
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample import METHODS
 
-MOST_STEPS = 64  # of an interval of the reference
+MOST_STEPS = 64  # of an interval of the finest
 STEPS_OF_LOG = 16  # at least, where logarithms are straight: what lies between that and light falls with their square
 CAPS = (2, 4, 8, 16, 32)  # of the sub-frames of an interval
 NAMES = {"none": "straight light", "linear": "linear", "flow": "flow"}
@@ -64,7 +65,11 @@ def ladder_of(recipe: Recipe, given: Given, steps: int) -> Ladder:
     cis = [mount.sensor.spec for mount in recipe.mounts if isinstance(mount.sensor.spec, CisSpec)]
     finest = _finest(recipe, given, steps, dvs)
     float64 = any(spec.filter == "before" and spec.pole_taus_us for spec in dvs)
-    reference = replace(finest, name="reference", float64=float64, offered=not float64)
+    finer = {name: 2 * steps for name, steps in finest.options.items() if name == "subframes"}
+    apart = float64 or bool(finer)
+    reference = replace(
+        finest, name="reference", options={**finest.options, **finer}, float64=float64, offered=not apart
+    )
     ways = {
         "light": _light(recipe, given, steps),
         "timing": [] if given.any("timing") else _timing(dvs),
@@ -75,7 +80,7 @@ def ladder_of(recipe: Recipe, given: Given, steps: int) -> Ladder:
         "size": _size(recipe, given),
     }
     singles = [rung for rungs in ways.values() for rung in rungs]
-    rungs = [*([finest] if float64 else []), Rung("default"), *singles, *_several({r.name: r for r in singles})]
+    rungs = [*([finest] if apart else []), Rung("default"), *singles, *_several({r.name: r for r in singles})]
     return Ladder(reference, tuple(rungs))
 
 
