@@ -197,7 +197,8 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
     film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
     facts = [("made", f"{path}: {made['frames']:,} frames of {width}x{height} as {kind}{film}")]
-    facts.append(("from", f"{made['key_frames']:,} key frames, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
+    keys = f"{made['key_frames']:,} key frame{'s' * (made['key_frames'] != 1)}"
+    facts.append(("from", f"{keys}, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
     if made["tiles"] != "none":
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():

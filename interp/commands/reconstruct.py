@@ -98,4 +98,5 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
         ("made", f"{path}: {made['frames']:,} pictures of {width}x{height} as {kind}{film}"),
         ("from", f"{made['events']:,} events, {span_s:.6g} s"),
         ("speed", f"{run['frames'] / seconds:.3g} pictures/s, {run['seconds']:.3g} s"),
+        *(("warning", text) for text in made["remarks"]),
     ]

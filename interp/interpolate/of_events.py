@@ -36,9 +36,10 @@ class FramesBesideEvents(OfSource):
         """Those of the source, and what events and frames do not say of each other."""
         across, down = self.event_size
         guessed = f"{self._events_path} does not state the size of its sensor, taken for {across}x{down}"
+        said = [*super().remarks, *(f"{self._events_path}: {text}" for text in self._cursor.file.warnings)]
         if not self._cursor.count:
-            return [*super().remarks, f"{self._events_path} holds no events"]
-        return [*super().remarks, *[guessed] * self._guessed, *self._elsewhere()]
+            return [*said, f"{self._events_path} holds no events"]
+        return [*said, *[guessed] * self._guessed, *self._elsewhere()]
 
     def _elsewhere(self) -> Iterator[str]:
         """Whether all events are before the frames, or after them."""

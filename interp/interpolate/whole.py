@@ -255,7 +255,7 @@ def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:
         "key_frames": len(shelf.done),
         "size": list(take.size),
         "start_us": shelf.done[0]["key_us"],
-        "stop_us": shelf.done[-1]["key_us"],
+        "stop_us": max([shelf.done[-1]["key_us"], *shelf.done[-1]["t_us"]]),
         "gaps_s": named,
         "remarks": [*take.remarks, *_unevenly(shelf, grid)],
         "manifest": str(manifest_of(shelf.output, shelf.kind)),

@@ -23,7 +23,7 @@ from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.formats import open_events
-from vid2ev.formats.event_file import Recording
+from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
 from vid2ev.sensors.limits import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
@@ -100,7 +100,8 @@ def reconstruct(
     output, path = Path(output), Path(events)
     kind, slicing = kind_of(output, format), _slicing(fps, events_per_frame)
     check_contrast(contrast)
-    recording, size = _window(path, start_s, stop_s)
+    file, recording = _window(path, start_s, stop_s)
+    size = recording.size
     nats = contrast or _contrast(path)
     where = device_of(device)
     made_by, why, about = _choice(network, cutoff_hz, size, nats, where)
@@ -130,7 +131,7 @@ def reconstruct(
             "size": list(size),
             "start_us": recording.start_us,
             "stop_us": shelf.done[-1]["t_us"][-1],
-            "remarks": [],
+            "remarks": _remarks(path, file, recording),
             "manifest": str(manifest_of(output, kind)),
             "run": {"seconds": round(seconds, 3), "frames": shelf.count - there, "machine": machine()},
         }
@@ -194,8 +195,8 @@ def _slicing(fps: Number | None, events_per_frame: int | None) -> Duration | Cou
     return Duration(10**6 / rate)
 
 
-def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[Recording, tuple[int, int]]:
-    """The part of the file, and the size of its sensor."""
+def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[EventFile, Recording]:
+    """The file, and the part of it."""
     check_second(start_s, "--start")
     check_second(stop_s, "--stop")
     if start_s is not None and stop_s is not None and stop_s <= start_s:
@@ -206,7 +207,14 @@ def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[Re
     recording = window(file, zero_us if start_us is None else start_us, stop_us)
     if not recording.count:
         raise UsageError(f"{path}: no events from {start_s or 0:g} s on; choose another part")
-    return recording, recording.size
+    return file, recording
+
+
+def _remarks(path: Path, file: EventFile, recording: Recording) -> list[str]:
+    """What the file does not say, and what is wrong with it."""
+    across, down = recording.size
+    guessed = f"{path} does not state the size of its sensor, taken for {across}x{down}, which holds all events"
+    return [*[guessed] * (file.size is None), *(f"{path}: {text}" for text in dict.fromkeys(file.warnings))]
 
 
 def _contrast(path: Path) -> tuple[float, float]:

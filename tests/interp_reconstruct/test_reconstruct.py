@@ -275,3 +275,15 @@ def test_memory_of_pictures_is_taken_again() -> None:
         for word in ("yes", "no")
     )
     assert 10 * kept < given_back
+
+
+def test_what_a_file_does_not_say_and_what_is_wrong_with_it_is_told(tmp_path: Path) -> None:
+    whole = written(tmp_path / "a.h5", drawn(us=200_000), us=200_000, format="hdf5")
+    assert reconstruct(whole, tmp_path / "whole", cutoff_hz=1.0)["remarks"] == []
+    bare = written(tmp_path / "a.csv", drawn(us=200_000), us=200_000, format="csv")
+    (said,) = reconstruct(bare, tmp_path / "bare", cutoff_hz=1.0)["remarks"]
+    assert "does not state the size of its sensor" in said
+    raw = written(tmp_path / "a.raw", drawn(us=200_000), us=200_000, format="evt2")
+    raw.write_bytes(raw.read_bytes()[:-1])
+    (cut,) = reconstruct(raw, tmp_path / "cut", cutoff_hz=1.0)["remarks"]
+    assert str(raw) in cut and "at the end" in cut
