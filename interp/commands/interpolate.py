@@ -51,8 +51,13 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     "--events", type=click.Path(exists=True, path_type=Path), metavar="EVENTS",
     help="Event file to a video, images or a single frame, on their clock.",
 )  # fmt: skip
-@click.option("--start", type=float, metavar="S", help="Begin at this second; of recordings after the first frame.")
-@click.option("--stop", type=float, metavar="S", help="End there.")
+@click.option(
+    "--start",
+    type=float,
+    metavar="S",
+    help="Begin at the first frame from this second on; of recordings after the first frame.",
+)
+@click.option("--stop", type=float, metavar="S", help="End at the last frame up to there.")
 @click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture.")
 @click.option("--size", metavar="W|WxH|WxH!", help="Pixels to bring a video to.")
 @click.option("--transfer", default="auto", show_default=True, metavar="CURVE", help="Of a video's codes.")
