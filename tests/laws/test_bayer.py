@@ -43,7 +43,7 @@ def stack(folder: Path, colours: tuple[float, float, float]) -> Path:
 
 
 def events(path: Path, bayer: str | None, upsample: str) -> Events:
-    options = {"fps": 100.0, "upsample": upsample, "subframes": 4, "bayer": bayer}
+    options = {"fps": 100.0, "upsample": upsample, "bayer": bayer} | ({"subframes": 4} if upsample != "none" else {})
     return Events.concatenate(events_of(path, "ideal", **options))
 
 
