@@ -402,7 +402,7 @@ def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
         time.sleep(0.05)
     child.send_signal(signal.SIGINT)
     _, error = child.communicate()
-    assert (child.returncode, error.count("\n"), error[:11]) == (130, 1, "interrupted")
+    assert (child.returncode, error.count("\n"), error[:11]) == (130, 1, "interrupted"), error
     assert left() == set()
 
 
