@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,17 @@ def test_a_camera_where_the_video_was_taken_sends_what_it_sends_alone(tmp_path: 
     assert len(pixels[0]) == len(pixels[1]) > 1000
     for one, other in zip(*pixels, strict=True):
         assert one[:2] == other[:2] and one[3] == other[3] and abs(one[2] - other[2]) <= 1
+
+
+def test_a_sensor_file_is_named_as_seen_from_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine").mkdir()
+    Path("mine/sensor.toml").write_text("[dvs]\nthreshold_on = 0.2\n")
+    convert(CLIP, "made/out", rig=rig(sensor="mine/sensor.toml"), **OPTIONS)
+    (named,) = [
+        each["sensor"] for each in tomllib.loads(Path("made/out/rig.toml").read_text())["camera"] if "sensor" in each
+    ]
+    assert Path("made/out", named).resolve() == Path("mine/sensor.toml").resolve()
 
 
 def test_every_camera_has_a_recording_of_its_own(tmp_path: Path) -> None:

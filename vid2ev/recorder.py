@@ -19,7 +19,7 @@ from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
-from vid2ev.rig.rig_file import write_rig
+from vid2ev.rig.rig_file import rig_text, write_text
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import sees_nothing
@@ -191,7 +191,8 @@ class Recorder:
         for mount, truth in zip(self.recipe.mounts, self._truths, strict=False):
             truth.write(whole / mount.within)
         if not self.recipe.alone:
-            write_rig(whole / "rig.toml", self.recipe.rig.settled(), overwrite=True)
+            rig = rig_text(self.recipe.rig.settled(), self.folder.directory)  # (as seen from where it will be)
+            write_text(whole / "rig.toml", rig, overwrite=True)
 
     def span_us(self, number: int) -> tuple[int, int]:
         """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last
