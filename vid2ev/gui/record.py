@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +57,10 @@ class Record:
             for number, camera in enumerate(session.setup.rig.cameras):
                 ui.menu_item(
                     f"sensor of {camera.name}",
-                    lambda k=number: self._save(f"{self._name(k)}.toml", lambda s, k=k: sensor_text(s, k)),
+                    lambda k=number: self._save(f"{self._name(k)}.toml", partial(_sensor, k)),
                 )
-            ui.menu_item("rig", lambda: self._save(RIG, lambda setup: rig_text(setup.rig)))
-            ui.menu_item("scene", lambda: self._save(SCENE, scene_text))
+            ui.menu_item("rig", lambda: self._save(RIG, lambda setup, folder: rig_text(setup.rig, folder)))
+            ui.menu_item("scene", lambda: self._save(SCENE, lambda setup, _: scene_text(setup)))
         ui.button("Convert", on_click=self.convert).props('unelevated dense data-key="convert"')
 
     def show(self) -> None:
@@ -140,19 +142,20 @@ class Record:
     def _name(self, camera: int) -> str:
         return f"{self._session.setup.rig.cameras[camera].name}_sensor"
 
-    def _save(self, name: str, text: Any) -> None:
+    def _save(self, name: str, text: Callable[[Setup, Path], str]) -> None:
+        """Save what `text` makes of the setup, as seen from the folder where it is going to be."""
         setup = self._session.setup
         if name == SCENE and not setup.is_scene:
             ui.notify("a video has no scene to save", position="bottom-right")
             return
         self._ask_where(name, setup, text)
 
-    def _ask_where(self, name: str, setup: Setup, text: Any) -> None:
+    def _ask_where(self, name: str, setup: Setup, text: Callable[[Setup, Path], str]) -> None:
         """Ask for the place, then write the file, or say why not."""
 
         def write() -> None:
             try:
-                write_text(Path(where.value), text(setup), over.value)
+                write_text(Path(where.value), text(setup, Path(where.value).parent), over.value)
             except Vid2evError as error:
                 why.text = str(error)
                 return
@@ -166,6 +169,10 @@ class Record:
             with ui.row():
                 ui.button("Save", on_click=write).props("unelevated dense")
                 ui.button("Cancel", on_click=dialog.close).props("flat dense")
+
+
+def _sensor(camera: int, setup: Setup, _: Path) -> str:
+    return sensor_text(setup, camera)
 
 
 def _count(result: dict[str, Any]) -> str:

@@ -57,7 +57,7 @@ class Session:
         """Take up the setup that `make` makes; if that is refused, why."""
         try:
             setup = make()
-        except (Vid2evError, ValueError) as error:
+        except (Vid2evError, ValueError, OSError) as error:  # (of the last, names that no disk takes)
             return str(error)
         if setup != self.setup:
             self.look(setup=setup)
