@@ -268,7 +268,7 @@ def _read_recording(path: Path) -> None:
     start_us, stop_us = sequence.covered_us
     sequence.events(start_us, stop_us).within(sequence.event_size)
     if folder.name == "own":
-        CamerasOf(sequence).at(start_us)  # type: ignore[arg-type]
+        CamerasOf(sequence).at(start_us, (0, 0))  # type: ignore[arg-type]
 
 
 READERS: dict[str, tuple[Seeds, Callable[[Path], object]]] = {
