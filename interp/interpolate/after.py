@@ -55,11 +55,12 @@ class After:
         if work.first.known:
             first, state = self._processed(work.first.codes, self._rest, self._state)
         for frame in work.frames:
-            if frame.key and frame.shot == work.shot and first is not None:
+            before = state if frame.shot == work.shot else None
+            if frame.key and before and first is not None:
                 yield replace(frame, key=False, codes=first)
                 continue
-            since = self._voxels(work.events, frame.instant.share) if frame.shot == work.shot and state else None
-            codes, _ = self._processed(frame.codes, since, state if frame.shot == work.shot else None)
+            since = self._voxels(work.events, frame.instant.share) if before else None
+            codes, _ = self._processed(frame.codes, since, before)
             yield replace(frame, key=False, codes=codes)
         self._state, self._rest = state, self._voxels(work.events, 1)
 
@@ -80,9 +81,8 @@ class After:
         self, codes: np.ndarray, since: torch.Tensor | None, state: HdrState | None
     ) -> tuple[np.ndarray, HdrState]:
         """A frame [H, W, C], with the events since the one that a state is of, and the state after it."""
-        light = to_light(torch.from_numpy(np.ascontiguousarray(np.moveaxis(codes, -1, 0))), "srgb")[None].to(
-            self.device
-        )
+        planes = torch.from_numpy(np.ascontiguousarray(np.moveaxis(codes, -1, 0)))
+        light = to_light(planes, "srgb")[None].to(self.device)
         window = light.new_zeros(1, self.network.spec.bins, *light.shape[2:]) if since is None else since
         second = window if self.needs_events else light
         made, after = self.network(light.expand(-1, self.network.spec.colours, -1, -1), second, state)

@@ -12,17 +12,7 @@ from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
 from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
-from vid2ev.kernels.measured import (
-    BY_ALL,
-    BY_JUMPS,
-    FIGURES,
-    LANES,
-    LIGHT,
-    PLANES,
-    QUARTERS,
-    SCRATCH,
-    TRAVEL,
-)
+from vid2ev.kernels.measured import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, TRAVEL
 from vid2ev.kernels.play import end_measure
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
