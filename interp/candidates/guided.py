@@ -34,6 +34,7 @@ Source: DIS, T. Kroeger et al., "Fast optical flow using dense inverse search", 
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -214,12 +215,20 @@ def _flows(shown: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
     if min(shown.shape[-2:]) < SMALLEST:
         return shown.new_zeros(*shown.shape[:2], 2, *shown.shape[-2:])
     starts, ends = (_eight_bits(each) for each in (shown.detach(), key.detach()))
-    dis = dense_flow()
-    found = [
-        [convincing(dis.calc(start, end[0], None), start, end[0], CONVINCED_CODES) for start in some]
-        for some, end in zip(starts, ends, strict=True)
-    ]
-    return torch.from_numpy(np.moveaxis(np.array(found), -1, 2).copy()).to(shown)
+    pairs = [(start, end[0]) for some, end in zip(starts, ends, strict=True) for start in some]
+    threads = min(torch.get_num_threads(), len(pairs))
+    if threads == 1:
+        found = [_flow(*pair) for pair in pairs]
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            found = list(pool.map(lambda pair: _flow(*pair), pairs))
+    flows = np.moveaxis(np.array(found), -1, 1).reshape(*shown.shape[:2], 2, *shown.shape[-2:])
+    return torch.from_numpy(flows).to(shown)
+
+
+def _flow(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Motion [H, W, 2] from one picture to the other, of 8 bits, where it is more convincing than none."""
+    return convincing(dense_flow().calc(start, end, None), start, end, CONVINCED_CODES)
 
 
 def _eight_bits(shown: torch.Tensor) -> np.ndarray:

@@ -20,6 +20,7 @@ from interp.weights import load
 from vid2ev.errors import DataError, UsageError
 
 AT_ONCE_PX = 1 << 21  # pixels of images that a network makes at a time: some 200 bytes each of the smallest networks
+ON_GPU_PX, BYTES_PER_PX = 1 << 24, 1024  # on a GPU, where few at a time leave it waiting; and what large networks take
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +114,10 @@ def of_weights(
 
 def _at_once(gap: Gap) -> int:
     """How many images are made at a time."""
-    return max(1, AT_ONCE_PX // gap.frame_0[0].numel())
+    most = AT_ONCE_PX
+    if gap.frame_0.is_cuda:
+        most = min(ON_GPU_PX, torch.cuda.mem_get_info(gap.frame_0.device)[0] // BYTES_PER_PX)
+    return max(1, most // gap.frame_0[0].numel())
 
 
 def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:

@@ -37,6 +37,7 @@ class Running:
 
     def ready(self, network: Any) -> Any:
         """A network to be run like this; its parts are compiled when they are first used."""
+        network = laid_out(network)
         for part in network.children() if self.compiled else ():
             assert isinstance(part, nn.Module)
             part.compile()
@@ -64,6 +65,13 @@ class Running:
 
 
 PLAIN = Running()
+
+
+def laid_out(network: Any) -> Any:
+    """A network as its device takes it best: on a GPU with the channels of a pixel beside each other, a third faster in
+    16 bits."""
+    on_gpu = any(weight.is_cuda for weight in network.parameters())
+    return network.to(memory_format=torch.channels_last) if on_gpu else network
 
 
 def compiles(device: str) -> bool:

@@ -22,6 +22,7 @@ from torch.optim import AdamW, Optimizer
 from torch.optim.lr_scheduler import LambdaLR
 
 from interp.losses.perceptual import Perceptual
+from interp.methods.running import laid_out
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores
@@ -76,6 +77,10 @@ class Learner(LightningModule):
         optimizer = AdamW(learnt, recipe.rate, recipe.betas, weight_decay=recipe.weight_decay)
         rates = LambdaLR(optimizer, lambda step: self.schedule.share(step))
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": rates, "interval": "step"}}
+
+    def on_fit_start(self) -> None:
+        """The network is on its device now."""
+        laid_out(self.network)
 
     def on_train_batch_start(self, batch: Any, batch_idx: int) -> None:
         """Random numbers of this step."""

@@ -34,6 +34,7 @@ def as_arrays(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
         return kind(*(as_arrays(getattr(argument, name), (kind.__name__, name)) for name in argument._fields))
     if not isinstance(argument, torch.Tensor):
         return argument
+    assert argument.is_contiguous(), place  # (as `memory._seen` wants it)
     return argument.numpy().view(UNSIGNED.get(place, argument.numpy().dtype))
 
 

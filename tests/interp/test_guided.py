@@ -11,7 +11,17 @@ from pairs import counts
 from torch.nn import functional as F
 
 from interp.candidates.bridge import DARK
-from interp.candidates.guided import GAMMA, SHARP, agreement, carried_off_by, guided, off_by, part_of, recoloured
+from interp.candidates.guided import (
+    GAMMA,
+    SHARP,
+    agreement,
+    carried_off_by,
+    flows_to,
+    guided,
+    off_by,
+    part_of,
+    recoloured,
+)
 from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_light
 from interp.methods import Gap, open_method
@@ -74,6 +84,23 @@ def test_it_finds_motion_that_turns_back_and_keeps_colours() -> None:
     assert float((coloured[:, 0] - truth)[inner].square().mean()) < 0.7 * float(wrong)
     light, kept = (luminance(to_light(each, "srgb")) for each in (seen, coloured))
     torch.testing.assert_close(kept, light, atol=2e-3, rtol=0)  # (colours beyond black are cut off)
+
+
+def test_motion_is_the_same_whoever_looks_for_it() -> None:
+    first, last = shifted(0.0), shifted(5.0)
+    between = torch.stack([shifted(by) for by in (1.0, 2.5, 4.0)], 1)
+    threads, found = torch.get_num_threads(), []
+    try:
+        for some in (1, 4):
+            torch.set_num_threads(some)
+            found.append(
+                flows_to(first.expand(2, -1, -1, -1), last.expand(2, -1, -1, -1), between.expand(2, -1, -1, -1, -1))
+            )
+    finally:
+        torch.set_num_threads(threads)
+    assert torch.equal(*found) and found[0].shape == (2, 3, 4, SIDE, SIDE)
+    inner = found[0][0, :, :, 16:-16, 16:-16].mean((-1, -2))
+    assert torch.allclose(inner[:, 2] - inner[:, 0], torch.tensor(-5.0), atol=0.3)  # (from the first to the second)
 
 
 def test_what_does_not_agree_counts_little() -> None:

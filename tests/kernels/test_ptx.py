@@ -7,6 +7,8 @@ the text fuses them.  Most sensors are slow: `python -m pytest tests/kernels/tes
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from importlib.util import find_spec
 from types import SimpleNamespace
 from typing import Any
@@ -134,6 +136,28 @@ def test_a_product_and_a_sum_are_fused_only_where_the_text_says_so():
     assert "fma.rn.f32" in ptx_of(flags, "glance")  # as numba compiles, which shows that this can be seen
     strict = strictly(flags, "glance")
     assert "fma" not in strict and "mul.rn.f32" in strict and "add.rn.f32" in strict
+
+
+def test_kernels_are_not_optimised_again_as_they_are_linked():
+    """That would fuse products and sums."""
+    flags = flags_of(TWO_POLES, labels=False)
+    build = Build(CARD)
+    ours = build.module("vid2ev.kernels.layout").Flags(*flags)
+    kernels = build.module("vid2ev.kernels.cuda.kernels").kernels_of(ours, int(stride_of(flags)) // PITCH)
+    inside = build.module("vid2ev.physics.elementary").log64
+    assert [each.targetoptions["lto"] for each in (*kernels, inside)] == [False] * (len(kernels) + 1)
+
+
+def test_numpy_without_a_name_that_numba_cuda_asks_for_stays_without_it():
+    """As numpy 2.5 is."""
+    code = (
+        "import warnings; warnings.simplefilter('ignore'); import numpy as np; vars(np).pop('row_stack', None)\n"
+        "from vid2ev.kernels.cuda.strict import strict\n"
+        "with strict():\n    from numba.cuda import cudaimpl\n"
+        "print('row_stack' in vars(np), cudaimpl.__name__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.split() == ["False", "numba.cuda.cudaimpl"], done.stderr
 
 
 def test_a_glance_at_a_pixel_is_in_registers():

@@ -12,7 +12,7 @@ import numpy as np
 from vid2ev.kernel_compiler import inner
 from vid2ev.kernel_intrinsics import floor
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
-from vid2ev.kernels.layout import CAPPED, LANE_PITCH
+from vid2ev.kernels.layout import CAPPED, LANE_COUNT, LANE_PITCH
 
 # Where the signal goes [nat]; crossings so far; the first level and the step to the next; whether there is one.
 END, RUNGS, FIRST, STEP, REACHED = (FREE + k * LANE_PITCH for k in range(5))
@@ -83,7 +83,14 @@ def reached_lanes(lanes, count, live):
     for j in range(count):
         live[left] = j
         left += np.int64(lanes[REACHED + j])
-    return left
+    return few(left)
+
+
+@inner
+def few(count):
+    """A number of lanes, of which there are no more than LANE_COUNT: a compiler for lanes of one pixel then knows that
+    loops over them are none, which makes a quarter of the code."""
+    return min(count, np.int64(LANE_COUNT))
 
 
 @inner

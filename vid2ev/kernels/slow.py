@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import inner
+from vid2ev.kernels.company import anyone
 from vid2ev.kernels.crossing import AT, LABEL, WHEN, fresh_thresholds, leave_levels, load_thresholds, send
-from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, lanes_with_more, next_rungs
+from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, few, lanes_with_more, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
 from vid2ev.kernels.response import batch_times, lane_times, load_responses, next_pieces, prepare_responses
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
@@ -34,7 +35,8 @@ def climb(work, count, planes, flags, num, iv, out, n, tally):
         prepare_responses(
             work.lanes, work.turns, work.guesses, work.live, count, slower_rate(flags, iv), flags, num, iv
         )
-    while count > 0:
+    while anyone(count > 0):
+        count = few(count)
         load_thresholds(work.lanes, work.pixels, count, planes, flags, num)
         if len(flags.labels):
             for j in range(LABEL, LABEL + count):
@@ -80,7 +82,7 @@ def steady_levels(work, count, planes, flags, num, iv, out, n, tally):
     i, rung = 0, first
     while i < alive:
         i, rung, waiting = fill_batch(work.lanes, work.live, alive, work.who, work.levels, i, rung, first, num)
-        out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
+        out, n = send_batch(work, few(waiting), planes, flags, num, iv, out, n, tally)
     return out, n
 
 
@@ -151,11 +153,11 @@ def drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
             out, n = send_in_place(work, AT, alive, count, planes, flags, num, iv, out, n, tally)
         else:
             if waiting + alive > LANE_COUNT or alive == 0:
-                out, n = send_batch(work, waiting, planes, flags, num, iv, out, n, tally)
+                out, n = send_batch(work, few(waiting), planes, flags, num, iv, out, n, tally)
                 waiting = 0
             add_to_batch(work.lanes, work.who, work.levels, work.live, alive, waiting)
             waiting += alive
-        if alive == 0:
+        if not anyone(alive > 0):
             return out, n
         climbed = True
         fresh_thresholds(work.lanes, work.pixels, work.live, alive, planes, flags, num)

@@ -14,6 +14,8 @@ from vid2ev.sensors.card_events import CardEvents, CardSent, Moments, events_of,
 from vid2ev.sensors.clock import Step, as_counted
 from vid2ev.sensors.proposed import none_proposed, proposed
 
+WALKERS = 1 << 17  # threads that walk pixels: what is listed, which only the device knows, is shared out among them
+
 
 class CardWalk:
     """State of the pixels of some sensors of size (width, height) on a device.
@@ -39,7 +41,7 @@ class CardWalk:
         self._kernels = memory.kernels(flags)
         self._bad, self._phase = memory.put(bad), memory.put(np.array(random_phase, np.uint8))
         self._hot = np.flatnonzero(bad == 1)
-        self._of_walk = Totals(memory.zeros(TALLIES, np.int64))
+        self._of_walk, self._none = Totals(memory.zeros(TALLIES, np.int64)), none_proposed(memory)
         self.be(planes, np.zeros(TALLIES, np.int64))
         self._saved = Planes(*(memory.like(plane) for plane in planes))
         self._listed = Listed(
@@ -106,10 +108,10 @@ class CardWalk:
         while True:
             self._sent.taken[:] = 0
             self._of_walk.counts[:] = 0
+            walkers, planes = min(self._total, WALKERS), (self._planes, self._saved)
             self.memory.launch(
-                self._kernels.walk, self._total, seen, self._listed, candidates, self._planes, self._saved, self._sent,
-                self._of_walk,
-            )  # fmt: skip
+                self._kernels.walk, walkers, seen, self._listed, candidates, *planes, self._sent, self._of_walk
+            )
             taken = int(self._sent.taken[0])
             if taken <= len(self._sent.keys):
                 break
@@ -131,7 +133,7 @@ class CardWalk:
 
     def _candidates(self, seen: Clips, steps: list[list[Step]]) -> Candidates:
         if not self._flags.forced:
-            return none_proposed(self.memory)
+            return self._none
         t0_ns = [row[0][0].t0_ns for row in steps]
         t1_ns = [row[-1][0].t0_ns + int(row[-1][0].dt_ns) for row in steps]
         return proposed(self.memory, self._kernels.propose, seen, self._hot, self._numbers, t0_ns, t1_ns)

@@ -21,12 +21,10 @@ from vid2ev.errors import UsageError
 DEVICES = ("cpu", "cuda", "auto")
 SIMULATED = "simulated"  # for tests
 
-# `python examples/benchmark_gpu.py` prints the first three.  Those of a card are guesses, as none has been measured:
-# that to start and to compile two kernels takes 40 s, and that the 3.4 kB that torch's operations read and write for a
-# pixel and step, to carry light, go at 1 TB/s.
+# `python examples/benchmark_gpu.py` prints the first three.
 CPU_NS = 29.0  # for a pixel and step, of one thread of an AMD EPYC (Zen 4): light by flow, sensor "paper"
-START_S = 40.0
-CARD_NS = 3.4
+START_S = 21.0  # until a card has made its first events: kernels are compiled
+CARD_NS = 2.3  # for a pixel and step, of an H200
 STEPS_OF_FLOW = 17.0  # from frame to frame, of `--subframes auto`: the median of eight clips, 1 to 51
 UNKNOWN_FRAMES = 300  # what a source of unknown length is taken for
 

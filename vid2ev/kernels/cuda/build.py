@@ -25,6 +25,7 @@ CARD = ALWAYS | {
     "vid2ev.kernel_extending": "vid2ev.kernels.cuda.device_extending",
     "vid2ev.kernel_intrinsics": "vid2ev.kernel_intrinsics",  # (its own text, by the other way in)
     "vid2ev.kernels.cuda.counter": "vid2ev.kernels.cuda.device_counter",
+    "vid2ev.kernels.company": "vid2ev.kernels.cuda.warp",
 }
 SIMULATED = ALWAYS | {
     "vid2ev.kernel_compiler": "vid2ev.kernels.cuda.simulated_compiler",

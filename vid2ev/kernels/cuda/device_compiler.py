@@ -12,7 +12,7 @@ INNER_OPTIONS: dict[str, Any] = {}
 
 def compiled(function: Callable) -> Any:
     """A function that kernels call, or others that they call."""
-    return cuda.jit(device=True, lto=False)(function)
+    return cuda.jit(function, device=True, lto=False)
 
 
 inlined = inner = compiled

@@ -97,9 +97,12 @@ class Card:
         self.torch, self.device = torch, torch.device(device)
         if device == "cuda":  # (that of this thread, whichever thread asks next)
             self.device = torch.device("cuda", torch.cuda.current_device())
+        self._compiled: dict[Any, Any] = {}  # each kernel as it is for the types that it is always launched with
 
     def zeros(self, shape: Any, dtype: Any) -> Any:
-        return self.put(np.zeros(0, dtype)).new_zeros(shape)
+        kind = np.dtype(dtype)
+        kind = getattr(self.torch, np.dtype(SIGNED.get(kind, kind)).name)
+        return self.torch.zeros(shape, dtype=kind, device=self.device)
 
     def like(self, array: Any) -> Any:
         return self.torch.empty_like(array)
@@ -144,10 +147,16 @@ class Card:
         if threads == 0:
             return
         config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # (small sensors have few pixels)
-        with strict(), self.torch.cuda.device(self.device):  # (the first launch compiles)
+        seen, blocks = [_seen(argument) for argument in arguments], -(-threads // THREADS)
+        with self.torch.cuda.device(self.device):
             ours = self.torch.cuda.current_stream().cuda_stream
-            stream = cuda.external_stream(ours) if ours else 0
-            kernel[-(-threads // THREADS), THREADS, stream](*(_seen(argument) for argument in arguments))
+            configured = kernel.configure(blocks, THREADS, cuda.external_stream(ours) if ours else 0)
+            if kernel in self._compiled:  # (numba itself looks up the types of all arrays anew, which takes 1 ms)
+                self._compiled[kernel].launch(seen, configured.griddim, configured.blockdim, configured.stream)
+                return
+            with strict():
+                configured(*seen)
+            (self._compiled[kernel],) = kernel.overloads.values()
 
     def kernels(self, flags: Flags) -> Any:
         return _kernels("cuda", flags)
@@ -164,15 +173,20 @@ def _linear(light: Any) -> np.ndarray:
 
 def _seen(argument: Any, place: tuple[str, str] = ("", "")) -> Any:
     """An argument as a kernel takes it, without a copy."""
-    from numba import cuda
+    from numba.cuda.api import from_cuda_array_interface
 
     if hasattr(argument, "_fields"):
         kind = type(argument)
         return kind(*(_seen(getattr(argument, name), (kind.__name__, name)) for name in argument._fields))
     if not hasattr(argument, "__cuda_array_interface__"):
         return argument
-    array = cuda.as_cuda_array(argument)
-    return array.view(UNSIGNED[place]) if place in UNSIGNED else array
+    views = argument.__dict__.setdefault("seen_by_kernels", {})  # (a tensor stays where it is)
+    kind = UNSIGNED.get(place)
+    if kind not in views:
+        assert argument.is_contiguous(), place  # (what is compiled is compiled for that)
+        array = from_cuda_array_interface(argument.__cuda_array_interface__)  # (an owner of it would be a circle)
+        views[kind] = array if kind is None else array.view(kind)
+    return views[kind]
 
 
 @cache

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.kernels.company import together
 from vid2ev.kernels.cuda.staged import Staged, send_waiting
 from vid2ev.kernels.forced import keep_likely
 from vid2ev.kernels.general import walk_pixel
@@ -81,35 +82,40 @@ def glance(pixel, light, floats, ints, forced, planes, own, scratch, flagged, fl
 def walk(pixel, first, light, floats, ints, bases, due, planes, work, sent, flags, num, tally):
     """Walk a pixel through the frames of light [frames, pixels] from `first` on, and send its events.
 
-    `due` has the pixel's forced candidates.
+    `due` has the pixel's forced candidates.  All threads come through all frames (`company`): one without a pixel has
+    that of another, and `first` beyond the last.
     """
     stride, n, gain = stride_of(flags), np.int64(0), gain_of(planes, pixel)
     block, rest = planes.fast[pixel * stride : (pixel + 1) * stride], planes.rest[2 * pixel : 2 * pixel + 2]
     for i in range(SCRATCH):
         work.scratch[i] = F(0.0)
     work.one_pixel[1] = 0
-    for k in range(first, light.shape[0]):
+    for k in range(light.shape[0]):
         iv, out = interval_of_row(floats[k], ints[k]), Staged(sent.waiting, sent.keys, sent.taken, bases[k])
-        if floats[k, RISEN] > 0.0:
-            shift_pixel(pixel, floats[k, RISEN], planes, flags, num, work)
-        forget_rests(work.scratch)
-        tally[NOT_FINITE] += take_light(work.scratch, light[k, pixel], gain)
-        note_rests(work.scratch, scan(block, rest, work.scratch, work.flagged, pixel, 1, flags, num, iv))
-        out, n = solve(pixel, block, due, planes, work, flags, num, iv, out, n, tally)
-        commit(block, work.scratch, 1, flags)
+        forced, work.flagged[0] = np.int64(0), 0
+        together()
+        if k >= first:
+            if floats[k, RISEN] > 0.0:
+                shift_pixel(pixel, floats[k, RISEN], planes, flags, num, work)
+            forget_rests(work.scratch)
+            tally[NOT_FINITE] += take_light(work.scratch, light[k, pixel], gain)
+            note_rests(work.scratch, scan(block, rest, work.scratch, work.flagged, pixel, 1, flags, num, iv))
+            if len(flags.forced):
+                forced = take_due(due, iv)
+                forced = keep_likely(block, work.scratch, due.keys, due.chance, forced, flags, num, iv)
+        out, n = solve(pixel, block, due, forced, planes, work, flags, num, iv, out, n, tally)
+        if k >= first:
+            commit(block, work.scratch, 1, flags)
     if n > 0:
         send_waiting(sent, n)
 
 
 @inner
-def solve(pixel, block, due, planes, work, flags, num, iv, out, n, tally):
-    """Events of a pixel that has been scanned: (out, n)."""
-    forced, general = np.int64(0), len(flags.no_closed_form) > 0
+def solve(pixel, block, due, forced, planes, work, flags, num, iv, out, n, tally):
+    """Events of a pixel that has been scanned, if it is flagged or has forced candidates: (out, n)."""
+    general, loaded = len(flags.no_closed_form) > 0, np.int64(0)
     if len(flags.noise):
         general = general or not iv.noise_resolved
-    if len(flags.forced):
-        forced = take_due(due, iv)
-        forced = keep_likely(block, work.scratch, due.keys, due.chance, forced, flags, num, iv)
     if forced > 0 or (general and work.flagged[0] != 0):
         if len(flags.forced) + len(flags.noise) + len(flags.no_closed_form):
             out, n = walk_pixel(
@@ -119,8 +125,8 @@ def solve(pixel, block, due, planes, work, flags, num, iv, out, n, tally):
     elif work.flagged[0] != 0:
         work.hits[0] = 0
         load(block, work.scratch, work.lanes, work.pixels, work.hits, 1, pixel, flags)
-        out, n = climb(work, 1, planes, flags, num, iv, out, n, tally)
-    return out, n
+        loaded = np.int64(1)
+    return climb(work, loaded, planes, flags, num, iv, out, n, tally)
 
 
 @inner

@@ -35,6 +35,6 @@ class SimulatedKernel(kernel.FakeCUDAKernel):
             kernelapi.FakeCUDAShared = plain  # type: ignore[misc]
 
 
-def jit(function: Callable) -> SimulatedKernel:
+def jit(function: Callable, registers: int | None = None) -> SimulatedKernel:
     """A kernel."""
     return SimulatedKernel(function, device=False)

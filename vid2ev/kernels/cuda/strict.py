@@ -12,6 +12,8 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from vid2ev.kernel_flags import Numba, pass_over_flags
 
 _lock = threading.RLock()
@@ -24,6 +26,7 @@ def strict() -> Iterator[None]:
     compiler: Any = import_module("numba.cuda.compiler")
     nvvm: Any = import_module("numba.cuda.cudadrv.nvvm")
     with _lock:
+        _load()
         plain, plain_compiler = nvvm.compile_ir, compiler.CUDACompiler
 
         def compile_ir(modules: Any, **options: Any) -> Any:
@@ -34,6 +37,20 @@ def strict() -> Iterator[None]:
             yield
         finally:
             nvvm.compile_ir, compiler.CUDACompiler = plain, plain_compiler
+
+
+@cache
+def _load() -> None:
+    """What numba compiles for a GPU, loaded.  Up to 0.30 numba-cuda asks for `numpy.row_stack`, which numpy 2.5 has no
+    more: it is lent one."""
+    lent = not hasattr(np, "row_stack")
+    if lent:
+        np.vstack = np.vstack  # type: ignore[attr-defined]
+    try:
+        import_module("numba.cuda.cudaimpl")
+    finally:
+        if lent:
+            del np.vstack  # type: ignore[attr-defined]
 
 
 @cache

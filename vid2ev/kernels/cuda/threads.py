@@ -51,10 +51,13 @@ def glance_at(thread, clips, planes, own, scratch, flagged, flags, totals, tally
 
 @compiled
 def walk_listed(thread, clips, listed, candidates, planes, saved, work, waiting, sent, flags, totals, tally):
-    """`walk` for a pixel that is listed, whose state is saved before."""
-    place = listed.pixel[thread]
+    """`walk` for a pixel that is listed, whose state is saved before; a thread beyond the list goes along."""
+    begin = np.int64(clips.light.shape[0])
+    place = listed.pixel[min(thread, listed.count[0] - 1)]
     clip, first, last = place // clips.pixels, np.int64(0), np.int64(0)
-    copy_pixel(planes, saved, place, flags)
+    if thread < listed.count[0]:
+        begin = np.int64(listed.frame[thread])
+        copy_pixel(planes, saved, place, flags)
     times = clip if clips.interval_floats.shape[0] > 1 else 0
     forget_tally(tally)
     if len(flags.forced):
@@ -65,7 +68,7 @@ def walk_listed(thread, clips, listed, candidates, planes, saved, work, waiting,
     )  # fmt: skip
     bases = clips.bases[clip]
     walk(
-        place - clip * clips.pixels, np.int64(listed.frame[thread]), clips.light[:, clip], clips.interval_floats[times],
+        place - clip * clips.pixels, begin, clips.light[:, clip], clips.interval_floats[times],
         clips.interval_ints[times], bases, due, planes_of_clip(planes, clip, clips.pixels, flags), work,
         Staged(waiting, sent.keys, sent.taken, bases[0]), flags,
         sensor_of(clips.sensor_floats[clip], clips.sensor_ints[clip]), tally,

@@ -1,0 +1,16 @@
+"""What pixels that go together do of each other: on a CPU each goes through its loops alone."""
+
+from __future__ import annotations
+
+from vid2ev.kernel_compiler import inner
+
+
+@inner
+def together():
+    """Wait for the others."""
+
+
+@inner
+def anyone(does):
+    """Whether any of those that go together does."""
+    return does
