@@ -243,6 +243,24 @@ def test_a_scene_brings_its_own_rig(tmp_path: Path) -> None:
         convert(scene, tmp_path / "other", depth="plane:2", **OPTIONS)
 
 
+@pytest.mark.parametrize(
+    ("edit", "focal_px", "centre_px"),
+    [
+        ({"size": (16, 12)}, 0.5, (7.5, 5.5)),
+        ({"crop": "16x12+4+6"}, 1.0, (11.5, 5.5)),
+        ({"slowdown": 2.0}, 1.0, (15.5, 11.5)),
+    ],
+)
+def test_what_is_left_of_a_scene_is_seen_through_its_lens(
+    edit: dict[str, Any], focal_px: float, centre_px: tuple[float, float]
+) -> None:
+    scene = "scene:room,scene.duration_s=0.01,size=32x24"
+    whole, part = (Recipe.of(scene, frame_camera=True, **edits).rig for edits in ({}, edit))
+    assert not part.source_assumed
+    assert part.source.focal_px == pytest.approx([focal_px * each for each in whole.source.focal_px])
+    assert part.source.centre_px == pytest.approx(centre_px)
+
+
 def test_other_depth_is_another_recording(tmp_path: Path) -> None:
     np.save(tmp_path / "depth.npy", np.full((48, 64), 2, np.float32))
     options = OPTIONS | {"rig": rig(translation_mm=(40.0, 0.0, 0.0)), "depth": f"{tmp_path / 'depth.npy'},scale=1"}

@@ -20,6 +20,8 @@ from vid2ev.scenes.render import Picture
 from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import Source
 from vid2ev.sources.cut import Cut
+from vid2ev.sources.edit import Edit
+from vid2ev.sources.framing import framing_of
 from vid2ev.stream.frames import Frame
 
 GLANCE_PX = 64  # along a side: most cameras see much, and so many of their places say so
@@ -76,6 +78,18 @@ def scene_of(source: Source) -> SceneSource | None:
     """The scene that a source renders, or a part in time of one; None for other sources."""
     scene = source.source if isinstance(source, Cut) else source
     return scene if isinstance(scene, SceneSource) else None
+
+
+def lens_of(source: Source) -> Intrinsics | None:
+    """The lens of the scene that a source renders, through which what is left of its pictures is seen; None for other
+    sources."""
+    scene = source
+    while isinstance(scene, Edit):
+        scene = scene.source
+    if not isinstance(scene, SceneSource):
+        return None
+    framing = framing_of(source)
+    return framing.lens_of_part(scene.world.intrinsics) if framing else scene.world.intrinsics
 
 
 class Stage:

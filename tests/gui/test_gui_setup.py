@@ -7,6 +7,8 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -122,6 +124,19 @@ def test_each_scene_can_be_converted_as_it_comes(name: str, tmp_path: Path) -> N
     recipe = Recipe.of(**options_of(setup, tmp_path))
     assert [mount.kind for mount in recipe.mounts] == ["dvs", "cis"]
     assert str(command_of(setup)).startswith(f"vid2ev convert scene:{name},size=32x24")
+
+
+def test_a_changed_scene_keeps_photographs_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "used").mkdir()
+    cv2.imwrite(str(tmp_path / "own/wall.png"), np.full((8, 8, 3), 90, np.uint8))
+    file = tmp_path / "own/own.toml"
+    thing = '[[objects]]\nname = "wall"\nkind = "plane"\ntexture = "wall.png"\n'
+    file.write_text(f"[scene]\nduration_s = 0.01\n[camera]\nsize = [16, 12]\n{thing}")
+    setup = setup_of(f"scene:{file}")
+    setup = setup.with_scene(with_values(setup.settled(), "scene", {"ambient": (0.2, 0.3, 0.4)}))
+    source: Any = Recipe.of(**options_of(setup, tmp_path / "used")).source
+    assert next(iter(source.frames())).light.shape == (12, 16)
 
 
 def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -133,6 +134,20 @@ def test_convert_reads_the_folder_and_many_of_them() -> None:
         ).exit_code
         == 0
     )
+
+
+def test_a_scene_with_photographs_of_its_own_is_rendered_again_from_its_folder() -> None:
+    rng = np.random.default_rng(0)
+    Path("own").mkdir()
+    for name in ("wall", "sky"):
+        cv2.imwrite(f"own/{name}.png", rng.integers(0, 255, (16, 16, 3), np.uint8))
+    text = '[scene]\nduration_s = 0.01\nenvironment = "sky.png"\n[camera]\nsize = [16, 12]\n'
+    Path("own/scene.toml").write_text(f'{text}[[objects]]\nname = "wall"\nkind = "plane"\ntexture = "wall.png"\n')
+    assert vid2ev("scene", "own/scene.toml", "-o", "first", "-q").exit_code == 0
+    shutil.rmtree("own")
+    Path("first").rename("moved")
+    assert vid2ev("scene", "moved/scene.toml", "-o", "second", "-q").exit_code == 0
+    assert Path("moved/000000.png").read_bytes() == Path("second/000000.png").read_bytes()
 
 
 def test_the_preview_is_a_film_of_the_scene() -> None:

@@ -155,6 +155,8 @@ def read_scene(name_or_path: str | Path, settings: Sequence[str] = ()) -> SceneF
         raise DataError(f"scene {path} is not valid TOML: {error}; correct that line") from error
     if isinstance(tables.get("camera"), list):  # (of a scene it is one table)
         raise UsageError(f"{path} is a rig file, not a scene; use it with vid2ev convert VIDEO --rig {path}")
+    if not tables:
+        raise UsageError(f"scene {path} says nothing: expected tables such as [scene], [camera] and [[objects]]")
     for text in settings:
         tables = changed(tables, text, name)
     asked = (_parsed(text.partition("=")[2].strip()) for text in settings)
