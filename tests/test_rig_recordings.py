@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +54,15 @@ def test_a_camera_where_the_video_was_taken_sends_what_it_sends_alone(tmp_path: 
         assert one[:2] == other[:2] and one[3] == other[3] and abs(one[2] - other[2]) <= 1
 
 
-def test_a_sensor_file_is_named_as_seen_from_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_holds_the_sensor_files_of_its_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine").mkdir()
-    Path("mine/sensor.toml").write_text("[dvs]\nthreshold_on = 0.2\n")
-    convert(CLIP, "made/out", rig=rig(sensor="mine/sensor.toml"), **OPTIONS)
-    (named,) = [
-        each["sensor"] for each in tomllib.loads(Path("made/out/rig.toml").read_text())["camera"] if "sensor" in each
-    ]
-    assert Path("made/out", named).resolve() == Path("mine/sensor.toml").resolve()
+    Path("mine/sensor.toml").write_text("[dvs]\nthreshold_on = 0.2\nrefractory_us = 90\n")
+    convert(CLIP, "made/out", rig=rig(sensor="mine/sensor.toml", set={"threshold_on": 0.3}), **OPTIONS)
+    Path("mine/sensor.toml").unlink()
+    Path("made").rename("moved")
+    convert(CLIP, "again", rig="moved/out/rig.toml", **OPTIONS)
+    assert columns(Path("moved/out/right")) == columns(Path("again/right"))
 
 
 def test_every_camera_has_a_recording_of_its_own(tmp_path: Path) -> None:

@@ -19,15 +19,18 @@ from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
-from vid2ev.rig.rig_file import rig_text, write_text
+from vid2ev.rig.rig_file import is_file, rig_text, write_text
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import sees_nothing
+from vid2ev.toml_text import toml_text
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
 from vid2ev.tracks.truth import TruthTrack, truth_files
 from vid2ev.untrusted import json_of
+
+SENSORS = "sensors"  # the folder
 
 
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
@@ -191,8 +194,22 @@ class Recorder:
         for mount, truth in zip(self.recipe.mounts, self._truths, strict=False):
             truth.write(whole / mount.within)
         if not self.recipe.alone:
-            rig = rig_text(self.recipe.rig.settled(), self.folder.directory)  # (as seen from where it will be)
-            write_text(whole / "rig.toml", rig, overwrite=True)
+            self._write_rig(whole)
+
+    def _write_rig(self, whole: Path) -> None:
+        """The rig file, and files of those sensors that are no presets, as they were."""
+        rig, cameras = self.recipe.rig.settled(), []
+        for camera, mount in zip(rig.cameras, self.recipe.mounts, strict=True):
+            if camera.sensor is not None and is_file(camera.sensor):
+                about = {"title": f"{Path(camera.sensor).stem}, as {camera.name} had it"}
+                text = toml_text({"about": about, mount.kind: mount.sensor.spec.model_dump(mode="json")})
+                name = f"{SENSORS}/{camera.name}.toml"
+                (whole / SENSORS).mkdir(exist_ok=True)
+                write_text(whole / name, text, overwrite=True)
+                camera = camera.model_copy(update={"sensor": name})
+            cameras.append(camera)
+        rig = rig.model_copy(update={"cameras": tuple(cameras)})
+        write_text(whole / "rig.toml", rig_text(rig), overwrite=True)
 
     def span_us(self, number: int) -> tuple[int, int]:
         """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last

@@ -136,7 +136,7 @@ def test_a_changed_scene_keeps_photographs_of_its_own(tmp_path: Path) -> None:
     setup = setup_of(f"scene:{file}")
     setup = setup.with_scene(with_values(setup.settled(), "scene", {"ambient": (0.2, 0.3, 0.4)}))
     source: Any = Recipe.of(**options_of(setup, tmp_path / "used")).source
-    assert next(iter(source.frames())).light.shape == (12, 16)
+    assert next(iter(source.frames())).light.shape == (12, 16, 3)
 
 
 def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ def rig_text(rig: Rig, folder: Path = Path()) -> str:
     """The text of a rig file; `sensor` files are named as seen from `folder`."""
     tables = [] if rig.source == Source() else ["[source]\n" + _keys(rig.source)]
     for camera in rig.cameras:
-        if camera.sensor is not None and _is_file(camera.sensor) and not os.path.isabs(camera.sensor):
+        if camera.sensor is not None and is_file(camera.sensor) and not os.path.isabs(camera.sensor):
             camera = camera.model_copy(update={"sensor": os.path.relpath(camera.sensor, folder)})
         tables.append("[[camera]]\n" + _keys(camera))
     return "\n".join(tables)
@@ -124,14 +124,14 @@ def _camera(table: Mapping[str, Any], index: int, path: Path, to_use: bool) -> C
     name = table.get("name")
     where = f"{path}: camera '{name}'" if isinstance(name, str) else f"{path}: camera {index + 1}"
     camera = _made(Camera, table, where)
-    if camera.sensor is not None and _is_file(camera.sensor):
+    if camera.sensor is not None and is_file(camera.sensor):
         if to_use:
             beside(path, camera.sensor)
         camera = camera.model_copy(update={"sensor": os.path.normpath(path.parent / camera.sensor)})
     return camera
 
 
-def _is_file(sensor: str) -> bool:
+def is_file(sensor: str) -> bool:
     """Whether a sensor is named by a file; a preset's name has neither suffix nor folder."""
     return sensor.endswith(".toml") or len(Path(sensor).parts) > 1
 
