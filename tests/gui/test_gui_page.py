@@ -197,10 +197,16 @@ def test_a_change_is_seen_a_bad_one_is_refused_and_two_tabs_do_not_mix(browser: 
 
 def test_the_page_is_served_to_this_machine_alone(address: Any) -> None:
     host, port = address[0].removeprefix("http://").split(":")
-    for name, status in ((f"127.0.0.1:{port}", b"200"), ("evil.example", b"403")):
+    here = f"127.0.0.1:{port}"
+    for name, origin, status in (
+        (here, "", b"200"), (here, f"http://{here}", b"200"), ("evil.example", "", b"403"),
+        (here, "http://evil.example", b"403"), (here, "http://127.0.0.1:1", b"403"), (here, "null", b"403"),
+        (here, "http:127.0.0.1", b"403"),
+    ):  # fmt: skip
         with socket.create_connection((host, int(port))) as link:
-            link.sendall(f"GET / HTTP/1.1\r\nHost: {name}\r\nConnection: close\r\n\r\n".encode())
-            assert link.recv(64).split()[1] == status
+            came = f"Origin: {origin}\r\n" * bool(origin)
+            link.sendall(f"GET / HTTP/1.1\r\nHost: {name}\r\n{came}Connection: close\r\n\r\n".encode())
+            assert link.recv(64).split()[1] == status, origin
 
 
 def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser: Any, address: Any) -> None:

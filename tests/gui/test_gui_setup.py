@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import shlex
 import socket
 from pathlib import Path
@@ -15,8 +16,9 @@ from click.testing import CliRunner
 from vid2ev.commands.convert import convert
 from vid2ev.commands.gui import gui
 from vid2ev.commands.worker_options import NAMES
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text
+from vid2ev.gui.guard import Guard
 from vid2ev.gui.loading import loaded
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
 from vid2ev.gui.setup import Setup, setup_of
@@ -126,6 +128,14 @@ def test_each_scene_can_be_converted_as_it_comes(name: str, tmp_path: Path) -> N
     assert str(command_of(setup)).startswith(f"vid2ev convert scene:{name},size=32x24")
 
 
+@pytest.mark.parametrize("name", ["n" * 300 + ".toml", "a\0b", "", "..", "/"])
+def test_a_file_is_taken_whatever_a_browser_calls_it(name: str, tmp_path: Path) -> None:
+    setup = loaded(setup_of(SMALL), "[dvs]\nthreshold_on = 0.33\n", name, tmp_path)
+    assert setup.spec(0).threshold_on == 0.33
+    with pytest.raises(DataError, match="is not valid TOML"):
+        loaded(setup, "[", name, tmp_path)
+
+
 def test_a_changed_scene_keeps_photographs_of_its_own(tmp_path: Path) -> None:
     (tmp_path / "own").mkdir()
     (tmp_path / "used").mkdir()
@@ -148,3 +158,29 @@ def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pyte
     with socket.create_server(("127.0.0.1", 0)) as taken:
         refused = CliRunner().invoke(gui, [SMALL, "--port", str(taken.getsockname()[1])]).exception
     assert isinstance(refused, UsageError) and "give another --port, or 0" in str(refused)
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "status"),
+    [
+        ("127.0.0.1:80", "", 200),
+        ("[::1]:80", "http://[::1]:80", 200),
+        ("localhost", "http://localhost", 200),
+        ("127.0.0.1:80", "http://127.0.0.1:81", 403),
+        ("127.0.0.1:80", "null", 403),
+        ("127.0.0.1:80", "http:127.0.0.1", 403),
+        ("evil.example", "", 403),
+    ],
+)
+def test_pages_of_others_are_not_served(host: str, origin: str, status: int) -> None:
+    sent: list[Any] = []
+
+    async def page(scope: Any, receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200})
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    headers = [(b"host", host.encode()), *([(b"origin", origin.encode())] if origin else [])]
+    asyncio.run(Guard(page, "127.0.0.1")({"type": "http", "headers": headers}, None, send))
+    assert sent[0]["status"] == status

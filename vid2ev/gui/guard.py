@@ -1,7 +1,7 @@
 """A page on loopback is for this machine alone: what asks for it under another name is another page's doing.
 
 A page of the web can have a browser resolve its own name to 127.0.0.1 and so read what is served there (DNS rebinding);
-the name that it asks for gives it away.
+the name that it asks for gives it away.  What another port of this machine serves is another page, too.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Guard:
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         if self._local and scope["type"] in ("http", "websocket"):
             headers = dict(scope["headers"])
-            asked = _name(headers.get(b"host", b"").decode("latin-1"))
-            came = _name(headers.get(b"origin", b"").decode("latin-1").rpartition("//")[2])
-            if asked not in LOOPBACK or came not in ("", *LOOPBACK):
+            asked = headers.get(b"host", b"").decode("latin-1")
+            came = headers.get(b"origin", b"").decode("latin-1")
+            if _name(asked) not in LOOPBACK or came not in ("", f"http://{asked}"):
                 if scope["type"] == "websocket":
                     await send({"type": "websocket.close", "code": 1008})
                 else:

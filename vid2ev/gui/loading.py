@@ -23,7 +23,7 @@ def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
         tables = parsed_toml(text)
     except ValueError as error:
         raise DataError(f"{name} is not valid TOML: {error}; correct that line") from error
-    path = folder / Path(name).name
+    path = folder / "given.toml"  # (what a browser calls it may be no name for a file here)
     write_text(path, text, overwrite=True)
     try:
         return _taken(setup, path, tables)

@@ -42,7 +42,7 @@ class Record:
         self._bar = ui.linear_progress(value=0, show_value=False).props("rounded size=6px").classes("mt-3")
         self._said = ui.label().classes("v-muted").props('data-key="said"')
         self._busy(False)
-        self._source = ""
+        self._source, self._offered = "", list[str]()
         session.on("setup", lambda _: self.show())
         self.show()
 
@@ -53,15 +53,26 @@ class Record:
             self._upload = ui.upload(
                 on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file"
             ).props('accept=".toml" flat data-key="load"')
-        with ui.button("Save").props("flat dense data-key=save"), ui.menu():
-            for number, camera in enumerate(session.setup.rig.cameras):
-                ui.menu_item(
-                    f"sensor of {camera.name}",
-                    lambda k=number: self._save(f"{self._name(k)}.toml", partial(_sensor, k)),
-                )
+        with ui.button("Save").props("flat dense data-key=save"), ui.menu() as self._saves:
+            self._offer()
+        session.on("setup", lambda _: self._offer())
+        ui.button("Convert", on_click=self.convert).props('unelevated dense data-key="convert"')
+
+    def _offer(self) -> None:
+        """What can be saved: a file for each camera's sensor, and those of the rig and the scene."""
+        names = [camera.name for camera in self._session.setup.rig.cameras]
+        if names == self._offered:
+            return
+        self._offered = names
+        self._saves.clear()
+        with self._saves:
+            for number, name in enumerate(names):
+                ui.menu_item(f"sensor of {name}", partial(self._save_sensor, number))
             ui.menu_item("rig", lambda: self._save(RIG, lambda setup, folder: rig_text(setup.rig, folder)))
             ui.menu_item("scene", lambda: self._save(SCENE, lambda setup, _: scene_text(setup)))
-        ui.button("Convert", on_click=self.convert).props('unelevated dense data-key="convert"')
+
+    def _save_sensor(self, number: int) -> None:
+        self._save(f"{self._name(number)}.toml", partial(_sensor, number))
 
     def show(self) -> None:
         """Show the command."""
