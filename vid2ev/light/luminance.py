@@ -6,7 +6,8 @@
 
 Y', Cb and Cr come from the codes in float32 and never touch 8 bits again; the transfer curve acts on each channel
 before the channels are added, because luminance is a sum of light, not of codes.  Codes brighter than white (above 235
-in limited range) become light above 1; a channel that the matrix makes negative is black.
+in limited range) become light above 1; a channel that the matrix makes negative is black, and one that it makes larger
+than 1.25, which no camera means, is 1.25.
 
 Y'CgCo has R' = Y' - Cg + Co, G' = Y' + Cg, B' = Y' - Cg - Co instead.
 
@@ -30,7 +31,7 @@ from vid2ev.light.transfer import parse_transfer
 
 STEPS, FINE_STEPS = 4096, 32768  # table entries per unit of signal
 FINE_CURVES = ("pq", "hlg", "smpte240m", "st428", "log100", "log316")
-TOP = 1.25  # the highest signal: limited range ends at (255 - 16) / 219 = 1.09, saturated colours go beyond
+TOP = 1.25  # the highest signal: limited range ends at (255 - 16) / 219 = 1.09, colours that there are not go beyond
 F = np.float32
 _ZERO = F(0)
 

@@ -197,7 +197,8 @@ def _rows(path: Path) -> list[list[float]]:
             f"motion '{path}': no such file; give {', '.join(MOTIONS)} or a file t,x,y[,angle][,zoom]"
         ) from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as CSV ({error}); expected rows of t,x,y[,angle][,zoom]") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise DataError(f"{path}: cannot be read as CSV ({why}); expected rows of t,x,y[,angle][,zoom]") from error
     if not lines:
         raise DataError(f"{path}: no rows; expected rows of t,x,y[,angle][,zoom]")
     names = ["t", "x", "y", "angle", "zoom"][: max(map(len, lines))]

@@ -16,6 +16,7 @@ import numpy as np
 
 from vid2ev.kernel_flags import Numba, pass_over_flags
 
+NO_MORE = "row_stack"
 _lock = threading.RLock()
 
 
@@ -43,14 +44,14 @@ def strict() -> Iterator[None]:
 def _load() -> None:
     """What numba compiles for a GPU, loaded.  Up to 0.30 numba-cuda asks for `numpy.row_stack`, which numpy 2.5 has no
     more: it is lent one."""
-    lent = not hasattr(np, "row_stack")
+    lent = not hasattr(np, NO_MORE)
     if lent:
-        np.vstack = np.vstack  # type: ignore[attr-defined]
+        setattr(np, NO_MORE, np.vstack)
     try:
         import_module("numba.cuda.cudaimpl")
     finally:
         if lent:
-            del np.vstack  # type: ignore[attr-defined]
+            delattr(np, NO_MORE)
 
 
 @cache
