@@ -46,11 +46,11 @@ class OfStill:
         if asked := [name for name, value in unfit.items() if value is not None]:
             raise UsageError(f"{picture} is a single frame, which stays as it is; leave {asked[0]} out")
         self._picture, self._path, self.name = picture, events, picture.stem
-        pixels = read_picture(picture).pixels
+        pixels, primaries, tagged = read_picture(picture)
         self.size = pixels.shape[1], pixels.shape[0]
         self.channels, self.bits = (1 if pixels.ndim == 2 else 3), (8 if pixels.dtype == np.uint8 else 16)
-        transfer = "srgb" if options.transfer == "auto" else options.transfer
-        light = torch.from_numpy(PictureReader(transfer, "rgb").light(pixels))[..., : self.channels]
+        transfer = tagged or "srgb" if options.transfer == "auto" else options.transfer
+        light = torch.from_numpy(PictureReader(transfer, "rgb").light(pixels, primaries))[..., : self.channels]
         self._codes = to_codes(light, "srgb").numpy()
         self._events = table_of(events) if is_mat(events) else Events.concatenate(read_events(events))
         if len(self._events) < 2:

@@ -32,6 +32,7 @@ from vid2ev.sources.source import Source
 SIDE = 346  # px
 LONGEST_S = 0.25
 MARGIN = 1.02
+OF_SOURCE = ("crop", "size", "slowdown", "start", "stop", "fps")  # options of the source, which a conversion obeys
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,8 @@ class LightTable:
         notes = _notes(mounts, _sizes(whole))
         if asked > 1.5 * fps:
             notes.append(f"the scene is rendered {fps} times a second here, where motion and light ask for {asked:.0f}")
+        if changed := [name for name in OF_SOURCE if name in setup.options]:
+            notes.append(f"the whole scene is shown here, without {' and '.join(changed)}")
         colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
         source: Any = SceneSource(world, "scene", fps=fps, colour=colour)
         recipe = Recipe("scene", source, rig, mounts, upsample="none")

@@ -1,8 +1,9 @@
 """Files of pictures: pixels, and which colours red, green and blue are in them.
 
 OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says;
-the package OpenEXR reads EXR.  Transparency is left out.  Of an EXR with several parts or layers the first with colour
-counts: R, G, B or else Y.  Its data window is set into its display window, black around, and its chromaticities hold.
+the package OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`).  Transparency is left out.  Of an EXR
+with several parts or layers the first with colour counts: R, G, B or else Y.  Its data window is set into its display
+window, black around, and its chromaticities hold.
 
 Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
 """
@@ -18,6 +19,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.light.pictures import TYPES
+from vid2ev.light.png_tags import png_tags
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr
@@ -26,10 +28,12 @@ AHEAD = 1 << 25  # bytes of pages that are read at once
 
 
 class Picture(NamedTuple):
-    """Pixels [H, W] or [H, W, 3 (red, green, blue)]; the primaries are those of BT.709 if the file names no others."""
+    """Pixels [H, W] or [H, W, 3 (red, green, blue)]; the primaries are those of BT.709 if the file names no others, and
+    the transfer curve of codes that of sRGB."""
 
     pixels: np.ndarray
     primaries: Primaries | None = None
+    transfer: str | None = None
 
 
 def pages_of(path: Path) -> int:
@@ -44,7 +48,12 @@ def pages_of(path: Path) -> int:
 
 def read_picture(path: Path, page: int = 0) -> Picture:
     """A picture, upright.  Raises DataError for a file that holds none, UsageError for an EXR without the package."""
-    return _checked(_read_exr(path) if head_of(path).startswith(EXR) else Picture(_read(path, page)[0]), path)
+    head = head_of(path)
+    if head.startswith(EXR):
+        return _checked(_read_exr(path), path)
+    pixels = _read(path, page)[0]
+    transfer, primaries = png_tags(path) if head.startswith(PNG) else (None, None)
+    return _checked(Picture(pixels, primaries, transfer), path)
 
 
 class PageReader:

@@ -84,8 +84,8 @@ def _photograph(name: str) -> np.ndarray:
     from vid2ev.light.picture_files import read_picture
     from vid2ev.light.pictures import PictureReader
 
-    pixels, primaries = read_picture(photograph_file(name) if name in PHOTOGRAPHS else Path(name))
-    transfer = "linear" if pixels.dtype.kind == "f" else "srgb"
+    pixels, primaries, tagged = read_picture(photograph_file(name) if name in PHOTOGRAPHS else Path(name))
+    transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
     return np.maximum(PictureReader(transfer, "rgb").light(pixels, primaries), 0)
 
 

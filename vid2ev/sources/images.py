@@ -3,7 +3,8 @@
 8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
 rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB unless
-a transfer is given, or `frames.json` says one, 16-bit ones too; floating point is linear light, 1.0 white as it stands.
+a transfer is given, or `frames.json` or the first PNG says one, 16-bit ones too; floating point is linear light, 1.0
+white as it stands.
 Transparency is ignored.
 """
 
@@ -69,12 +70,12 @@ class Images:
         if fps is None:
             self._stamps, self._unit = self._read_stamps()
             self.warnings += remarks_on_unit(self._unit)
-        first = read_picture(*self._places[0]).pixels
+        first, _, tagged = read_picture(*self._places[0])
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         if transfer == "auto":
-            transfer = "linear" if first.dtype.kind == "f" else _said(self.path / FRAMES)
+            transfer = "linear" if first.dtype.kind == "f" else _said(self.path / FRAMES, tagged or "srgb")
         self._reader = PictureReader(transfer, colour)
         self._dtype = first.dtype
 
@@ -112,7 +113,7 @@ class Images:
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _light(self, file: Path, picture: Picture) -> np.ndarray:
-        pixels, primaries = picture
+        pixels, primaries, _ = picture
         if (pixels.shape[1], pixels.shape[0]) != self.size:
             width, height = self.size
             raise DataError(
@@ -137,12 +138,12 @@ class Images:
         return stamps, unit
 
 
-def _said(path: Path) -> str:
-    """The transfer curve that pictures of a folder are said to be coded by; sRGB if nothing is said."""
+def _said(path: Path, otherwise: str) -> str:
+    """The transfer curve that pictures of a folder are said to be coded by; another if nothing is said."""
     try:
-        return parse_transfer(str(json_of(read_text(path)).get("transfer", "srgb"))).name
+        return parse_transfer(str(json_of(read_text(path)).get("transfer", otherwise))).name
     except (OSError, ValueError, AttributeError):  # (there is none, or it is none of ours)
-        return "srgb"
+        return otherwise
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:

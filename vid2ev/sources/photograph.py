@@ -64,9 +64,9 @@ class Photograph:
     ):
         self.path, self.warnings = Path(path), list[str]()
         self._motion = parse_motion(motion)
-        pixels, primaries = read_picture(self.path)
+        pixels, primaries, tagged = read_picture(self.path)
         if transfer == "auto":
-            transfer = "linear" if pixels.dtype.kind == "f" else "srgb"
+            transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
         self._transfer, self._crop = transfer, crop
         self._light = PictureReader(transfer, colour).light(pixels, primaries)
         if crop is not None:

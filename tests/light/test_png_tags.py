@@ -1,0 +1,71 @@
+"""Colour tags of PNG, in files put together by hand."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vid2ev import open_source
+from vid2ev.light.picture_files import read_picture
+from vid2ev.light.primaries import primaries_of
+from vid2ev.light.transfer import parse_transfer
+
+SRGB = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
+BT2020 = struct.pack(">8I", 31270, 32900, 70800, 29200, 17000, 79700, 13100, 4600)
+
+
+def png(path: Path, pixels: np.ndarray, *tags: tuple[bytes, bytes]) -> Path:
+    """RGB of 8 bits, with chunks before the pixels."""
+    height, width, _ = pixels.shape
+    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
+    head = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", head), *tags, (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    made = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    ]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(made))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("tags", "transfer", "primaries"),
+    [
+        ([], None, None),
+        ([(b"cICP", bytes([9, 16, 0, 1]))], "pq", 9),
+        ([(b"cICP", bytes([1, 1, 0, 1]))], "bt709", 1),
+        ([(b"gAMA", struct.pack(">I", 45455)), (b"cHRM", SRGB)], None, 1),
+        ([(b"gAMA", struct.pack(">I", 100000)), (b"cHRM", BT2020)], "linear", 9),
+        ([(b"gAMA", struct.pack(">I", 50000))], "gamma:2", None),
+        ([(b"gAMA", struct.pack(">I", 50000)), (b"sRGB", b"\0")], None, None),
+        ([(b"iCCP", b"x\0\0" + bytes(5000)), (b"cICP", bytes([12, 13, 0, 1]))], "srgb", 12),
+        ([(b"gAMA", struct.pack(">I", 0)), (b"cHRM", bytes(32))], None, None),
+        ([(b"gAMA", b"\1"), (b"cHRM", bytes(3)), (b"cICP", b"\1")], None, None),
+        ([(b"gAMA", struct.pack(">I", 1))], None, None),
+    ],
+)
+def test_a_png_says_what_its_codes_stand_for(
+    tmp_path: Path, tags: list[tuple[bytes, bytes]], transfer: str | None, primaries: int | None
+) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
+    found = read_picture(png(tmp_path / "one.png", pixels, *tags))
+    assert (found.pixels == pixels).all() and found.transfer == transfer
+    if primaries is None:
+        assert found.primaries is None
+    else:
+        assert found.primaries is not None
+        np.testing.assert_allclose(found.primaries.to_bt709, primaries_of(primaries).to_bt709, atol=2e-3)
+
+
+def test_a_folder_of_them_is_read_so_unless_told_otherwise(tmp_path: Path) -> None:
+    pixels = np.full((4, 4, 3), 128, np.uint8)
+    for k in range(2):
+        png(tmp_path / f"{k}.png", pixels, (b"cICP", bytes([1, 16, 0, 1])))
+    for asked, curve in (("auto", "pq"), ("srgb", "srgb")):
+        source = open_source(tmp_path, fps=10, transfer=asked)
+        assert source.describe()["transfer"] == curve
+        light = next(iter(source.frames())).luminance
+        assert light == pytest.approx(float(parse_transfer(curve).to_light(np.array(128 / 255))), rel=1e-5)

@@ -1,0 +1,67 @@
+"""What a PNG says of its colours: the curve of its codes, and which red, green and blue they are of.
+
+    cICP      code points of Rec. ITU-T H.273; before all others
+    iCCP      a profile, which is not read: sRGB
+    sRGB      sRGB
+    gAMA      codes are light ^ g.  1 / 2.2 is what programs write beside sRGB, and taken for that
+    cHRM      chromaticities, where none of the first three is there
+
+Source: PNG (third edition), W3C Recommendation of 2025, sections 4.3 and 11.3.2.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
+from vid2ev.light.recognise import PNG
+from vid2ev.light.tags import TRANSFERS
+
+LARGEST = 64  # bytes of a tag that is read
+USUAL_GAMMA = 45455  # hundred thousandths
+SLOPES = (0.1, 10.0)  # of curves `gamma:G`
+
+
+def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
+    """The transfer curve of a PNG that can be read, and its primaries; None where it does not say."""
+    chunks = _chunks(path)
+    if len(code := chunks.get(b"cICP", b"")) == 4:
+        return TRANSFERS.get(code[1]), primaries_of(code[0])
+    if b"iCCP" in chunks or b"sRGB" in chunks:
+        return None, None
+    return _curve(chunks.get(b"gAMA", b"")), _primaries(chunks.get(b"cHRM", b""))
+
+
+def _chunks(path: Path) -> dict[bytes, bytes]:
+    """What comes before the pixels, by its name."""
+    found: dict[bytes, bytes] = {}
+    with open(path, "rb") as file:
+        file.seek(len(PNG))
+        while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
+            length = int.from_bytes(head[:4], "big")
+            after = file.tell() + length + 4
+            found.setdefault(head[4:], file.read(min(length, LARGEST)))
+            file.seek(after)
+    return found
+
+
+def _curve(gamma: bytes) -> str | None:
+    number = int.from_bytes(gamma, "big")
+    if len(gamma) != 4 or number == 0 or abs(number - USUAL_GAMMA) <= USUAL_GAMMA // 100:
+        return None
+    slope = 100000 / number
+    if not SLOPES[0] <= slope <= SLOPES[1]:
+        return None
+    return "linear" if number == 100000 else f"gamma:{slope:.6g}"
+
+
+def _primaries(places: bytes) -> Primaries | None:
+    """Of white, red, green and blue, in this order."""
+    if len(places) != 32:
+        return None
+    numbers = [int.from_bytes(places[k : k + 4], "big") / 100000 for k in range(0, 32, 4)]
+    white, *colours = zip(numbers[::2], numbers[1::2], strict=True)
+    try:
+        return primaries_at([*colours, white])
+    except ValueError:
+        return None
