@@ -63,6 +63,13 @@ def test_a_recording_holds_the_sensor_files_of_its_rig(tmp_path: Path, monkeypat
     Path("made").rename("moved")
     convert(CLIP, "again", rig="moved/out/rig.toml", **OPTIONS)
     assert columns(Path("moved/out/right")) == columns(Path("again/right"))
+    convert(CLIP, "again", rig="moved/out/rig.toml", overwrite=True, **OPTIONS)
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "a\0b", "a/" * 3000])
+def test_a_folder_that_cannot_be_is_one_sentence(name: str) -> None:
+    with pytest.raises(UsageError, match="no folder can have the name"):
+        convert(CLIP, name, **OPTIONS)
 
 
 def test_every_camera_has_a_recording_of_its_own(tmp_path: Path) -> None:

@@ -30,9 +30,6 @@ from vid2ev.tracks.dvs import DvsTrack, dvs_files
 from vid2ev.tracks.truth import TruthTrack, truth_files
 from vid2ev.untrusted import json_of
 
-SENSORS = "sensors"  # the folder
-
-
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     """The files that a folder is to be made with."""
     events = [mount.within for mount in recipe.mounts if mount.kind == "dvs"]
@@ -203,8 +200,7 @@ class Recorder:
             if camera.sensor is not None and is_file(camera.sensor):
                 about = {"title": f"{Path(camera.sensor).stem}, as {camera.name} had it"}
                 text = toml_text({"about": about, mount.kind: mount.sensor.spec.model_dump(mode="json")})
-                name = f"{SENSORS}/{camera.name}.toml"
-                (whole / SENSORS).mkdir(exist_ok=True)
+                name = f"rig.{camera.name}.toml"
                 write_text(whole / name, text, overwrite=True)
                 camera = camera.model_copy(update={"sensor": name})
             cameras.append(camera)

@@ -213,7 +213,12 @@ def beside(file: Path, name: str) -> Path:
             f"{file} names {name}, which is not in its folder or below; put it there, or set {PATHS}=anywhere in the"
             " environment if the file is to be trusted"
         )
-    longest = max(len(part.encode(errors="replace")) for part in place.split(os.sep))
-    if longest > LONGEST_NAME or len(place.encode(errors="replace")) > LONGEST_PATH:
+    if not possible(place):
         raise UsageError(f"{file} names {name}: expected the name of a file, which has {LONGEST_NAME} bytes at most")
     return Path(place)
+
+
+def possible(place: str) -> bool:
+    """Whether a file can have this name."""
+    longest = max(len(part.encode(errors="replace")) for part in place.split(os.sep))
+    return "\0" not in place and longest <= LONGEST_NAME and len(place.encode(errors="replace")) <= LONGEST_PATH

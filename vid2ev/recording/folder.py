@@ -32,11 +32,11 @@ from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.stream.eager import EagerFile
-from vid2ev.untrusted import read_arrays
+from vid2ev.untrusted import possible, read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
     r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
-    r"|noise_maps\.npz|truth|rig\.toml|manifest\.json"
+    r"|noise_maps\.npz|truth|rig(\.[^/]+)?\.toml|manifest\.json"
 )
 WITHIN = re.compile(  # what the folders among them hold
     r"\d{6,}\.(png|npy|npz)|(timestamps|poses)\.txt|slices\.csv|intrinsics\.json"
@@ -239,6 +239,8 @@ def begun_job(directory: Path) -> dict[str, Any]:
 
 def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
     """Raise UsageError unless a recording may be written to `directory`; touches nothing."""
+    if not possible(str(directory)):
+        raise UsageError(f"no folder can have the name {str(directory)[:80]!r}; choose another one with -o")
     if directory.name in ("", "..") or directory.is_mount() or os.path.realpath(directory) == os.getcwd():
         raise UsageError(
             f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
