@@ -30,6 +30,7 @@ from vid2ev.tracks.dvs import DvsTrack, dvs_files
 from vid2ev.tracks.truth import TruthTrack, truth_files
 from vid2ev.untrusted import json_of
 
+
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     """The files that a folder is to be made with."""
     events = [mount.within for mount in recipe.mounts if mount.kind == "dvs"]
