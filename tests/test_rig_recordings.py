@@ -148,6 +148,23 @@ def test_a_part_of_a_video_is_as_far_as_the_video_and_seen_through_the_same_lens
     np.testing.assert_allclose(next(recipe.source.frames()).depth, 4, rtol=1e-6)
 
 
+def test_a_part_brought_to_the_size_of_the_whole_has_a_longer_lens(tmp_path: Path) -> None:
+    whole = Source(size=(64, 48), focal_px=(50.0, 50.0), centre_px=(30.0, 20.0))
+    options = {"crop": "32x24+10+8", "size": (64, 48)} | OPTIONS
+    recipe = Recipe.of(CLIP, rig=Rig(source=whole, cameras=(Camera(name="dvs", kind="dvs"),)), **options_of(options))
+    assert recipe.rig.source.focal_px == pytest.approx((100, 100))
+    assert recipe.rig.source.centre_px == pytest.approx((40.5, 24.5))
+    convert(CLIP, tmp_path / "out", rig=Rig(source=whole, cameras=rig().cameras), **options)
+    again = Recipe.of(CLIP, rig=tmp_path / "out/rig.toml", **options_of(options))
+    assert again.rig.source.focal_px == pytest.approx((100, 100))
+    assert again.rig.source.centre_px == pytest.approx((40.5, 24.5))
+
+
+def options_of(options: dict[str, Any]) -> dict[str, Any]:
+    """Those of a recipe."""
+    return {name: value for name, value in options.items() if name != "threads"}
+
+
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

@@ -23,6 +23,7 @@ from vid2ev.rig.rig_file import is_file, rig_text, write_text
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import sees_nothing
+from vid2ev.sources.framing import framing_of
 from vid2ev.toml_text import toml_text
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
@@ -196,7 +197,7 @@ class Recorder:
 
     def _write_rig(self, whole: Path) -> None:
         """The rig file, and files of those sensors that are no presets, as they were."""
-        rig, cameras = self.recipe.rig.settled(), []
+        rig, cameras = self.recipe.rig.settled(framing_of(self.recipe.source)), []
         for camera, mount in zip(rig.cameras, self.recipe.mounts, strict=True):
             if camera.sensor is not None and is_file(camera.sensor):
                 about = {"title": f"{Path(camera.sensor).stem}, as {camera.name} had it"}

@@ -92,8 +92,8 @@ class Source(Optics):
         """Of a video of this size, which may be that of `size` made smaller or larger, or framed out of pictures of
         `size`.  Raises UsageError."""
         stated = self.size or size
-        if framing is not None and stated == framing.whole != size:
-            return framing.lens_of_part(self.intrinsics(stated))
+        if framing is not None and self.size == framing.whole:
+            return framing.lens_of_part(self.intrinsics(framing.whole))
         lens = self.lens(stated) or self.model_copy(update={"fov_deg": ASSUMED_FOV_DEG}).lens(stated)
         assert lens is not None
         if abs(stated[0] * size[1] - stated[1] * size[0]) > max(*stated, *size):  # (more than a pixel is rounded off)
@@ -234,10 +234,13 @@ class ResolvedRig:
     source_assumed: bool
     viewpoints: tuple[Viewpoint, ...]
 
-    def settled(self) -> Rig:
-        """The rig with every number in it, so that it means the same around any video of this size."""
+    def settled(self, framing: Framing | None = None) -> Rig:
+        """The rig with every number in it, so that it means the same around any video of this size; also where it is
+        framed out of pictures of this size, whose lens a lens of this size is taken for."""
         cameras = [view.camera.model_copy(update=_stated(view.intrinsics)) for view in self.viewpoints]
-        return Rig(source=Source(**_stated(self.source)), cameras=tuple(cameras))
+        of_whole = framing is not None and framing.whole == framing.size
+        lens = framing.lens_of_whole(self.source) if framing and of_whole else self.source
+        return Rig(source=Source(**_stated(lens)), cameras=tuple(cameras))
 
     def describe(self) -> dict[str, Any]:
         """All of it, ready for JSON; reading it again gives the same light."""
