@@ -8,7 +8,9 @@ KNOWN = """\
 * Frames of the truth are the light of an instant, without exposure and noise.{exposures}
 * Events are simulated from the very light that the truth is made of. That is kinder to every method that uses events
   than a real recording is, to those that add them up most of all.
-* Scenes are independent of each other but for textures: the same photographs come again."""
+* {scenes}"""
+RENDERED = "Scenes are independent of each other but for textures: the same photographs come again."
+CUT = "Scenes that are parts of one film are not independent of each other."
 EXPOSED = " The frame camera's exposures have their\n  middles at such instants."
 KEYS = " So are those that\n  stand for frames of the camera."
 FILMED = """\
@@ -33,7 +35,8 @@ def card_text(facts: dict[str, Any]) -> str:
         "Seed": spec["seed"],
     }
     table = "\n".join(f"| {name} | {value} |" for name, value in rows.items())
-    known = KNOWN.format(exposures=EXPOSED if spec["layout"] == "own" else KEYS)
+    exposures = EXPOSED if spec["layout"] == "own" else KEYS
+    known = KNOWN.format(exposures=exposures, scenes=CUT if videos else RENDERED)
     if videos:
         known += "\n" + FILMED.format(filmed="They are real films.", interpolated=facts["interpolated_fps"])
     left_out = "\n".join(f"* {name}: {reason}" for name, reason in facts["left_out"].items())

@@ -87,9 +87,9 @@ class OfSequence:
             k for k in rising if (start_us is None or times[k] >= start_us) and (stop_us is None or times[k] <= stop_us)
         ]
         if not found:
-            raise UsageError(
-                f"{self.folder}: no frame from {options.start_s} to {options.stop_s} s; choose another part"
-            )
+            start = f"from {options.start_s or 0:g} s" + (f" to {options.stop_s:g} s" if options.stop_s else " on")
+            last_s = 1e-6 * (int(times[rising[-1]]) - int(times[rising[0]]))
+            raise UsageError(f"{self.folder}: no frame {start}; expected a part of its {last_s:.6g} s")
         return found
 
     def _identity(self) -> dict[str, Any]:

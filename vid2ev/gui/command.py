@@ -16,7 +16,7 @@ from typing import Any
 from vid2ev.gui.setup import PRESET, Setup, texts_of
 from vid2ev.rig.camera import Camera, Rig, default_rig
 from vid2ev.rig.rig_file import rig_text, write_text
-from vid2ev.scenes.own_pictures import with_own_pictures
+from vid2ev.scenes.own_files import with_own_files
 from vid2ev.toml_text import toml_text
 
 RIG, SCENE = "rig.toml", "scene.toml"
@@ -63,9 +63,9 @@ def options_of(setup: Setup, folder: Path) -> dict[str, Any]:
     chosen: dict[str, Any] = {"video": setup.source} | dict(setup.options)
     if setup.scene is not None:
         chosen["video"] = str(folder / SCENE)
-        tables, pictures = with_own_pictures(setup.settled().tables())
+        tables, files = with_own_files(setup.settled().tables())
         write_text(folder / SCENE, toml_text(tables), overwrite=True)
-        for name, file in pictures.items():
+        for name, file in files.items():
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).symlink_to(file)
     if not is_plain(setup):

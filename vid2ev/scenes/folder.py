@@ -1,7 +1,7 @@
 """The folder of a rendered scene: there as a whole or not at all.
 
 scene.toml   the scene with every number settled; its first line says how it was made
-pictures/    the photographs that it names, which are not vid2ev's own
+files/       the photographs and meshes that it names
 ...          what the reference camera saw (`camera_folder.py`)
 NAME/        what a camera of the scene's rig saw, likewise
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import whole, writing
 from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
-from vid2ev.scenes.own_pictures import PICTURES, with_own_pictures
+from vid2ev.scenes.own_files import FOLDER, with_own_files
 from vid2ev.scenes.source import SceneSource
 from vid2ev.toml_text import toml_text
 
@@ -42,14 +42,14 @@ def write_scene(
     Raises UsageError where the folder is taken, DataError where it cannot be written.
     """
     said = f"# vid2ev {version('vid2ev')}: {how}; {contents.describe()}"
-    tables, pictures = with_own_pictures(source.world.scene.tables())
+    tables, files = with_own_files(source.world.scene.tables())
     text = f"{said}\n\n{toml_text(tables)}"
     if _is_made(directory, text, overwrite, resume):
         return False
     with writing(directory, "make room or access there, or use -o"), whole(directory) as made:
         made.mkdir()
         (made / "scene.toml").write_text(text, encoding="utf-8")
-        for name, file in pictures.items():
+        for name, file in files.items():
             (made / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(file, made / name)
         _write_all(made, source, contents, report)
@@ -77,7 +77,7 @@ def _write_all(folder: Path, source: SceneSource, contents: Contents, report: Re
     with ExitStack() as stack:
         views = [CameraFolder(folder, world, contents)]
         for view in world.viewpoints:
-            if view.camera.name in (*TRUTH, PICTURES):
+            if view.camera.name in (*TRUTH, FOLDER):
                 raise UsageError(f"camera {view.camera.name}: that folder is for {view.camera.name}; rename the camera")
             views.append(CameraFolder(folder / view.camera.name, world, contents, view.intrinsics, view.pose))
         for camera in views:
