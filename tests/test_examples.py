@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from matplotlib.image import imread
 
 from vid2ev import CisSpec, DvsSpec, cis_names, load_sensor
-from vid2ev.__main__ import main
+from vid2ev.commands import main
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.devices import missing_for_cuda

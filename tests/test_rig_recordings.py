@@ -68,7 +68,7 @@ def test_a_recording_holds_the_sensor_files_of_its_rig(tmp_path: Path, monkeypat
 
 @pytest.mark.parametrize("name", ["n" * 300, "a\0b", "a/" * 3000])
 def test_a_folder_that_cannot_be_is_one_sentence(name: str) -> None:
-    with pytest.raises(UsageError, match="no folder can have the name"):
+    with pytest.raises(DataError, match="give one that a folder can have"):
         convert(CLIP, name, **OPTIONS)
 
 

@@ -1,6 +1,20 @@
 """`vid2ev` and `python -m vid2ev`: the command line."""
 
-from vid2ev.commands import main
+import sys
+
+from vid2ev import commands
+
+
+def main() -> None:
+    """The command line; ends with SystemExit."""
+    try:
+        commands.main()
+    except SystemExit as ended:
+        if ended.code == commands.INTERRUPTED:
+            # (objects of a compiler that were half made then complain as they go, after the last word was said)
+            sys.unraisablehook = lambda _: None
+        raise
+
 
 if __name__ == "__main__":
     main()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from vid2ev.__main__ import main
+from vid2ev.commands import main
 from vid2ev.instants import events_of
 from vid2ev.recipe import Recipe
 

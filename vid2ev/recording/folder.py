@@ -238,9 +238,10 @@ def begun_job(directory: Path) -> dict[str, Any]:
 
 
 def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
-    """Raise UsageError unless a recording may be written to `directory`; touches nothing."""
+    """Raise UsageError unless a recording may be written to `directory`, DataError for a name that no folder can have;
+    touches nothing."""
     if not possible(str(directory)):
-        raise UsageError(f"no folder can have the name {str(directory)[:80]!r}; choose another one with -o")
+        raise DataError(f"{str(directory)[:80]!r}: File name too long; give one that a folder can have with -o")
     if directory.name in ("", "..") or directory.is_mount() or os.path.realpath(directory) == os.getcwd():
         raise UsageError(
             f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
