@@ -21,10 +21,10 @@ from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.rig.rig_file import is_file, rig_text, write_text
 from vid2ev.sensors.devices import CPU, Device
+from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import sees_nothing
 from vid2ev.sources.framing import framing_of
-from vid2ev.toml_text import toml_text
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
@@ -200,8 +200,8 @@ class Recorder:
         rig, cameras = self.recipe.rig.settled(framing_of(self.recipe.source)), []
         for camera, mount in zip(rig.cameras, self.recipe.mounts, strict=True):
             if camera.sensor is not None and is_file(camera.sensor):
-                about = {"title": f"{Path(camera.sensor).stem}, as {camera.name} had it"}
-                text = toml_text({"about": about, mount.kind: mount.sensor.spec.model_dump(mode="json")})
+                title = f"{Path(camera.sensor).stem}, as {camera.name} had it"
+                text = sensor_file_text(mount.kind, mount.sensor.spec, title)
                 name = f"rig.{camera.name}.toml"
                 write_text(whole / name, text, overwrite=True)
                 camera = camera.model_copy(update={"sensor": name})

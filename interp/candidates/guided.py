@@ -216,19 +216,21 @@ def _flows(shown: torch.Tensor, key: torch.Tensor) -> torch.Tensor:
         return shown.new_zeros(*shown.shape[:2], 2, *shown.shape[-2:])
     starts, ends = (_eight_bits(each) for each in (shown.detach(), key.detach()))
     pairs = [(start, end[0]) for some, end in zip(starts, ends, strict=True) for start in some]
-    threads = min(torch.get_num_threads(), len(pairs))
-    if threads == 1:
-        found = [_flow(*pair) for pair in pairs]
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            found = list(pool.map(lambda pair: _flow(*pair), pairs))
+    share = -(-len(pairs) // torch.get_num_threads())
+    with ThreadPoolExecutor(torch.get_num_threads()) as pool:
+        parts = pool.map(_found, [pairs[k : k + share] for k in range(0, len(pairs), share)])
+        found = [flow for part in parts for flow in part]
     flows = np.moveaxis(np.array(found), -1, 1).reshape(*shown.shape[:2], 2, *shown.shape[-2:])
     return torch.from_numpy(flows).to(shown)
 
 
-def _flow(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Motion [H, W, 2] from one picture to the other, of 8 bits, where it is more convincing than none."""
-    return convincing(dense_flow().calc(start, end, None), start, end, CONVINCED_CODES)
+def _found(pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Motion [H, W, 2] from the one to the other of pairs of pictures of 8 bits, where it is more convincing than none.
+
+    (DIS keeps its memory from one pair to the next: one for each pair would take up to 1.4 times as long.)
+    """
+    dis = dense_flow()
+    return [convincing(dis.calc(start, end, None), start, end, CONVINCED_CODES) for start, end in pairs]
 
 
 def _eight_bits(shown: torch.Tensor) -> np.ndarray:

@@ -17,6 +17,7 @@ from vid2ev.gui.setup import PRESET, Setup, texts_of
 from vid2ev.rig.camera import Camera, Rig, default_rig
 from vid2ev.rig.rig_file import rig_text, write_text
 from vid2ev.scenes.own_files import with_own_files
+from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.toml_text import toml_text
 
 RIG, SCENE = "rig.toml", "scene.toml"
@@ -91,7 +92,7 @@ def sensor_text(setup: Setup, camera: int) -> str:
     kind, spec, preset = setup.kind(camera), setup.spec(camera), setup.preset(camera)
     changed = ", ".join(setup.rig.cameras[camera].set)
     title = f"{preset}, with other {changed}" if changed else preset
-    return toml_text({"about": {"title": title}, kind.table: spec.model_dump(mode="json")})
+    return sensor_file_text(kind.table, spec, title)
 
 
 def scene_text(setup: Setup) -> str:

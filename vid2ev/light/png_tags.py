@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vid2ev.errors import UsageError
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
 from vid2ev.light.recognise import PNG
 from vid2ev.light.tags import TRANSFERS
+from vid2ev.light.transfer import parse_transfer
 
 LARGEST = 64  # bytes of a tag that is read
 USUAL_GAMMA = 45455  # hundred thousandths
-SLOPES = (0.1, 10.0)  # of curves `gamma:G`
 
 
 def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
@@ -49,10 +50,10 @@ def _curve(gamma: bytes) -> str | None:
     number = int.from_bytes(gamma, "big")
     if len(gamma) != 4 or number == 0 or abs(number - USUAL_GAMMA) <= USUAL_GAMMA // 100:
         return None
-    slope = 100000 / number
-    if not SLOPES[0] <= slope <= SLOPES[1]:
+    try:
+        return parse_transfer("linear" if number == 100000 else f"gamma:{100000 / number:.6g}").name
+    except UsageError:  # (steeper than any curve that is meant)
         return None
-    return "linear" if number == 100000 else f"gamma:{slope:.6g}"
 
 
 def _primaries(places: bytes) -> Primaries | None:

@@ -238,8 +238,9 @@ class ResolvedRig:
         """The rig with every number in it, so that it means the same around any video of this size; also where it is
         framed out of pictures of this size, whose lens a lens of this size is taken for."""
         cameras = [view.camera.model_copy(update=_stated(view.intrinsics)) for view in self.viewpoints]
-        of_whole = framing is not None and framing.whole == framing.size
-        lens = framing.lens_of_whole(self.source) if framing and of_whole else self.source
+        lens = self.source
+        if framing is not None and framing.whole == framing.size:
+            lens = framing.lens_of_whole(lens)
         return Rig(source=Source(**_stated(lens)), cameras=tuple(cameras))
 
     def describe(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any
 
-from vid2ev.scenes.scene_file import LISTS
+from vid2ev.scenes.scene_file import files_named
 from vid2ev.scenes.textures import PHOTOGRAPHS
 
 FOLDER = "files"
@@ -19,26 +19,16 @@ def with_own_files(tables: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Pa
     Meshes that name further files, and a rig, stay where they are.
     """
     names: dict[Path, str] = {}
-
-    def own(text: Any) -> Any:
-        if not isinstance(text, str) or text in PHOTOGRAPHS:
-            return text
-        file = Path(text)
-        return names.setdefault(file, f"{FOLDER}/{len(names) + 1}{file.suffix.lower()}")
-
     tables = copy.deepcopy(tables)
-    for kind in LISTS:
-        for thing in tables.get(kind, []):
-            own_keys = ("texture", "file") if _is_alone(thing.get("file")) else ("texture",)
-            thing |= {key: own(thing[key]) for key in own_keys if key in thing}
-    setting = tables.get("scene", {})
-    setting |= {key: own(setting[key]) for key in ("environment",) if key in setting}
+    for table, key, _ in files_named(tables):
+        text = table[key]
+        if text not in PHOTOGRAPHS and (key in ("texture", "environment") or (key == "file" and _is_alone(text))):
+            file = Path(text)
+            table[key] = names.setdefault(file, f"{FOLDER}/{len(names) + 1}{file.suffix.lower()}")
     return tables, {name: file for file, name in names.items()}
 
 
-def _is_alone(mesh: str | None) -> bool:
+def _is_alone(mesh: str) -> bool:
     """Whether a mesh is in one file."""
-    if mesh is None:
-        return False
     suffix = Path(mesh).suffix.lower()
     return suffix in ALONE or (suffix == ".obj" and b"mtllib" not in Path(mesh).read_bytes())

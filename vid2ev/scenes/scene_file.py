@@ -91,15 +91,8 @@ class SceneFile:
 
     def _find_files(self, tables: dict[str, Any], chance: Chance) -> None:
         """Make names of files those of this folder; of a folder of photographs, one is drawn."""
-        for kind in LISTS:
-            for thing in tables.get(kind, []):
-                for key in ("texture", "file"):
-                    if isinstance(thing.get(key), str):
-                        thing[key] = self._found(thing[key], chance, f"{kind}.{thing['name']}.{key}")
-        setting = tables.get("scene")
-        for key in ("environment", "rig"):
-            if isinstance(setting, dict) and isinstance(setting.get(key), str):
-                setting[key] = self._found(setting[key], chance, f"scene.{key}")
+        for table, key, where in files_named(tables):
+            table[key] = self._found(table[key], chance, where)
 
     def _found(self, text: str, chance: Chance, path: str) -> str:
         if text in PHOTOGRAPHS:
@@ -114,6 +107,19 @@ class SceneFile:
             hint = nearest(text, [*PHOTOGRAPHS, ANY]) if names else ""
             raise UsageError(f"{self.name}: {path} = '{text}'{hint}: no such file{names}")
         return str(file)
+
+
+def files_named(tables: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
+    """Where the tables of a scene name a file or a photograph: the table, its key, and both as a path."""
+    for kind in LISTS:
+        for thing in tables.get(kind, []):
+            for key in ("texture", "file"):
+                if isinstance(thing.get(key), str):
+                    yield thing, key, f"{kind}.{thing.get('name')}.{key}"
+    setting = tables.get("scene")
+    for key in ("environment", "rig"):
+        if isinstance(setting, dict) and isinstance(setting.get(key), str):
+            yield setting, key, f"scene.{key}"
 
 
 def frozen(node: Any) -> Any:

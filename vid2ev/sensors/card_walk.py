@@ -108,10 +108,10 @@ class CardWalk:
         while True:
             self._sent.taken[:] = 0
             self._of_walk.counts[:] = 0
-            walkers, planes = min(self._total, WALKERS), (self._planes, self._saved)
             self.memory.launch(
-                self._kernels.walk, walkers, seen, self._listed, candidates, *planes, self._sent, self._of_walk
-            )
+                self._kernels.walk, min(self._total, WALKERS), seen, self._listed, candidates, self._planes,
+                self._saved, self._sent, self._of_walk,
+            )  # fmt: skip
             taken = int(self._sent.taken[0])
             if taken <= len(self._sent.keys):
                 break

@@ -21,7 +21,7 @@ from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.requests import setting
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.toml_text import parsed_toml
+from vid2ev.toml_text import parsed_toml, toml_text
 from vid2ev.untrusted import read_text
 
 
@@ -129,6 +129,11 @@ def read_sensor(name_or_path: str | Path, kind: Kind = DVS) -> SensorFile:
             f"Sensor file {path} has no table [{kind.table}]; put the sensor's keys under a line [{kind.table}]."
         )
     return SensorFile(name, about, values, _comments(text, kind))
+
+
+def sensor_file_text(table: str, spec: BaseModel, title: str) -> str:
+    """The text of a sensor file: a specification with every value in it, in the `table` of its kind."""
+    return toml_text({"about": {"title": title}, table: spec.model_dump(mode="json")})
 
 
 def kinds_of(name_or_path: str | Path) -> list[Kind]:
