@@ -20,6 +20,7 @@ from vid2ev.rig.pose import IDENTITY
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import open_source
+from vid2ev.sources.synthetic import MovingEdge
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=200,duration_s=0.2"
 OPTIONS: dict[str, Any] = {"upsample": "none", "seed": 3, "threads": 1}
@@ -98,6 +99,24 @@ def test_a_clock_of_its_own_moves_times_and_nothing_else(tmp_path: Path) -> None
     convert(CLIP, tmp_path / "out", rig=rig(clock_offset_us=1_234_567), **options)
     left, right = columns(tmp_path / "out" / "left"), columns(tmp_path / "out" / "right")
     assert [t + 1_234_567 for t in left[0]] == right[0] and left[1:] == right[1:]
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_times_that_a_format_does_not_have_are_refused_before_converting(tmp_path: Path, kind: str) -> None:
+    early = rig(clock_offset_us=-5000)
+    with pytest.raises(UsageError, match=rf"^format {kind} cannot hold times from -0\.005 to 0\.195 s, .*hdf5$"):
+        convert(CLIP, tmp_path / "out", rig=early, formats=kind, report=pytest.fail, **OPTIONS)
+    assert not list(tmp_path.iterdir())
+    convert(CLIP, tmp_path / "out", rig=rig(clock_offset_us=5000), formats=kind, preview=False, **OPTIONS)
+
+
+def test_a_clip_that_passes_once_is_refused_for_its_times_at_its_first_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MovingEdge, "rewindable", False)
+    with pytest.raises(UsageError, match=r"cannot hold times from -0\.005"):
+        convert(CLIP, tmp_path / "out", rig=rig(clock_offset_us=-5000), formats="ros1", report=pytest.fail, **OPTIONS)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_camera_beside_the_video_sees_a_plane_shifted_by_its_disparity(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sight import scene_of
-from vid2ev.sources import short_name
+from vid2ev.sources import begins_s, short_name
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too
@@ -160,12 +160,22 @@ def default_directory(video: str | Path) -> Path:
 
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
     """Raise UsageError where a format cannot hold what a camera may send, or a probed pixel is not there."""
-    seconds = recipe.source.duration_expected_s
+    source = recipe.source
     if outputs.pictures != Outputs().pictures and all(mount.kind == "dvs" for mount in recipe.mounts):
         raise UsageError(f"pictures as {', '.join(outputs.pictures)}: expected a frame camera; add --frames or --cis")
+    # (To ask for its first instant opens a source once more; those that pass once are asked when they begin.)
+    known = outputs.by_the_clock and source.rewindable
+    _check_cameras(recipe, outputs, round(1e9 * begins_s(source)) if known else None)
+
+
+def _check_cameras(recipe: Recipe, outputs: Outputs, begin_ns: int | None) -> None:
+    """Raise UsageError where a format cannot hold what event cameras may send of a source that begins then."""
+    seconds = recipe.source.duration_expected_s
+    duration_us = None if seconds is None else round(1e6 * seconds)
     for mount in recipe.mounts:
         if mount.kind == "dvs":
-            outputs.check(mount.size, None if seconds is None else round(1e6 * seconds))
+            start_us = None if begin_ns is None else begin_ns // 1000 + mount.clock_offset_us
+            outputs.check(mount.size, duration_us, start_us)
 
 
 def _manifests(job: dict[str, Any], recorder: Recorder, run: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -234,6 +244,7 @@ def _record(recorder: Recorder, planner: Planner | None, course: _Course, began:
             first = next(seen, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
+        _check_cameras(recipe, recorder.outputs, first.t_ns)
         recorder.begin(first)
         limited_before -= first.limited
         for instant in seen:

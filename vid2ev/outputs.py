@@ -79,18 +79,23 @@ class Outputs:
         """Those options that are fields of this class, taken out of all."""
         return {each.name: options.pop(each.name) for each in fields(cls) if each.name in options}
 
-    def check(self, size: tuple[int, int], duration_us: int | None) -> None:
-        """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration if known, and
-        where a pixel to be probed is not there."""
+    def check(self, size: tuple[int, int], duration_us: int | None, start_us: int | None = None) -> None:
+        """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration or the time at
+        which it starts if known, and where a pixel to be probed is not there."""
         for x, y in self.probe:
             if not (0 <= x < size[0] and 0 <= y < size[1]):
                 raise UsageError(f"probe {x},{y}: expected a pixel of a sensor of {size[0]}x{size[1]}")
         for kind in self.kinds():
-            check_holds(kind, size, duration_us)
+            check_holds(kind, size, duration_us, start_us)
 
     def kinds(self) -> list[Format]:
         """The formats."""
         return [format_named(name) for name in self.formats]
+
+    @property
+    def by_the_clock(self) -> bool:
+        """Whether one of the formats cannot hold all instants, whatever they are counted from."""
+        return any(kind.clock_us for kind in self.kinds())
 
     @property
     def want_frames(self) -> bool:
@@ -122,13 +127,16 @@ class Outputs:
     def write(self, folder: Path, recording: Recording) -> None:
         """Write the files of a recording, but for the preview.
 
-        Raises OSError, DataError for events that cannot be: what was kept of them to go on from was damaged.
+        Raises OSError, UsageError for times that a format cannot hold and DataError for events that cannot be: what was
+        kept of them to go on from was damaged.
         """
         files = self.files()
         for kind in self.kinds():
             assert kind.write is not None
             try:
                 kind.write(folder / files[kind.name], recording)
+            except UsageError:
+                raise
             except ValueError as error:
                 raise DataError(
                     f"{folder}: {error}; what was kept to go on from is damaged, --overwrite starts again"

@@ -49,7 +49,7 @@ def reformat(
         raise UsageError(f"{target} exists; --overwrite replaces it")
     file = open_events(source)
     recording = survey(file) if start_s is None and stop_s is None else _part(file, start_s, stop_s)
-    check_holds(kind, recording.size, recording.duration_us)
+    check_holds(kind, recording.size, recording.duration_us, recording.start_us)
     made = _write(target, kind, _reported(recording, report), overwrite)
     had = {"labels": recording.labelled, "frames": recording.frames is not None}
     unsaid = [f"the size is not stated; {recording.size[0]}x{recording.size[1]} holds all events"] * (file.size is None)

@@ -164,10 +164,14 @@ def _note_disorder(file: EventFile, disorder: Disorder) -> None:
         file.warnings.extend([said] if said not in file.warnings else [])
 
 
-def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = None) -> None:
+def check_holds(
+    kind: Format, size: tuple[int, int], duration_us: int | None = None, start_us: int | None = None
+) -> None:
     """Raise UsageError, which names a format that can, unless a format can hold pixels and times as these; DataError
     where times are so far apart that files would be full of nothing: a single damaged one is enough for that."""
     _check_idle(kind, duration_us or 0)
+    if kind.clock_us and start_us is not None:
+        _check_clock(kind, kind.clock_us, start_us, start_us + (duration_us or 0))
     limits = kind.largest
     if limits and (size[0] > limits[0] or size[1] > limits[1]):
         what, most = f"{size[0]}x{size[1]} pixels", f"{limits[0]}x{limits[1]}"
@@ -176,6 +180,15 @@ def check_holds(kind: Format, size: tuple[int, int], duration_us: int | None = N
     else:
         return
     raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format hdf5")
+
+
+def _check_clock(kind: Format, clock_us: tuple[int, int], first_us: int, last_us: int) -> None:
+    """Raise UsageError where times are beyond those that a format has."""
+    if first_us < clock_us[0] or last_us > clock_us[1]:
+        raise UsageError(
+            f"format {kind.name} cannot hold times from {first_us / 1e6:.10g} to {last_us / 1e6:.10g} s, at least"
+            f" {clock_us[0] / 1e6:.10g} and at most {clock_us[1] / 1e6:.10g} s; choose --format hdf5"
+        )
 
 
 def _check_idle(kind: Format, duration_us: int) -> None:

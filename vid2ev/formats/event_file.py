@@ -85,6 +85,7 @@ class Format:
     write       makes the file; raises OSError where the disk cannot take it.  None if that cannot be done
     largest     (width, height) [px] that it can hold; None without limit
     longest_us  the latest time after start_us that it can hold; None without limit
+    clock_us    the first and the last instant that it can hold, absolute; None without limit
     idle_bytes  a second, about, that it grows by where nothing happens
     keeps       what it holds beside t, x, y, p: of "labels", "frames", "size", "start"
     """
@@ -97,6 +98,7 @@ class Format:
     write: Callable[[Path, Recording], None] | None = None
     largest: tuple[int, int] | None = None
     longest_us: int | None = None
+    clock_us: tuple[int, int] | None = None
     idle_bytes: int = 0
     keeps: frozenset[str] = frozenset()
 

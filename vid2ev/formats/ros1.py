@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.formats.event_file import Format, Picture, Recording
-from vid2ev.formats.ros_events import EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
+from vid2ev.formats.ros_events import CLOCK_US, EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
 from vid2ev.formats.ros_messages import event_array_bytes, image_bytes
 from vid2ev.formats.rosbag import MAGIC, BagReader, Topic
 from vid2ev.formats.rosbag_writer import BagWriter
@@ -64,5 +64,6 @@ FORMAT = Format(
     open=open_events,
     write=write_events,
     largest=(1 << 16, 1 << 16),
+    clock_us=CLOCK_US,
     keeps=frozenset({"frames", "size", "start"}),
 )

@@ -23,7 +23,7 @@ from typing import Any
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Format, Picture, Recording
 from vid2ev.formats.ros2_bombs import bound_decompression, check_bag
-from vid2ev.formats.ros_events import EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
+from vid2ev.formats.ros_events import CLOCK_US, EVENTS_TOPIC, IMAGES_TOPIC, RosEvents, outgoing
 from vid2ev.formats.ros_messages import event_array_bytes, image_bytes
 from vid2ev.formats.rosbag import Topic
 
@@ -137,5 +137,6 @@ FORMAT = Format(
     open=open_events,
     write=write_events,
     largest=(1 << 16, 1 << 16),
+    clock_us=CLOCK_US,
     keeps=frozenset({"frames", "size", "start"}),
 )

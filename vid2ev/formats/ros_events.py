@@ -35,7 +35,7 @@ from vid2ev.stream.events import Events
 EVENTS_TOPIC, IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"
 WINDOW_US = 10_000  # of a message
 DAY_US = 24 * 3600 * 10**6
-LAST_US = 10**6 << 31  # stamps of ROS 2 end in 2038
+CLOCK_US = (0, (10**6 << 31) - 1)  # stamps of ROS 2 end in 2038
 
 
 class Bag(Protocol):
@@ -209,7 +209,7 @@ def outgoing(recording: Recording) -> Iterator[EventArray | Picture]:
 
 
 def _check_times(first_us: int, last_us: int) -> None:
-    if first_us < 0 or last_us >= LAST_US:
+    if first_us < CLOCK_US[0] or last_us > CLOCK_US[1]:
         raise UsageError(f"times from {first_us} to {last_us} us: ROS has 0 to 2^31 s; choose --format hdf5")
 
 
