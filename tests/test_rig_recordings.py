@@ -10,8 +10,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from vid2ev import DataError, Events, UsageError, convert, read_events
+from vid2ev.commands import main
 from vid2ev.conversion import Paused
 from vid2ev.recipe import Recipe
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
@@ -359,6 +361,18 @@ def test_codes_of_a_sensor_are_not_taken_for_pictures(tmp_path: Path) -> None:
     for folder, message in ((tmp_path / "out", "cameras cis, dvs"), (tmp_path / "out" / "cis", "frames and no events")):
         with pytest.raises(UsageError, match=message):
             next(read_events(folder))
+
+
+def test_codes_and_pictures_of_a_frame_camera_are_read_by_its_curve(tmp_path: Path) -> None:
+    """Codes of an ADC are linear; those of 8 bits are as `gamma` says, and the light is what it was."""
+    for gamma in ("srgb", "2.2"):
+        out = tmp_path / gamma
+        convert(CLIP, out, "ideal", [f"cis.gamma={gamma}"], cis="ideal", pictures="raw,png", **OPTIONS)
+        said = json.loads(CliRunner().invoke(main, ["info", str(out / "cis" / "raw"), "--json"]).stdout)
+        assert said["transfer"] == "linear"
+        assert "codes     of a sensor's ADC" in CliRunner().invoke(main, ["info", str(out / "cis" / "raw")]).stdout
+    lights = [next(open_source(tmp_path / gamma / "cis" / "frames").frames()).light for gamma in ("srgb", "2.2")]
+    assert np.ptp(lights[0]) > 0.4 and lights[1] == pytest.approx(lights[0], abs=0.01)
 
 
 def test_a_camera_with_finer_pixels_sees_a_scene_more_often() -> None:

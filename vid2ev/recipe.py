@@ -243,9 +243,14 @@ def plain(facts: dict[str, Any]) -> dict[str, Any]:
     return json.loads(json.dumps(facts))
 
 
+def holds_adc_codes(path: Path) -> bool:
+    """Whether it is the folder of a frame camera's codes."""
+    return path.name == RAW and (path.parent / "manifest.json").is_file()
+
+
 def refuse_recordings(path: Path, transfer: str = "auto") -> None:
     """Raise UsageError for what holds events already, and for frames that would be taken for something else."""
-    if path.name == RAW and (path.parent / "manifest.json").is_file() and transfer == "auto":
+    if holds_adc_codes(path) and transfer == "auto":
         raise UsageError(
             f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted"
         )

@@ -49,9 +49,12 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     elif is_list(path):
         raise UsageError(f"{path} is a text, which vid2ev convert takes for a list of videos; give one of them")
     else:
+        from vid2ev.recipe import holds_adc_codes
+
         source = _opened(path, file, options)
         found = {"path": file} | source.describe() | {"duration_expected_s": source.duration_expected_s}
-        facts = [("source", summary.source_text(found)), *(("warning", text) for text in source.warnings)]
+        codes = [("codes", "of a sensor's ADC, not pictures")] if holds_adc_codes(path) else []
+        facts = [("source", summary.source_text(found)), *codes, *(("warning", text) for text in source.warnings)]
     click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))
 
 

@@ -2,9 +2,9 @@
 
 8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
-rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB unless
-a transfer is given, or `frames.json` or the first PNG says one, 16-bit ones too; floating point is linear light, 1.0
-white as it stands.
+rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB,
+16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose folder it is, or
+the first PNG says one; floating point is linear light, 1.0 white as it stands.
 Transparency is ignored.
 """
 
@@ -22,6 +22,7 @@ from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_pictu
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.light.transfer import parse_transfer
+from vid2ev.recording.exposures import KINDS
 from vid2ev.sources.times import (
     Clock,
     digest_of,
@@ -75,7 +76,7 @@ class Images:
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         if transfer == "auto":
-            transfer = "linear" if first.dtype.kind == "f" else _said(self.path / FRAMES, tagged or "srgb")
+            transfer = "linear" if first.dtype.kind == "f" else _said(self.path, tagged or "srgb")
         self._reader = PictureReader(transfer, colour)
         self._dtype = first.dtype
 
@@ -138,12 +139,26 @@ class Images:
         return stamps, unit
 
 
-def _said(path: Path, otherwise: str) -> str:
-    """The transfer curve that pictures of a folder are said to be coded by; another if nothing is said."""
-    try:
-        return parse_transfer(str(json_of(read_text(path)).get("transfer", otherwise))).name
-    except (OSError, ValueError, AttributeError):  # (there is none, or it is none of ours)
-        return otherwise
+def _said(folder: Path, otherwise: str) -> str:
+    """The transfer curve that pictures of a folder are said to be coded by: by whoever made them, or by the manifest of
+    the frame camera that sent them; another if nothing is said."""
+    for path, said_of in ((folder / FRAMES, _of_frames), (folder.parent / "manifest.json", _of_camera)):
+        try:
+            return parse_transfer(str(said_of(json_of(read_text(path)), folder.name))).name
+        except (OSError, ValueError, LookupError, TypeError):  # (there is none, or it is none of ours)
+            continue
+    return otherwise
+
+
+def _of_frames(said: Any, _: str) -> Any:
+    return said["transfer"]
+
+
+def _of_camera(said: Any, folder: str) -> Any:
+    """The curve of a frame camera's codes, which are linear, or of its pictures.  Raises LookupError, TypeError."""
+    gamma = said["sensor"]["parameters"]["gamma"]
+    curve = gamma if gamma == "srgb" else f"gamma:{gamma}"
+    return {KINDS["raw"]: "linear", KINDS["png"]: curve}[folder]
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:
