@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.depth_files import write_depth
 from vid2ev.rig.depth import DepthScale, between, open_depth
 from vid2ev.rig.intrinsics import Intrinsics
 
@@ -34,6 +35,15 @@ def test_codes_of_16_bits_in_millimetres(tmp_path: Path) -> None:
         np.testing.assert_allclose(found[codes > 0], codes[codes > 0] / 1000, rtol=1e-6)
         with pytest.raises(UsageError, match=r"uint16 codes may mean any depth; give the scale"):
             open_depth(tmp_path / name, SOURCE)
+
+
+def test_codes_that_vid2ev_wrote_say_themselves_what_they_mean(tmp_path: Path) -> None:
+    """65535 is infinitely far there, and in codes of others a depth as any other."""
+    depth = VALUES.copy()
+    depth[3, 4], depth[5, 6] = np.nan, np.inf
+    write_depth(tmp_path / "000000.png", depth, 0.002)
+    np.testing.assert_allclose(open_depth(tmp_path, SOURCE).at(0), depth, atol=0.001)
+    assert open_depth(tmp_path, SOURCE, scale=0.002).at(0)[5, 6] == pytest.approx(131.07)
 
 
 def test_disparities_as_those_of_kitti(tmp_path: Path) -> None:

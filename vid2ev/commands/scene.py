@@ -48,8 +48,10 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
     help="png and png16: sRGB; tiff and exr: linear light, unclipped.",
 )
 @click.option(
-    "--truth", default="poses", show_default=True, metavar="LIST", help="depth, flow, poses; depth:png, flow:flo; none."
-)
+    "--truth", default="poses", show_default=True, metavar="LIST",
+    help="depth, flow, poses; depth:exr or depth:png (16 bits: m per code in depth.txt, 0 unknown, 65535 infinitely"
+    " far), flow:flo or flow:png; none.",
+)  # fmt: skip
 @click.option(
     "--renderer",
     type=click.Choice(["embedded", "blender"]),

@@ -32,6 +32,7 @@ from vid2ev.recording.truth_arrays import (
 )
 from vid2ev.untrusted import check_exr, openexr, read_array
 
+SCALE = "depth.txt"
 NOTHING, MOST = 65535, 65534  # codes
 CHANNELS = ("Z", "V", "Y", "R")  # of depth, of any layer, the likeliest first: renderers differ
 
@@ -54,6 +55,11 @@ def read_depth(path: Path) -> np.ndarray:
     if np.any(depth <= 0):  # (OpenEXR gives zeros for what is damaged)
         raise DataError(f"{path} holds depth of {float(np.nanmin(depth)):g} m, not above 0; get another copy")
     return depth
+
+
+def is_stated(path: Path) -> bool:
+    """Whether it is a PNG and what its codes mean is said beside it."""
+    return path.suffix.lower() == ".png" and (path.parent / SCALE).is_file()
 
 
 def _write_npy(path: Path, depth: np.ndarray) -> None:
@@ -100,14 +106,14 @@ def _depth_png(m_per_code: float) -> Callable[[Path, np.ndarray], None]:
         codes = np.where(np.isnan(depth), 0, NOTHING).astype(np.uint16)
         # (what is nearer than half a code is not unknown)
         codes[known] = np.maximum(np.round(depth[known].astype(np.float64) / m_per_code), 1)
-        state_number(path, "depth.txt", m_per_code)
+        state_number(path, SCALE, m_per_code)
         write_png(path, codes)
 
     return write
 
 
 def _read_depth_png(path: Path) -> np.ndarray:
-    codes, m_per_code = read_png(path), stated_number(path, "depth.txt")
+    codes, m_per_code = read_png(path), stated_number(path, SCALE)
     if codes.ndim != 2 or codes.dtype != np.uint16:
         raise DataError(f"{path}: depth has one channel of 16 bits, not {list(codes.shape)} of {codes.dtype}")
     depth = codes * m_per_code

@@ -5,6 +5,8 @@
                               disparity, depths or disparities
     PNG, TIFF                 8 or 16 bits in steps of `scale` (0.001 for millimetres, 1/256 for KITTI's disparities),
                               which must be given; TIFF also floating point
+    PNG beside a depth.txt    depth that vid2ev wrote (`recording/depth_files.py`), if no scale is given: 65535 is
+                              infinitely far
     PFM                       floating point, as Middlebury's disparities
     EXR                       the channel Z, Depth.Z or the like, or the only one; needs `vid2ev[formats]`
 
@@ -24,6 +26,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
+from vid2ev.recording.depth_files import is_stated, read_depth
 from vid2ev.rig.depth import DepthScale
 from vid2ev.untrusted import check_exr, first_line, openexr, read_arrays
 
@@ -72,10 +75,17 @@ class DepthFiles:
             )
         if index not in self._kept:
             file = self._files[0 if self._stack is not None else index]
-            values = read_values(file) if self._stack is None else self._stack[index]
+            values = self._values_of(file) if self._stack is None else self._stack[index]
             depth_m = self._checked(values, file)
             self._kept = {index: depth_m}
         return self._kept[index]
+
+    def _values_of(self, file: Path) -> np.ndarray:
+        """The numbers of a file; depth [m] where it says itself what its codes mean and nothing else is said."""
+        given = self.scale
+        if (given.kind, given.scale, given.shift) == ("depth", None, 0) and is_stated(file):
+            return read_depth(file)
+        return read_values(file)
 
     def _checked(self, values: np.ndarray, file: Path) -> np.ndarray:
         if values.shape != self.size[::-1]:
