@@ -14,7 +14,7 @@ import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
 
-from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, read_events
+from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, open_source, read_events
 from vid2ev.conversion import Paused
 from vid2ev.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
 from vid2ev.stream.ahead import ahead
@@ -64,6 +64,18 @@ def test_frames_may_be_days_apart(tmp_path: Path, upsample: str) -> None:
     assert made["duration_us"] == 86_400_040_000 and made["counts"]["frames"] == 4
     assert made["counts"]["on"] > 3 * 12 * 16 and made["counts"]["off"] > 12 * 16
     assert made["counts"]["subframes"] >= 4
+
+
+def test_films_of_odd_sides_say_which_they_have(tmp_path: Path) -> None:
+    clip = "synthetic:moving-edge,size=31x24,duration_s=0.1"
+    options: dict[str, Any] = {"frame_camera": True, "upsample": "none"}
+    convert(clip, tmp_path / "out", frames="mp4", **options)
+    for camera in ("dvs", "cis"):
+        assert open_source(tmp_path / "out" / camera / "frames.mp4").size == (32, 24)
+        [said] = manifest_of(tmp_path / "out" / camera)["warnings"]
+        assert said == "frames.mp4 has 32x24 pixels: films have even sides, so the last column of 31x24 is there twice"
+    convert(clip, tmp_path / "none", pictures="png", **options)
+    assert not any(manifest_of(tmp_path / "none" / camera)["warnings"] for camera in ("dvs", "cis"))
 
 
 @pytest.mark.parametrize("fps", [3e6, 1e7, 1e9])

@@ -31,7 +31,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.pictures.film import join_films, write_film
+from vid2ev.pictures.film import film_size, join_films, remarks_on_size, write_film
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
@@ -104,6 +104,14 @@ class Shelf:
     def count(self) -> int:
         """How many frames belong to stretches that are done."""
         return sum(len(line["t_us"]) for line in self.done)
+
+    def size_of(self, pictures: tuple[int, int]) -> tuple[int, int]:
+        """Width and height of what is made of pictures of this size."""
+        return film_size(pictures) if self.kind == "mp4" else pictures
+
+    def remarks_on(self, pictures: tuple[int, int]) -> list[str]:
+        """That it is not the pictures' own size, if it is not."""
+        return remarks_on_size("the film", pictures) if self.kind == "mp4" else []
 
     def writing(self) -> Any:
         """What goes wrong with the disk within becomes one sentence."""

@@ -253,10 +253,10 @@ def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:
     return {
         "frames": shelf.count,
         "key_frames": len(shelf.done),
-        "size": list(take.size),
+        "size": list(shelf.size_of(take.size)),
         "start_us": shelf.done[0]["key_us"],
         "stop_us": max([shelf.done[-1]["key_us"], *shelf.done[-1]["t_us"]]),
         "gaps_s": named,
-        "remarks": [*take.remarks, *_unevenly(shelf, grid)],
+        "remarks": [*take.remarks, *_unevenly(shelf, grid), *shelf.remarks_on(take.size)],
         "manifest": str(manifest_of(shelf.output, shelf.kind)),
     }

@@ -128,10 +128,10 @@ def reconstruct(
         manifest = shelf.job | {
             "frames": shelf.count,
             "events": recording.count,
-            "size": list(size),
+            "size": list(shelf.size_of(size)),
             "start_us": recording.start_us,
             "stop_us": shelf.done[-1]["t_us"][-1],
-            "remarks": _remarks(path, file, recording),
+            "remarks": [*_remarks(path, file, recording), *shelf.remarks_on(size)],
             "manifest": str(manifest_of(output, kind)),
             "run": {"seconds": round(seconds, 3), "frames": shelf.count - there, "machine": machine()},
         }

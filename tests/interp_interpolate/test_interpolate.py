@@ -48,6 +48,14 @@ def test_key_frames_are_there_bit_for_bit(tmp_path: Path, multiple: object, ever
         assert times[int(k * float(str(multiple)))] == STEP_US * k
 
 
+def test_the_size_that_is_said_is_that_of_the_film(tmp_path: Path) -> None:
+    source = images(tmp_path / "a", [frame[:, :63] for frame in moving(2)])
+    told = interpolate(source, tmp_path / "film.mp4", multiple=2, method="linear")
+    assert tuple(told["size"]) == open_source(tmp_path / "film.mp4").size == (64, 48)
+    assert "so the last column of 63x48 is there twice" in told["remarks"][-1]
+    assert interpolate(source, tmp_path / "b", multiple=2, method="linear")["size"] == [63, 48]
+
+
 @pytest.mark.parametrize("curve", ["srgb", "bt709", "gamma:2.2", "gamma:2.8", "gamma:10"])
 @pytest.mark.parametrize("kind", ["png", "mp4"])
 def test_codes_of_key_frames_are_those_of_their_curve(kind: str, curve: str) -> None:

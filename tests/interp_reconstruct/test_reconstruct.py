@@ -48,10 +48,10 @@ def drawn(count: int = 5000, us: int = 1_000_000, seed: int = 0) -> Events:
     return Events(t, x, y, draw.integers(0, 2, count).astype(np.uint8))
 
 
-def written(path: Path, events: Events, us: int = 1_000_000, format: str = "npz") -> Path:
+def written(path: Path, events: Events, us: int = 1_000_000, format: str = "npz", size: tuple[int, int] = SIZE) -> Path:
     kind = format_named(format)
     assert kind.write is not None
-    kind.write(path, Recording(SIZE, 0, us, len(events), lambda: iter([events])))
+    kind.write(path, Recording(size, 0, us, len(events), lambda: iter([events])))
     return path
 
 
@@ -178,6 +178,16 @@ def test_killed_it_goes_on_to_the_same_bytes(tmp_path: Path, network: str, at: i
     for file in os.listdir(tmp_path / "once"):
         if file != "frames.json":
             assert (tmp_path / "once" / file).read_bytes() == (tmp_path / "twice" / file).read_bytes()
+
+
+def test_the_size_that_is_said_is_that_of_what_was_made(tmp_path: Path) -> None:
+    """Films have even sides."""
+    path = written(tmp_path / "a.npz", drawn(), size=(41, 25))
+    film = reconstruct(path, tmp_path / "a.mp4", cutoff_hz=1, fps=10)
+    assert tuple(film["size"]) == open_source(tmp_path / "a.mp4").size == (42, 26)
+    assert film["remarks"][-1].startswith("the film has 42x26 pixels: films have even sides, so the last column and")
+    pictures = reconstruct(path, tmp_path / "pictures", cutoff_hz=1, fps=10)
+    assert pictures["size"] == [41, 25] and not any("even" in text for text in pictures["remarks"])
 
 
 def test_a_film_has_all_pictures(tmp_path: Path) -> None:

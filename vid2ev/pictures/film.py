@@ -65,10 +65,27 @@ def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int) 
     first = next(coming)
     height, width = first.shape[:2]
     margin = (0, height % 2), (0, width % 2), (0, 0)
-    with Film(path, (width + width % 2, height + height % 2), fps) as film:
+    with Film(path, film_size((width, height)), fps) as film:
         for picture in chain([first], coming):
             film.add(np.pad(picture, margin, mode="edge"))
     return film.frames
+
+
+def film_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of the film that `write_film` makes of pictures of a size."""
+    width, height = size
+    return width + width % 2, height + height % 2
+
+
+def remarks_on_size(name: str, size: tuple[int, int]) -> list[str]:
+    """That a film of pictures of a size has another, if it does."""
+    width, height = film_size(size)
+    if (width, height) == tuple(size):
+        return []
+    last = ["the last column"] * (width > size[0]) + ["the last row"] * (height > size[1])
+    twice = f"{' and '.join(last)} of {size[0]}x{size[1]} {'is' if len(last) == 1 else 'are'} there twice"
+    why = f"films have even sides, so {twice}"
+    return [f"{name} has {width}x{height} pixels: {why}"]
 
 
 def join_films(path: Path, pieces: Iterable[tuple[Path, int]], rate: Fraction | int) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.outputs import Outputs
-from vid2ev.recording.exposures import ExposureFiles
+from vid2ev.pictures.film import remarks_on_size
+from vid2ev.recording.exposures import KINDS, ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
@@ -77,4 +78,6 @@ class CisTrack:
                 f"{counts['not_finite']} values of light were not finite, beyond 1e30, or negative where colours"
                 " cannot be; they count as 0 or 1e30"
             )
+        if "mp4" in self._files.kinds and counts["frames"]:
+            remarks += remarks_on_size(KINDS["mp4"], self.cis.size)
         return remarks

@@ -12,6 +12,7 @@ import numpy as np
 from vid2ev.formats.event_file import BLOCK, Picture, Recording
 from vid2ev.outputs import Outputs
 from vid2ev.physics.fixed_rate import latest_us
+from vid2ev.pictures.film import remarks_on_size
 from vid2ev.recording.columns import EventColumns, column_files
 from vid2ev.recording.disk import write_npz
 from vid2ev.recording.folder import Folder
@@ -20,6 +21,7 @@ from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.views.on_disk import KINDS
 
 FRAME_US, PROBE = "frame_us", "probe.csv"  # files that grow beside the events
 
@@ -142,6 +144,8 @@ class DvsTrack:
                 f"{key} = {getattr(self.dvs.spec, key):g} nat is more than the thresholds have room for; their spread"
                 f" is {on:.3g} nat (ON) and {off:.3g} nat (OFF)"
             )
+        if self.outputs.frames == "mp4":
+            remarks += remarks_on_size(KINDS["mp4"], self.dvs.size)
         return remarks
 
     def _see(self) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.formats import open_events
 from vid2ev.formats.event_file import EventFile, Recording
+from vid2ev.pictures.film import film_size
 from vid2ev.recording.disk import whole, writing
 from vid2ev.views.canvas import Canvas
 from vid2ev.views.destination import check_free, kind_of
@@ -88,8 +89,8 @@ def render(
     made = _write(output, canvas, arrays, done, rate)
     made_as = kind_of(output)
     asked = {"path": str(output), "kind": made_as, "view": view, "by": str(slicing), "fps": float(fps)}
-    size_px = [side + side % 2 for side in canvas.size] if made_as == "mp4" else list(canvas.size)
-    return asked | made | {"size": size_px, "warnings": list(file.warnings)}
+    size_px = film_size(canvas.size) if made_as == "mp4" else canvas.size
+    return asked | made | {"size": list(size_px), "warnings": list(file.warnings)}
 
 
 @dataclass
