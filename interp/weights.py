@@ -54,14 +54,18 @@ def about(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def fill(network: nn.Module, path: Path) -> None:
-    """Give a network the weights of a file.  Raises DataError where they are not of it."""
-    tensors = _read(path)[2]
-    _check_fits(network, tensors, path)
+    """Give a network the weights of a file.  Raises UsageError where they are of another network, DataError where they
+    are not even of the one that the file names."""
+    name, _, tensors = _read(path)
+    if misfit := _misfit(network, tensors):
+        _of_network(path)
+        raise UsageError(f"{path} holds the weights of another network, {name} ({misfit}); give those of this one")
     network.load_state_dict(tensors)
 
 
 def load_part(network: nn.Module, part: str, path: Path) -> None:
-    """Give a part of a network, such as `flow` or `reconstruct`, the weights of a network trained for itself."""
+    """Give a part of a network, such as `flow` or `reconstruct`, the weights of a network trained for itself; raises
+    UsageError for a part that it does not have, and as `fill` does."""
     module = getattr(network, part, None)
     if not isinstance(module, nn.Module):
         raise UsageError(
@@ -79,7 +83,8 @@ def _of_network(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor
     except Exception as error:  # (of options; of torch, for sizes that cannot be)
         said = first_line(error)
         raise DataError(f"{path} is of another version of its network ({said}); train it again") from error
-    _check_fits(network, tensors, path)
+    if misfit := _misfit(network, tensors):
+        raise DataError(f"{path} holds the weights of another network than it says ({misfit}); get another copy")
     return name, spec, tensors
 
 
@@ -110,17 +115,14 @@ def _in_order(file: bytes) -> bytes:
     return len(padded).to_bytes(8, "little") + padded + file[8 + length :]
 
 
-def _check_fits(module: nn.Module, tensors: Mapping[str, torch.Tensor], path: Path) -> None:
+def _misfit(module: nn.Module, tensors: Mapping[str, torch.Tensor]) -> str:
+    """The first tensor that is not as the module has it, and how; empty if all fit."""
     shapes = {key: tensor.shape for key, tensor in module.state_dict().items()}
     keys = (key for key in [*shapes, *tensors] if key not in tensors or tensors[key].shape != shapes.get(key))
-    if (key := next(keys, None)) is not None:
-        wanted, found = (
-            list(of) if of is not None else "nothing" for of in (shapes.get(key), _shape(tensors.get(key)))
-        )
-        raise DataError(
-            f"{path} holds the weights of another network ({key[:80]} is {found}, expected {wanted}); give those"
-            " of this one"
-        )
+    if (key := next(keys, None)) is None:
+        return ""
+    wanted, found = (list(of) if of is not None else "nothing" for of in (shapes.get(key), _shape(tensors.get(key))))
+    return f"{key[:80]} is {found}, expected {wanted}"
 
 
 def _shape(tensor: torch.Tensor | None) -> torch.Size | None:

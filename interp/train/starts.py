@@ -77,7 +77,7 @@ def check_frozen(name: str, size: str, options: Mapping[str, Any], parts: Iterab
 def begin(learner: Learner, starts: Mapping[str, Path]) -> None:
     """Give what learns the weights, parts last.
 
-    Raises UsageError for a part that it does not have, DataError for weights that are not of it.
+    Raises UsageError for a part that it does not have and for weights of another network, DataError for damaged files.
     """
     for part, path in sorted(starts.items()):
         if part == FEATURES:

@@ -68,7 +68,7 @@ def test_a_part_takes_the_weights_of_a_network_trained_for_itself(tmp_path: Path
     frames = torch.rand(2, 1, 3, 16, 16)
     torch.testing.assert_close(network.flow(*frames), flow(*frames).detach())  # type: ignore[operator]
     torch.testing.assert_close(network.get_submodule("reconstruct.module").state_dict(), fire.state_dict())
-    with pytest.raises(DataError, match="weights of another network"):
+    with pytest.raises(UsageError, match="weights of another network, firenet"):
         weights.load_part(network, "flow", tmp_path / "fire.safetensors")
     with pytest.raises(UsageError, match="no part 'flows'"):
         weights.load_part(network, "flows", tmp_path / "flow.safetensors")
