@@ -149,11 +149,13 @@ def test_a_pipe_taken_up_again_passes_over_what_was_done(pipe) -> None:
     assert [frame.t_ns for frame in open_source("-").frames(6)] == [240_000_000, 280_000_000, 320_000_000]
 
 
-def test_a_pipe_that_ends_too_early_says_so_as_a_file_does(encode, pipe, tmp_path: Path) -> None:
-    data = encode("a.mkv", noise(40), codec="ffv1").read_bytes()
-    (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
-    file = open_source(tmp_path / "cut.mkv")
-    pipe(data[: len(data) // 2])
+@pytest.mark.parametrize(("name", "codec"), [("cut.mkv", "ffv1"), ("cut.ts", "libx264")])
+def test_a_pipe_that_ends_too_early_says_so_as_a_file_does(encode, pipe, tmp_path: Path, name: str, codec: str) -> None:
+    data = encode(name, noise(40), codec=codec).read_bytes()
+    data = data[: len(data) // 2 // 188 * 188 + 94]
+    (tmp_path / name).write_bytes(data)
+    file = open_source(tmp_path / name)
+    pipe(data)
     piped = open_source("-")
     assert len(list(file.frames())) == len(list(piped.frames())) < 40
     assert file.warnings == piped.warnings and any("truncated" in warning for warning in piped.warnings)

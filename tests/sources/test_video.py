@@ -332,6 +332,20 @@ def test_a_truncated_file_gives_what_it_has_and_says_so(encode, name: str, codec
     assert len(list(source.frames(5))) == len(frames) - 5
 
 
+@pytest.mark.parametrize("container_options", [{}, {"mpegts_m2ts_mode": "1"}], ids=["188", "192"])
+def test_a_stream_that_ends_within_a_packet_says_that_it_is_truncated(encode, container_options) -> None:
+    """MPEG-TS, which announces nothing; what ends with a packet may be whole."""
+    path = encode("a.ts", noisy(40), codec="libx264", container_options=container_options)
+    size, data = 192 if container_options else 188, path.read_bytes()
+    assert len(data) % size == 0
+    for ends, cut in ((len(data), 0), (len(data) // 2 // size * size, 0), (len(data) // 3 // size * size + 100, 100)):
+        path.write_bytes(data[:ends])
+        source = open_source(path)
+        assert 5 < len(list(source.frames())) <= 40
+        said = f"truncated: the file has {cut} of the {size} bytes of its last packet"
+        assert [text for text in source.warnings if "truncated" in text] == [said] * bool(cut)
+
+
 def test_a_file_without_its_index_is_refused(encode) -> None:
     path = encode("a.mp4", noisy(40), codec="libx264")
     path.write_bytes(path.read_bytes()[:-2000])

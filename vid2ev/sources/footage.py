@@ -5,6 +5,7 @@ Both give PyAV's pictures in order of presentation, and what is damaged costs no
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +18,8 @@ import av
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.recognise import recognise
-from vid2ev.sources.kept import Kept
+from vid2ev.sources.kept import Kept, Reader
+from vid2ev.sources.transport_stream import TAIL, remarks_on_end
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
 STREAMS = "Y4M, Matroska, MPEG-TS or fragmented MP4"
@@ -78,6 +80,12 @@ class VideoFile:
                         return
         with self._opened() as (container, stream):
             yield from _decoded(container, stream, self.planned, remarks)
+            remarks += remarks_on_end(container.format.name, self._tail())
+
+    def _tail(self) -> bytes:
+        with open(self.path, "rb") as file:
+            file.seek(-min(TAIL, self.path.stat().st_size), os.SEEK_END)
+            return file.read()
 
     @contextmanager
     def _opened(self) -> Iterator[tuple[Any, Any]]:
@@ -109,7 +117,7 @@ class Piped:
 
     def __init__(self, kept: Kept):
         self.name, self.kept = kept.name, kept
-        with self._opened() as (container, stream):
+        with self._opened(kept.reader()) as (container, stream):
             self.rate, self.pixel_shape, self.codec = _said_of(stream)
             self.first = next(_decoded(container, stream, 0, []), None)
             kept.wanted = False
@@ -119,12 +127,13 @@ class Piped:
 
     def pictures(self, remarks: list[str], since_s: Fraction | None = None) -> Iterator[Any]:
         """The pictures from the first one on.  Raises UsageError if they are not kept any more."""
-        with self._opened() as (container, stream):
+        reader = self.kept.reader(TAIL)
+        with self._opened(reader) as (container, stream):
             yield from _decoded(container, stream, 0, remarks)
+            remarks += remarks_on_end(container.format.name, reader.tail)
 
     @contextmanager
-    def _opened(self) -> Iterator[tuple[Any, Any]]:
-        reader = self.kept.reader()
+    def _opened(self, reader: Reader) -> Iterator[tuple[Any, Any]]:
         try:
             container = av.open(reader, options={"protocol_whitelist": ""})
         except (av.FFmpegError, ValueError) as error:

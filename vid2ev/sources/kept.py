@@ -37,10 +37,11 @@ class Kept:
         self._file = SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 (closed by `_drop`)
         self._drop = weakref.finalize(self, self._file.close)
 
-    def reader(self) -> Reader:
-        """The stream from its beginning.  Raises UsageError if that is not kept any more."""
+    def reader(self, remembers: int = 0) -> Reader:
+        """The stream from its beginning; it remembers so many of the last bytes that it has read.  Raises UsageError if
+        that is not kept any more."""
         self._still()
-        return Reader(self)
+        return Reader(self, remembers)
 
     def at(self, place: int, size: int) -> bytes:
         """At most `size` bytes from a place on, which is not beyond what was read so far.
@@ -78,11 +79,14 @@ class Kept:
 class Reader:
     """One reading of a stream that is kept."""
 
-    def __init__(self, kept: Kept):
-        self._kept, self._place = kept, 0
+    def __init__(self, kept: Kept, remembers: int = 0):
+        self._kept, self._place, self._remembers = kept, 0, remembers
+        self.tail = b""
 
     def read(self, size: int) -> bytes:
         """The next bytes, at most `size`; none at the end."""
         found = self._kept.at(self._place, size)
         self._place += len(found)
+        if self._remembers:
+            self.tail = (self.tail + found)[-self._remembers :]
         return found
