@@ -12,7 +12,7 @@ import math
 import os
 import re
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -184,15 +184,24 @@ def check_png(path: Path) -> None:
     """Raise DataError for a PNG that has a part that goes on beyond the end of the file: OpenCV makes room for as much
     as it says, up to 4 GB, before it reads.
     """
-    size, at, kind = path.stat().st_size, len(b"\x89PNG\r\n\x1a\n"), b""
+    size = path.stat().st_size
     with open(path, "rb") as file:
-        while at < size and kind != b"IEND":
-            file.seek(at)
-            head = file.read(8)
-            length, kind = int.from_bytes(head[:4], "big"), head[4:]
-            at += 12 + length
-    if at > size:
+        cut = any(end > size for _, _, end in png_chunks(file))
+    if cut:
         raise DataError(f"{path}: not an image that can be read (it is cut short); remove it or write it anew")
+
+
+def png_chunks(file: BinaryIO) -> Iterator[tuple[bytes, int, int]]:
+    """The parts of a PNG up to the one that ends it, or as far as the file goes: name, length of the content, which the
+    file is at, and where the part ends, which may be beyond the file."""
+    end, kind = len(b"\x89PNG\r\n\x1a\n"), b""
+    while kind != b"IEND":
+        file.seek(end)
+        if not (head := file.read(8)):
+            return
+        length, kind = int.from_bytes(head[:4], "big"), head[4:]
+        end += 12 + length
+        yield kind, length, end
 
 
 def first_line(error: Exception, most: int | None = 200) -> str:

@@ -13,6 +13,7 @@ from vid2ev import open_source
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.primaries import primaries_of
 from vid2ev.light.transfer import parse_transfer
+from vid2ev.untrusted import png_chunks
 
 SRGB = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
 BT2020 = struct.pack(">8I", 31270, 32900, 70800, 29200, 17000, 79700, 13100, 4600)
@@ -29,6 +30,21 @@ def png(path: Path, pixels: np.ndarray, *tags: tuple[bytes, bytes]) -> Path:
     ]
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(made))
     return path
+
+
+def test_the_parts_of_a_png_go_to_its_end_or_that_of_the_file(tmp_path: Path) -> None:
+    path = png(tmp_path / "a.png", np.zeros((4, 5, 3), np.uint8), (b"gAMA", b"1234"))
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"what comes after the end")
+    with open(path, "rb") as file:
+        found = {kind: file.read(length) for kind, length, _ in png_chunks(file)}
+    assert list(found) == [b"IHDR", b"gAMA", b"IDAT", b"IEND"]
+    assert found[b"gAMA"] == b"1234" and zlib.decompress(found[b"IDAT"]) == bytes(64)
+    for size in range(len(whole) + 1):
+        path.write_bytes(whole[:size])
+        with open(path, "rb") as file:
+            *before, last = [0, *(end for *_, end in png_chunks(file))]
+        assert max(before, default=0) <= size and (last > size) == (size > 8 and size != last)
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from vid2ev.errors import UsageError
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
-from vid2ev.light.recognise import PNG
 from vid2ev.light.tags import TRANSFERS
 from vid2ev.light.transfer import parse_transfer
+from vid2ev.untrusted import png_chunks
 
 LARGEST = 64  # bytes of a tag that is read
 USUAL_GAMMA = 45455  # hundred thousandths
@@ -37,12 +37,10 @@ def _chunks(path: Path) -> dict[bytes, bytes]:
     """What comes before the pixels, by its name."""
     found: dict[bytes, bytes] = {}
     with open(path, "rb") as file:
-        file.seek(len(PNG))
-        while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
-            length = int.from_bytes(head[:4], "big")
-            after = file.tell() + length + 4
-            found.setdefault(head[4:], file.read(min(length, LARGEST)))
-            file.seek(after)
+        for kind, length, _ in png_chunks(file):
+            if kind == b"IDAT":
+                break
+            found.setdefault(kind, file.read(min(length, LARGEST)))
     return found
 
 
