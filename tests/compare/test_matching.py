@@ -126,13 +126,17 @@ def test_counts_and_shares() -> None:
 def test_of_nothing_there_are_no_errors() -> None:
     nothing, something = Events.empty(), busy(10)
     none = compare(nothing, nothing, SIZE).as_dict()
-    assert none["distance"] == none["count_error"] == 0 and none["matched_share"] == 1
+    assert none["distance"] == none["count_error"] == 0
+    assert none["matched_share"] is none["matched_share_of_reference"] is None
+    assert str(compare(nothing, nothing, SIZE)).startswith("events    none in either: there is nothing to compare\n")
     assert none["timing_error_median_us"] is None and none["timing_error_abs_p95_us"] is None
     invented = compare(something, nothing, SIZE)
     assert invented.count_error is None and invented.as_dict()["matched_share"] == 0
     missing = compare(nothing, something, SIZE)
     assert missing.count_error == 1 and missing.distance == invented.distance > 0
-    assert all(isinstance(str(found), str) for found in (invented, missing))
+    assert "matched   nothing: the reference has no events" in str(invented) and "%" not in str(invented)
+    assert "matched   nothing: it has no events" in str(missing)
+    assert "polarity" not in f"{invented}{missing}" and "timing" not in f"{invented}{missing}"
 
 
 @given(st.lists(st.integers(-9, 9), min_size=1, max_size=50), st.integers(1, 100))

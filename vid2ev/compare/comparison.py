@@ -8,7 +8,7 @@
     polarity errors events without a partner that have one of the opposite polarity
 
 Percentiles are those of the inverted distribution: whole microseconds that occur, not means of two.  What is undefined,
-such as a timing error without a pair, is None.
+such as a timing error without a pair, or a share of no events, is None.
 """
 
 from __future__ import annotations
@@ -61,8 +61,9 @@ class Comparison:
 
     @cached_property
     def count_error(self) -> float | None:
-        """sum |n_A - n_B| / n_B, pixel by pixel; None if only B has no event."""
-        return _share(int(np.abs(self.difference).sum()), self.reference_events)
+        """sum |n_A - n_B| / n_B, pixel by pixel; 0 if neither has an event, None if only B has none."""
+        wrong = int(np.abs(self.difference).sum())
+        return wrong / self.reference_events if self.reference_events else (None if wrong else 0.0)
 
     @cached_property
     def matched(self) -> int:
@@ -92,8 +93,8 @@ class Comparison:
             "count_error": self.count_error,
             "window_us": self.window_us,
             "matched": self.matched,
-            "matched_share": _share(self.matched, self.events, 1.0),
-            "matched_share_of_reference": _share(self.matched, self.reference_events, 1.0),
+            "matched_share": self.matched / self.events if self.events else None,
+            "matched_share_of_reference": self.matched / self.reference_events if self.reference_events else None,
             "timing_error_median_us": self.timing_error_us,
             "timing_error_abs_median_us": median_us,
             "timing_error_abs_p95_us": most_us,
@@ -102,30 +103,31 @@ class Comparison:
 
     def facts(self) -> list[tuple[str, str]]:
         """The same for people: a name and a line for each."""
-        numbers = self.as_dict()
+        span, events = self._span(), (self.events, self.reference_events)
+        if not any(events):
+            return [("events", "none in either: there is nothing to compare"), span]
         headline, *others = (f"{distance:.3g} at {_time(tau)}" for tau, distance in self.distances.items())
         beside = "".join(f", {text}" for text in others)
         wrong = "" if self.count_error is None else f"; count error {_percent(self.count_error)}, pixel by pixel"
-        share, other_share = (_percent(numbers[name]) for name in ("matched_share", "matched_share_of_reference"))
         facts = [
             ("distance", f"{headline}{beside} (van Rossum; 0: the same, 1: nothing in common)"),
             ("counts", f"{self.events:,} events against {self.reference_events:,} of the reference{wrong}"),
-            (
-                "matched",
-                f"{share} of them, {other_share} of the reference's, within {_time(self.window_us)}",
-            ),
         ]
+        if not all(events):
+            return [*facts, ("matched", f"nothing: {'the reference' if self.events else 'it'} has no events"), span]
+        share, other_share = (_percent(self.matched / count) for count in events)
+        facts.append(("matched", f"{share} of them, {other_share} of the reference's, within {_time(self.window_us)}"))
         if self.matched:
             median_us, most_us = self.absolute_timing_error_us
             bias_us = self.timing_error_us or 0
             lateness = f"{abs(bias_us)} us {'early' if bias_us < 0 else 'late'}"
             facts.append(("timing", f"{median_us} us median error, {most_us} us 95th percentile; {lateness} (median)"))
+        return [*facts, ("polarity", f"{self.polarity_errors:,} events of the wrong polarity"), span]
+
+    def _span(self) -> tuple[str, str]:
         first_us, last_us = self.span_us
-        return [
-            *facts,
-            ("polarity", f"{self.polarity_errors:,} events of the wrong polarity"),
-            ("compared", f"{(last_us - first_us) / 1e6:.6g} s from {first_us} us on, {'x'.join(map(str, self.size))}"),
-        ]
+        size = "x".join(map(str, self.size))
+        return "compared", f"{(last_us - first_us) / 1e6:.6g} s from {first_us} us on, {size}"
 
     def __str__(self) -> str:
         return "\n".join(f"{name:<9} {text}" for name, text in self.facts())
@@ -218,14 +220,8 @@ def absolute_percentiles(errors_us: np.ndarray) -> tuple[int | None, int | None]
     return percentile(late, 50), percentile(late, 95)
 
 
-def _share(part: int, whole: int, of_nothing: float = 0.0) -> float | None:
-    if whole:
-        return part / whole
-    return None if part else of_nothing
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.3g} %"
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
 
 
 def _time(us: int) -> str:
