@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from vid2ev import Events, UsageError, read_events
 from vid2ev.commands import main
-from vid2ev.formats import FORMATS, format_named, open_events, survey
+from vid2ev.formats import FORMATS, describe_events, format_named, open_events, survey
 from vid2ev.formats.event_file import Picture, Recording
 from vid2ev.reformat import format_of_suffix, reformat, writable
 
@@ -123,6 +124,10 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
     assert columns(Path("long.dat"))[0] == t.tolist()
     with pytest.raises(UsageError, match="exists"):
         reformat("long.h5", "long_1.dat")
+    shutil.copy("long_1.dat", "long_3.dat")  # (which is of no such recording)
+    reformat(recording, "long.dat", overwrite=True)
+    assert {path.name for path in Path().glob("long*")} == {"long.h5", "long.dat", "long_3.dat"}
+    assert describe_events("long.dat")["events"] == 5000 and not describe_events("long.dat")["warnings"]
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import UsageError
-from vid2ev.formats import FORMATS, check_holds, format_named, open_events, survey
+from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import FORMATS, check_holds, format_named, open_events, recognise, survey
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.recording.disk import sync, writing
 from vid2ev.stream.events import Events
@@ -33,7 +33,8 @@ def reformat(
     """Write an event file anew in another format; `target` is there as a whole or not at all.
 
     source           an event file of any format, or a recording's folder
-    target           the file to make; DAT makes more of them where one cannot hold the times
+    target           the file to make; DAT makes more of them where one cannot hold the times.  Those of a recording
+                     that is replaced go with it
     name             of the format; by default what the suffix of target says
     start_s, stop_s  the part to take [s after the beginning]
     report           called with the recording and the number of events done
@@ -107,11 +108,23 @@ def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) ->
                 raise UsageError(f"{target.parent / taken[0]} exists; --overwrite replaces it")
             for path in made:
                 sync(path)
+            old = _further(target)
             places = [path.replace(target.parent / path.name) for path in made]
+            for path in {*old} - {*places}:
+                path.unlink()
             sync(target.absolute().parent)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
     return places
+
+
+def _further(target: Path) -> list[Path]:
+    """The other files of the recording that is in the way, which go with it; none of what cannot be read."""
+    try:
+        kind = recognise(target) if target.is_file() else None
+        return kind.further(target) if kind and kind.further else []
+    except DataError:
+        return []
 
 
 def _reported(recording: Recording, report: Report | None) -> Recording:

@@ -61,6 +61,11 @@ class DatEvents(Sequential):
                 yield from part._alone()
                 self.warnings += [text for text in part.warnings if text not in self.warnings]
 
+    def further(self) -> list[Path]:
+        """Those files in which the recording goes on that are there, and say themselves that they are its parts."""
+        files = self._further()
+        return [path for k, path in enumerate(files, 2) if _is_part(path, f"{k}/{len(files) + 1}")]
+
     def _further(self) -> list[Path]:
         """The files in which the recording goes on."""
         found = re.fullmatch(r"1/([1-9]\d{0,3})", self._header.fields.get("part", ""))
@@ -120,6 +125,14 @@ def _part(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}_{number}{path.suffix}") if number else path
 
 
+def _is_part(path: Path, which: str) -> bool:
+    if not path.is_file():
+        return False
+    with reading(path) as file:
+        header = _header(file.read(HEAD))
+    return header is not None and header.fields.get("part") == which
+
+
 def _header(head: bytes) -> Header | None:
     header = read_header(head)
     kind = head[header.length : header.length + 2] if header else b""
@@ -133,6 +146,7 @@ FORMAT = Format(
     recognises=lambda head, path: _header(head) is not None,
     open=DatEvents,
     write=write_events,
+    further=lambda path: DatEvents(path).further(),
     largest=(1 << 14, 1 << 14),
     keeps=frozenset({"size", "start"}),
 )

@@ -83,6 +83,7 @@ class Format:
     recognises  whether a file is of this kind, by its first `HEAD` bytes (the path is there to look further)
     open        the file, to be read; None if that cannot be done
     write       makes the file; raises OSError where the disk cannot take it.  None if that cannot be done
+    further     the other files that belong to one, where a recording may take several; raises DataError
     largest     (width, height) [px] that it can hold; None without limit
     longest_us  the latest time after start_us that it can hold; None without limit
     clock_us    the first and the last instant that it can hold, absolute; None without limit
@@ -96,6 +97,7 @@ class Format:
     recognises: Callable[[bytes, Path], bool]
     open: Callable[[Path], EventFile] | None = None
     write: Callable[[Path, Recording], None] | None = None
+    further: Callable[[Path], list[Path]] | None = None
     largest: tuple[int, int] | None = None
     longest_us: int | None = None
     clock_us: tuple[int, int] | None = None
