@@ -142,9 +142,10 @@ def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path
         (tmp_path / ("eval" if name == "job.json.new" else "run") / name).write_text("{")
     run = RunFolder(tmp_path / "run", {"a": 1}, resume=False)
     run.close()
-    assert {path.name for path in (tmp_path / "run").iterdir()} == {"lock", "run.json"}
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"run.json"}
     with Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False):
         pass
+    assert {path.name for path in (tmp_path / "eval").iterdir()} == {"job.json"}
     (tmp_path / "eval" / "notes.txt").write_text("mine")
     (tmp_path / "eval" / "job.json").unlink()
     with pytest.raises(UsageError, match="holds something else"):

@@ -21,7 +21,7 @@ from typing import Any, get_type_hints
 
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, whole_file, writing
+from vid2ev.recording.disk import lock, unlock, whole_file, writing
 from vid2ev.recording.manifest import as_stated, difference
 from vid2ev.untrusted import json_of, read_text
 
@@ -119,7 +119,7 @@ class Kept(KeptRows):
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._handle)
+        unlock(self.folder, self._handle)
 
 
 def read_job(folder: Path) -> dict[str, Any]:

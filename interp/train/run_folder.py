@@ -20,7 +20,6 @@ from __future__ import annotations
 import json
 import math
 import operator
-import os
 import re
 import shutil
 from collections.abc import Iterable, Mapping
@@ -30,7 +29,7 @@ from typing import Any
 
 from interp.pretrained import OF_RUN
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, whole_file, writing
+from vid2ev.recording.disk import lock, unlock, whole_file, writing
 from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
@@ -87,7 +86,7 @@ class RunFolder:
     def close(self) -> None:
         """Let others at it."""
         if self.first and self._lock is not None:
-            os.close(self._lock)
+            unlock(self.path, self._lock)
             self._lock = None
 
     @property

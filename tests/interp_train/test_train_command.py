@@ -46,6 +46,7 @@ def test_a_run_in_two_sessions_ends_with_a_table() -> None:
         "scenes             PSNR     SSIM   moving   static\n"
     )
     assert "\nbridge " in again.output and "\nnetwork " in again.output
+    assert not Path("run/lock").exists()
     same = run(*FEW, "-o", "run", "--resume", "--json")
     assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}
 

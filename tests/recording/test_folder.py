@@ -10,7 +10,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.columns import EventColumns, column_files
-from vid2ev.recording.disk import lock
+from vid2ev.recording.disk import lock, unlock
 from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
@@ -211,6 +211,19 @@ def test_a_lock_that_was_removed_since_it_was_opened_is_none(tmp_path: Path, mon
         lock(tmp_path / "out")
     os.close(held[0])
     os.close(lock(tmp_path / "out"))
+
+
+def test_of_a_lock_nothing_is_left_and_that_of_others_stays(tmp_path: Path) -> None:
+    unlock(tmp_path, lock(tmp_path))
+    assert not list(tmp_path.iterdir())
+    pytest.importorskip("fcntl", reason="no file locks on this system")
+    handle = lock(tmp_path)
+    (tmp_path / "lock").unlink()
+    other = lock(tmp_path)
+    unlock(tmp_path, handle)
+    with pytest.raises(UsageError, match="another vid2ev"):
+        lock(tmp_path)
+    unlock(tmp_path, other)
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:

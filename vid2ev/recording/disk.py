@@ -40,6 +40,13 @@ def lock(folder: Path) -> int:
     return lock(folder)
 
 
+def unlock(folder: Path, handle: int) -> None:
+    """Let others at a folder that was locked, with nothing left of the lock."""
+    if _is_at(handle, folder / "lock"):
+        _remove(folder / "lock")  # (while it is held: who has opened it meanwhile sees that it is gone)
+    os.close(handle)
+
+
 def _is_at(handle: int, path: Path) -> bool:
     """Whether the file of a handle is still there by its name."""
     with suppress(FileNotFoundError):
