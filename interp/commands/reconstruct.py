@@ -51,7 +51,8 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
 def reconstruct(
     events: str, output: Path | None, contrast: str | None, as_json: bool, quiet: bool, **options: Any
 ) -> None:
-    """Make pictures of what the event camera of EVENTS saw: any event file, or a recording's folder.
+    """Make pictures of what the event camera of EVENTS saw: any event file, or a recording's folder; of a rig's, that
+    of its only event camera.
 
     EVENTS is read in blocks, however long it is.  How bright a scene is cannot be seen from events: pictures show what
     changed.

@@ -129,6 +129,23 @@ def test_any_event_file_gives_the_same_pictures(tmp_path: Path, format: str) -> 
         np.testing.assert_array_equal(one, two)
 
 
+def test_of_a_recording_of_several_cameras_the_only_event_camera_is_taken(tmp_path: Path) -> None:
+    for camera in ("aps", "dvs", "other"):
+        (tmp_path / "rig" / camera).mkdir(parents=True)
+        sensor = {"parameters": {"threshold_on": 0.3, "threshold_off": 0.2} if camera == "dvs" else {}}
+        (tmp_path / "rig" / camera / "manifest.json").write_text(
+            json.dumps({"versions": {"vid2ev": "0"}, "sensor": sensor})
+        )
+    written(tmp_path / "rig" / "dvs" / "events.npz", drawn())
+    made = reconstruct(tmp_path / "rig", tmp_path / "a", cutoff_hz=1, fps=10)
+    assert (made["source"]["path"], made["source"]["contrast"]) == (str(tmp_path / "rig" / "dvs"), [0.2, 0.3])
+    written(tmp_path / "rig" / "other" / "events.npz", drawn())
+    with pytest.raises(UsageError, match=r"of the cameras aps, dvs, other; give one: .*rig/dvs$"):
+        reconstruct(tmp_path / "rig", tmp_path / "b", cutoff_hz=1, fps=10)
+    written(tmp_path / "rig" / "events.npz", drawn())
+    assert reconstruct(tmp_path / "rig", tmp_path / "b", cutoff_hz=1, fps=10)["source"]["path"] == str(tmp_path / "rig")
+
+
 def test_pictures_come_by_time_or_by_events(tmp_path: Path) -> None:
     path = written(tmp_path / "a.npz", drawn())
     made = reconstruct(path, tmp_path / "time", cutoff_hz=1, fps="1000/33")

@@ -25,6 +25,7 @@ __all__ = [
     "FORMATS",
     "check_holds",
     "describe_events",
+    "event_cameras",
     "format_named",
     "open_events",
     "read_events",
@@ -219,6 +220,16 @@ def recognise(path: str | Path) -> Format | None:
     return next((kind for kind in kinds if kind.open and kind.recognises(head, path)), None)
 
 
+def event_cameras(folder: Path) -> list[Path]:
+    """The folders of the event cameras in a recording of several cameras; none in a folder that has events itself."""
+    itself = (folder / "metadata.yaml").exists() or any(folder.glob("events.*"))
+    return [] if itself else [camera for camera in _cameras(folder) if any(camera.glob("events.*"))]
+
+
+def _cameras(folder: Path) -> list[Path]:
+    return sorted(path.parent for path in folder.glob("*/manifest.json"))
+
+
 def _opened(path: str | Path) -> tuple[Format, EventFile]:
     path = Path(path)
     path = _within(path) if path.is_dir() else path
@@ -240,10 +251,10 @@ def _within(folder: Path) -> Path:
         if path.exists():
             return path
     bag = folder / "metadata.yaml"
-    cameras = sorted(path.parent.name for path in folder.glob("*/manifest.json"))
+    cameras = _cameras(folder)
     if cameras and not bag.exists():
-        seen = next((name for name in cameras if any((folder / name).glob("events.*"))), cameras[0])
-        raise UsageError(f"{folder} is a recording of the cameras {', '.join(cameras)}; give one: {folder / seen}")
+        names, seen = ", ".join(camera.name for camera in cameras), [*event_cameras(folder), cameras[0]][0]
+        raise UsageError(f"{folder} is a recording of the cameras {names}; give one: {seen}")
     if (folder / "timestamps.txt").exists() or any((folder / name).exists() for name in ("raw", "frames.mp4")):
         raise UsageError(f"{folder} holds frames and no events; give the folder of an event camera")
     return bag if bag.exists() else folder / "events.h5"
