@@ -60,6 +60,19 @@ def test_table_file_and_picture(clip: str) -> None:
     assert "upsample" not in json.dumps(json.loads(again.stdout)["settings"])
 
 
+def test_a_budget_that_nothing_meets_ends_with_2_and_what_was_measured_is_there(clip: str) -> None:
+    for options in ([], ["--json", "--overwrite"]):
+        done = call(cost, clip, *COMMON, "--repeats", "1", "--budget", "time=1e-9x", *options)
+        assert done.exit_code == 2
+        assert done.stderr.startswith("error: budget 'time=1e-9x': the best settings come to time=")
+        assert "allow more" not in done.stdout and "straight light" in done.stdout
+        assert json.loads(Path("texture_cost.json").read_text())["recommended"] is None
+    assert json.loads(done.stdout)["recommended"] is None
+    converted = call(convert, clip, *COMMON, "-o", "out", "--budget", "time=1e-9x")
+    assert converted.exit_code == 2 and "the best settings come to time=" in converted.stderr
+    assert not Path("out").exists()
+
+
 def test_a_budget_is_kept_and_noted(clip: str) -> None:
     done = call(convert, clip, *COMMON, "--no-preview", "-o", "out", "--budget", "time=1000000x")
     assert done.exit_code == 0, done.output

@@ -75,6 +75,8 @@ def cost(
     What you give explicitly is the same in all settings; the rest is varied.  Nothing else is written.  Kernels are
     compiled before anything is timed; the first time that takes some minutes.
 
+    Exit code 2 says that no setting is within the budget that was given; what was measured is there all the same.
+
     With --rebuild, frames of SOURCE (what `eval` takes) are dropped and rebuilt in one way after the other: how long
     each takes per frame, of that size and of two others, and how close its frames are to those dropped.
     """
@@ -97,20 +99,24 @@ def cost(
     found.draw(places[1])
     if as_json:
         click.echo(json.dumps(found.described, indent=2))
-        return
-    click.echo(found.text)
-    if not quiet:
-        click.echo(f"\n{places[0]}, {places[1]}")
+    else:
+        click.echo(found.text)
+        if not quiet:
+            click.echo(f"\n{places[0]}, {places[1]}")
+    if found.refusal:
+        raise UsageError(found.refusal)
 
 
 def _of_conversion(source: str, **options: Any) -> Findings:
+    from vid2ev.cost.front import refusal
     from vid2ev.cost.measure import measured
     from vid2ev.cost.plot import plot
     from vid2ev.cost.store import Findings
     from vid2ev.cost.table import table
 
     found = measured(source, **options)
-    return Findings(found.describe(), table(found), partial(plot, found))
+    unmet = refusal(found.settings, found.budget) if found.recommended is None and options["budget"] else None
+    return Findings(found.describe(), table(found, recommending=not unmet), partial(plot, found), unmet)
 
 
 def _of_rebuilding() -> Callable[..., Findings]:

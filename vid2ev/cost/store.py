@@ -15,11 +15,13 @@ from vid2ev.sources import short_name
 
 @dataclass(frozen=True)
 class Findings:
-    """What was measured: ready for JSON, as text for people, and what draws it into a PNG file."""
+    """What was measured: ready for JSON, as text for people, and what draws it into a PNG file; and why nothing is
+    within a budget that was asked for, if so."""
 
     described: Mapping[str, Any]
     text: str
     draw: Callable[[Path], None]
+    refusal: str | None = None
 
 
 def check(name: str | None, source: str, overwrite: bool, kind: str = "cost") -> tuple[Path, Path]:

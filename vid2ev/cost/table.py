@@ -9,13 +9,13 @@ from vid2ev.cost.measure import Cost
 from vid2ev.cost.quality import Quality
 
 
-def table(cost: Cost) -> str:
-    """The table, what makes light between the frames best, and the recommendation."""
+def table(cost: Cost, *, recommending: bool = True) -> str:
+    """The table, what makes light between the frames best, and the recommendation, if it is wanted."""
     lines = [*_headed(cost), ""]
     for way, found in cost.between.items():
         if found is not None:
             lines.append(f"a frame left out, made by --upsample {way}: {_shown(found)}")
-    return "\n".join([*lines, recommendation(cost)])
+    return "\n".join([*lines, *[recommendation(cost)] * recommending]).rstrip()
 
 
 def recommendation(cost: Cost) -> str:
