@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from interp.train.fit import Outcome
     from interp.train.job import Job
     from interp.train.machines import Machines
+    from vid2ev.sensors.devices import Device
 
 WORD = "auto"
 SAYS = {  # what an option says of a job: the part of it, if it is in one, and the name
@@ -64,6 +65,10 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
 @click.option("--nodes", type=click.IntRange(1), default=1, show_default=True, help="Machines; start it on each.")
 @click.option("--cpu", is_flag=True, help="Train on the CPU though there is a GPU.")
 @click.option("--workers", type=click.IntRange(0), metavar="N", help="Processes that make samples.  [default: cores]")
+@click.option(
+    "--clips-on", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True,
+    help="Where clips are simulated: by those processes, or on a GPU of NVIDIA's.",
+)  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Check everything, say what would be done, do nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
@@ -75,6 +80,7 @@ def train(
     nodes: int,
     cpu: bool,
     workers: int | None,
+    clips_on: str,
     dry_run: bool,
     as_json: bool,
     quiet: bool,
@@ -111,7 +117,8 @@ def train(
         begin(learner_of(job), starts)
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
-    outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts)
+    device = _device(clips_on, machines)
+    outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts, device)
     if machines.first:
         _tell(outcome, path, as_json, quiet)
 
@@ -125,13 +132,25 @@ def _run(
     workers: int | None,
     quiet: bool,
     starts: Mapping[str, Path],
+    device: Device,
 ) -> Outcome:
     """A session; the first Ctrl-C ends it after the step, with a checkpoint."""
     from interp.train.runs import run
     from vid2ev.commands.progress import heard
 
     with heard(gently=True) as check:
-        return run(job, path, resume, machines, session_s, workers, quiet, check, starts)
+        return run(job, path, resume, machines, session_s, workers, quiet, check, starts, device)
+
+
+def _device(asked: str, machines: Machines) -> Device:
+    """Where clips are made; without a GPU on the CPU, which is said."""
+    from vid2ev.sensors.devices import Device, missing_for_cuda
+
+    if asked == "cuda" and (missing := missing_for_cuda()):
+        if machines.first:
+            click.echo(f"note: clips are made on the CPU: {missing}", err=True)
+        return Device("cpu", asked, missing)
+    return Device(asked, asked)
 
 
 def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:

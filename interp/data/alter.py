@@ -57,7 +57,7 @@ def stilled(clip: Clip, still: np.ndarray, quality: int | None = None) -> Clip:
     truth, keys, off_on = (np.array(each) for each in (clip.truth, clip.keys, clip.off_on))
     first = truth[0] if quality is None or truth.dtype != np.uint8 else _coded(truth[0], quality)
     noise = keys.astype(np.int16) - truth[[0, -1]] if truth.dtype == np.uint8 else None
-    truth[:, still] = first[still]
+    np.copyto(truth, first, where=still[..., None])
     if noise is None:
         keys[1, still] = keys[0, still]
     else:  # (the noise of both key frames stays as it was where they saw an instant; blur goes)
@@ -65,13 +65,16 @@ def stilled(clip: Clip, still: np.ndarray, quality: int | None = None) -> Clip:
         for key, own in zip(keys, noise, strict=True):
             key[still] = np.clip(first.astype(np.int16) + own * small[..., None], 0, 255).astype(np.uint8)[still]
     each = clip.coarser
-    off_on[:, :, still[each // 2 :: each, each // 2 :: each]] = 0
+    off_on *= ~still[each // 2 :: each, each // 2 :: each]
     return replace(clip, truth=truth, keys=keys, off_on=off_on)
 
 
 def thinned(clip: Clip, draw: np.random.Generator, share: float) -> Clip:
     """With a share of the events lost."""
-    return replace(clip, off_on=draw.binomial(clip.off_on, 1 - share).astype(np.uint8))
+    off_on = np.array(clip.off_on)
+    some = off_on > 0  # (of the others nothing is drawn, but it takes as long)
+    off_on[some] = draw.binomial(off_on[some], 1 - share)
+    return replace(clip, off_on=off_on)
 
 
 def misjudged(clip: Clip, draw: np.random.Generator, error: Range) -> Clip:

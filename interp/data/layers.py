@@ -17,10 +17,12 @@ import numpy as np
 
 from interp.data.chance import chance, log_uniform, uniform
 from interp.data.layer_kernel import lay
+from interp.data.layer_tensors import Laid, seen
 from interp.data.settings import ClipSettings
 from interp.data.shot import Beside, coarse
 from vid2ev.scenes.textures import pixels_of
-from vid2ev.stream.frames import LUMINANCE
+from vid2ev.sensors.devices import Device
+from vid2ev.stream.frames import luminance_of
 
 MOST_BEFORE = 3  # layers before the background
 CLOSENESS = (0.7, 2.5)  # pixels of the picture per pixel of a photograph
@@ -42,6 +44,11 @@ class Layer(NamedTuple):
     waves: tuple[float, float, float, float]  # height [px], length [px], phase, and phases per gap
     distance_m: float
     behind_all: bool
+
+    def waves_at(self, u: float) -> tuple[float, float, float]:
+        """Height [px], length [px] and phase of its waves at u."""
+        height, length, phase, turns = self.waves
+        return height, length, phase + u * turns
 
 
 class Layers:
@@ -66,24 +73,50 @@ class Layers:
         for j in range(first, last + 1):
             light = self._seen(j / steps, (0.0, 0.0))
             if self._beside.same:
-                yield light, light @ LUMINANCE
+                yield light, luminance_of(light)
             else:
                 there = self._seen(j / steps, (self._beside.right_m, self._beside.down_m))
-                yield light, coarse(there @ LUMINANCE, self._beside.coarser)
+                yield light, coarse(luminance_of(there), self._beside.coarser)
+
+    def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
+        """The same on a device (`Shot`)."""
+        import torch
+
+        times, beside = [j / steps for j in range(first, last + 1)], self._beside
+        pixels = [torch.from_numpy(layer.pixels).to(device.light) for layer in self._layers]
+        light = self._seen_on(pixels, times, (0.0, 0.0))
+        if beside.same:
+            return light, luminance_of(light)
+        there = luminance_of(self._seen_on(pixels, times, (beside.right_m, beside.down_m)))
+        return light, torch.nn.functional.avg_pool2d(there, beside.coarser)
 
     def _seen(self, u: float, stand_m: tuple[float, float]) -> np.ndarray:
         out = np.zeros((self.size[1], self.size[0], 3), np.float32)
         for layer in self._layers:
-            x, y, turn, growth = layer.start + u * layer.way + u * (1 - u) * layer.bend
-            shift = FOCAL * self.size[0] / layer.distance_m
-            x, y = x + shift * stand_m[0], y + shift * stand_m[1]
-            step = math.exp(-growth)
-            rows, columns = layer.pixels.shape[:2]
-            place = (columns / 2 + x, rows / 2 + y, step * math.cos(turn), step * math.sin(turn))
-            height, length, phase, turns = layer.waves
-            lay(layer.pixels, place, (height, length, phase + u * turns), layer.behind_all, out)
+            lay(layer.pixels, self._place(layer, u, stand_m), layer.waves_at(u), layer.behind_all, out)
         out *= np.float32(math.exp(self._fade * u))
         return out
+
+    def _seen_on(self, pixels: list[Any], times: list[float], stand_m: tuple[float, float]) -> Any:
+        """Light [n, H, W, 3] at some times, as a tensor beside those of the layers' pixels."""
+        import torch
+
+        layers = []
+        for there, layer in zip(pixels, self._layers, strict=True):
+            places = torch.tensor([self._place(layer, u, stand_m) for u in times], dtype=torch.float64)
+            waves = torch.tensor([layer.waves_at(u) for u in times], dtype=torch.float64)
+            layers.append(Laid(there, places.to(there.device), waves.to(there.device), layer.behind_all))
+        light = seen(layers, self.size)
+        fade = torch.tensor([math.exp(self._fade * u) for u in times], dtype=torch.float32)
+        return light * fade.to(light.device)[:, None, None, None]
+
+    def _place(self, layer: Layer, u: float, stand_m: tuple[float, float]) -> tuple[float, float, float, float]:
+        """Where a layer is, as `layer_kernel.lay` takes it."""
+        x, y, turn, growth = layer.start + u * layer.way + u * (1 - u) * layer.bend
+        shift, step = FOCAL * self.size[0] / layer.distance_m, math.exp(-growth)
+        x, y = x + shift * stand_m[0], y + shift * stand_m[1]
+        rows, columns = layer.pixels.shape[:2]
+        return columns / 2 + x, rows / 2 + y, step * math.cos(turn), step * math.sin(turn)
 
 
 def _layer(

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+from interp.data.cameras import Cameras, cameras_of
 from interp.data.chance import chance, log_uniform, one_of, uniform
 from interp.data.clip import Clip
 from interp.data.settings import SOURCES, ClipSettings
-from interp.data.shot import SAME, Beside
+from interp.data.shot import SAME, Beside, Shot
 from interp.data.simulate import simulated
+
+
+class Wanted(NamedTuple):
+    """What a number stands for: where its light is from, K, motion and time from key frame to key frame, and where the
+    event camera stands."""
+
+    source: str
+    multiple: int
+    motion_px: float
+    gap_us: int
+    beside: Beside
 
 
 def made(settings: ClipSettings, seed: int, number: int) -> Clip:
@@ -16,6 +29,16 @@ def made(settings: ClipSettings, seed: int, number: int) -> Clip:
 
     Raises UsageError, DataError for files of the settings that cannot be read.
     """
+    want = wanted(settings, seed, number)
+    if want.source == "recordings":
+        from interp.data.recorded import recorded
+
+        return recorded(settings, seed, number, want.multiple)
+    return simulated(*looked_at(want, settings, seed, number), settings)
+
+
+def wanted(settings: ClipSettings, seed: int, number: int) -> Wanted:
+    """What a number stands for."""
     draw = chance(seed, "clip", number)
     source = SOURCES[one_of(draw, settings.shares)]
     multiple = settings.multiples[int(draw.integers(len(settings.multiples)))]
@@ -23,25 +46,31 @@ def made(settings: ClipSettings, seed: int, number: int) -> Clip:
     motion_px = uniform(draw, part[1:])
     gap_us = settings.bins * max(1, round(1000 * log_uniform(draw, settings.gap_ms) / settings.bins))
     beside = _beside(settings, draw.random() < settings.rigs, seed, number)
-    if source == "recordings":
-        from interp.data.recorded import recorded
-
-        return recorded(settings, seed, number, multiple)
     if source == "videos":
+        beside = Beside(coarser=beside.coarser)  # (how far the scene is, nobody knows)
+    return Wanted(source, multiple, motion_px, gap_us, beside)
+
+
+def looked_at(want: Wanted, settings: ClipSettings, seed: int, number: int) -> tuple[Shot, Cameras]:
+    """The shot that a number stands for, and the cameras that look at it; not of recordings."""
+    shot, gap_us = _shot_of(want, settings, seed, number), want.gap_us
+    if want.source == "videos":
+        gap_us = shot.gap_us  # type: ignore[attr-defined]
+    return shot, cameras_of(shot, settings, seed, number, want.multiple, gap_us, want.beside)
+
+
+def _shot_of(want: Wanted, settings: ClipSettings, seed: int, number: int) -> Shot:
+    if want.source == "videos":
         from interp.data.video_shots import VideoShot
 
-        beside = Beside(coarser=beside.coarser)  # (how far the scene is, nobody knows)
-        shot = VideoShot(settings, seed, number, beside, multiple)
-        return simulated(shot, settings, seed, number, multiple, shot.gap_us, beside)
-    if source == "scenes":
+        return VideoShot(settings, seed, number, want.beside, want.multiple)
+    if want.source == "scenes":
         from interp.data.scene_shots import SceneShot
 
-        scene = SceneShot(settings, seed, number, beside, motion_px)
-        return simulated(scene, settings, seed, number, multiple, gap_us, beside)
+        return SceneShot(settings, seed, number, want.beside, want.motion_px)
     from interp.data.layers import Layers
 
-    layers = Layers(settings, seed, number, beside, motion_px)
-    return simulated(layers, settings, seed, number, multiple, gap_us, beside)
+    return Layers(settings, seed, number, want.beside, want.motion_px)
 
 
 def _beside(settings: ClipSettings, elsewhere: bool, seed: int, number: int) -> Beside:

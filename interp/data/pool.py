@@ -10,7 +10,7 @@ Samples are drawn from a window of clips that slides: sample i sees clips low(i)
     high(i) = begin + floor(fresh i)        low(i) = max(0, high(i) - most)
 
 Who draws a sample at which high(i) steps on makes a clip that is needed some time later, so that the processes that
-load samples share the work, and removes one that is needed no more.
+load samples share the work, and removes one that is needed no more.  With a GPU to make them on, `ahead` makes them.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from interp.data.making import made
 from interp.data.settings import ClipSettings
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import writing
+from vid2ev.sensors.devices import CPU, Device
 
 AHEAD = 48  # clips that are made before they are drawn from
 KEPT = 48  # clips behind the window that a slower process may still look at
@@ -40,6 +41,7 @@ class Pool:
     begin   clips that there are before the first sample
     most    clips in the window; each of 128x128 pixels takes 1.6 MB
     fresh   clips that join it with each sample
+    device  what clips are made on; one that is needed and not there yet is made on the CPU
     Raises UsageError for a window that cannot be.
     """
 
@@ -52,12 +54,14 @@ class Pool:
         begin: int = 256,
         most: int = 1500,
         fresh: float = 0.02,
+        device: Device = CPU,
     ):
         if not 1 <= begin <= most or fresh < 0:
             raise UsageError(
                 f"a window of {begin} to {most} clips, {fresh} fresh ones a sample: expected 1 <= begin <= most"
             )
         self.settings, self.seed, self.begin, self.most, self.fresh = settings, seed, begin, most, fresh
+        self.device = device
         self.folder = folder / f"{settings.name}-{seed}-{VERSION}"
         with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -74,26 +78,32 @@ class Pool:
             return read_clip(path)
         except FileNotFoundError:
             clip = made(self.settings, self.seed, number)
-            with writing(path):
-                write_clip(path, clip)
+            self.keep(number, clip)
             return clip
+
+    def keep(self, number: int, clip: Clip) -> None:
+        """Write the clip of a number.  Raises DataError where the folder cannot be written."""
+        path = self._path(number)
+        with writing(path):
+            write_clip(path, clip)
+
+    def missing(self, sample: int, ahead: int = AHEAD) -> list[int]:
+        """Those that are not there, of the clips that a sample may be drawn from and so many after them."""
+        window = self.window(sample)
+        return [number for number in range(window.start, window.stop + ahead) if not self._path(number).exists()]
 
     def step(self, sample: int) -> None:
         """What drawing a sample is due: a clip of later, if the window steps on here."""
         here, after = self.window(sample), self.window(sample + 1)
         for number in range(here.stop, after.stop):
-            if not self._path(number + AHEAD).exists():
+            if self.device.name == "cpu" and not self._path(number + AHEAD).exists():
                 self.clip(number + AHEAD)
             self._path(number - self.most - KEPT).unlink(missing_ok=True)
 
     def fill(self, sample: int, jobs: int = 1, report: Report | None = None) -> None:
         """Make what samples from this one on need at first, with some processes, and remove what they do not."""
-        window = self.window(sample)
-        wanted = {*range(window.start, window.stop + AHEAD)}
-        for path in self.folder.glob("*.npy"):
-            if path.stem.isdecimal() and int(path.stem) not in wanted:
-                path.unlink(missing_ok=True)
-        missing = [number for number in sorted(wanted) if not self._path(number).exists()]
+        self.remove_others(sample)
+        missing = self.missing(sample)
         if not missing:
             return
         if jobs == 1:
@@ -109,6 +119,13 @@ class Pool:
                 future.result()
                 if report:
                     report(done, len(missing))
+
+    def remove_others(self, sample: int) -> None:
+        """Remove clips that samples from this one on do not need, or not soon."""
+        window = self.window(sample)
+        for path in self.folder.glob("*.npy"):
+            if path.stem.isdecimal() and int(path.stem) not in range(window.start, window.stop + AHEAD):
+                path.unlink(missing_ok=True)
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:06d}.npy"

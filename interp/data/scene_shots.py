@@ -17,12 +17,13 @@ from interp.data.chance import Range, chance, log_uniform, uniform
 from interp.data.settings import ClipSettings
 from interp.data.shot import Beside
 from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.pose import Pose
+from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.scene_file import SceneFile, read_scene
 from vid2ev.scenes.world import World
-from vid2ev.stream.frames import LUMINANCE
+from vid2ev.sensors.devices import Device
+from vid2ev.stream.frames import luminance_of
 
 WHOLE_PX: Range = (160.0, 640.0)  # width of the picture of which a part is seen; scenes are made for 640
 SPARSE = 32  # pixels across, of the picture in which motion is measured
@@ -53,11 +54,7 @@ class SceneShot:
         self._span_ns = 1e9 * float(np.clip(motion_px / max(speed, 1e-9), SPAN_S[0], longest_s))
         self._begin_ns = 1e9 * middle_s - self._span_ns / 2
         self.moved_px = 1e-9 * self._span_ns * max(speed, PER_PERIOD_PX * flicker_hz)
-        self._frames, self._events = Reel(self._world, self._lens), None
-        if not beside.same:
-            size = settings.size[0] // beside.coarser, settings.size[1] // beside.coarser
-            stand = Pose(np.eye(3), np.array([beside.right_m, beside.down_m, 0.0]))
-            self._events = Reel(self._world, self._lens.scaled_to(size), stand)
+        self._there = None if beside.same else _there(self._lens, settings.size, beside)
         self.about: dict[str, Any] = {
             "source": "scene", "scene": name, "scene_seed": scene_seed, "begin_s": 1e-9 * self._begin_ns,
             "span_s": 1e-9 * self._span_ns, "focal_px": self._lens.focal_px[0],
@@ -65,10 +62,38 @@ class SceneShot:
 
     def pictures(self, steps: int, first: int, last: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """The light of both cameras (`Shot`)."""
-        for j in range(first, last + 1):
-            t_ns = max(0, round(self._begin_ns + self._span_ns * j / steps))
-            light = self._frames.picture(t_ns)[0].light
-            yield light, (self._events.picture(t_ns)[0].light if self._events else light) @ LUMINANCE
+        frames = Reel(self._world, self._lens)
+        events = Reel(self._world, *self._there) if self._there else None
+        for t_ns in self._instants_ns(steps, first, last):
+            light = frames.picture(t_ns)[0].light
+            yield light, luminance_of(events.picture(t_ns)[0].light if events else light)
+
+    def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
+        """The same on a device (`Shot`)."""
+
+        instants_ns = self._instants_ns(steps, first, last)
+        light = self._painted(device, instants_ns, self._lens)
+        there = self._painted(device, instants_ns, *self._there) if self._there else light
+        return light, luminance_of(there)
+
+    def _painted(self, device: Device, instants_ns: list[int], lens: Intrinsics, stand: Pose = IDENTITY) -> Any:
+        """Light [n, H, W, 3] on a device."""
+        import torch
+
+        from vid2ev.scenes.reel_on_card import ReelOnCard
+
+        pictures = ReelOnCard(self._world, device.memory, lens, stand).pictures(instants_ns)
+        return torch.stack([torch.as_tensor(picture.light) for picture in pictures])
+
+    def _instants_ns(self, steps: int, first: int, last: int) -> list[int]:
+        """When the scene is seen, by its own clock."""
+        return [max(0, round(self._begin_ns + self._span_ns * j / steps)) for j in range(first, last + 1)]
+
+
+def _there(lens: Intrinsics, size: tuple[int, int], beside: Beside) -> tuple[Intrinsics, Pose]:
+    """What an event camera beside sees through, and how it stands to the frame camera."""
+    coarse = size[0] // beside.coarser, size[1] // beside.coarser
+    return lens.scaled_to(coarse), Pose(np.eye(3), np.array([beside.right_m, beside.down_m, 0.0]))
 
 
 @lru_cache(maxsize=16)

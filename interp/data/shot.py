@@ -8,6 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vid2ev.sensors.devices import Device
+
 AHEAD = 8  # the event camera watches from the gap / AHEAD before the first key frame on
 
 
@@ -44,6 +46,9 @@ class Shot(Protocol):
     def pictures(self, steps: int, first: int, last: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """The light of both cameras at instants j / steps of the gap, j = first ... last, before it (j < 0) and after
         it too: of the frame camera [H, W, 3], and luminance for the event camera [h, w]; float32."""
+
+    def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
+        """All of them on a device, but for the last bits: tensors [n, H, W, 3] and [n, h, w]."""
 
 
 def coarse(light: np.ndarray, factor: int) -> np.ndarray:

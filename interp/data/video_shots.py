@@ -18,6 +18,7 @@ from interp.data.chance import chance
 from interp.data.settings import ClipSettings
 from interp.data.shot import AHEAD, Beside, coarse
 from vid2ev import Frame, UsageError, open_source
+from vid2ev.sensors.devices import Device
 from vid2ev.sources import Source, begins_s
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
@@ -64,6 +65,13 @@ class VideoShot:
         for j in range(first, last + 1):
             frame = stream[j + each * self._before]
             yield frame.light, coarse(frame.luminance, self._beside.coarser)
+
+    def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
+        """The same on a device (`Shot`), made here: motion is sought on the CPU."""
+        import torch
+
+        light, luminance = zip(*self.pictures(steps, first, last), strict=True)
+        return tuple(torch.from_numpy(np.stack(each)).to(device.light) for each in (light, luminance))  # type: ignore[return-value]
 
 
 def _before(multiple: int) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset, default_collate
 
+from interp.data.ahead import Ahead
 from interp.data.chance import chance
 from interp.data.clip import Clip, read_clip, write_clip
 from interp.data.pool import Pool, Report
@@ -27,6 +28,7 @@ from interp.train.job import EVENT_FED, Job
 from interp.train.learner import Learner
 from interp.train.schedule import Schedule
 from interp.train.true_flows import WithFlowBetween, WithFlows, with_flows
+from vid2ev.sensors.devices import CPU, Device
 
 WITHOUT_END = 1 << 40  # samples
 MEASURED_WITH = ("clean", "noisy")  # event sensors
@@ -41,15 +43,32 @@ def learner_of(job: Job) -> Learner:
     return kinds.get(job.network, FrameFedLearner)(job.network, network, job.recipe, schedule)
 
 
-def feed_of(job: Job, cache: Path, step: int, workers: int, jobs: int, report: Report | None = None) -> Feed:
+def feed_of(
+    job: Job,
+    cache: Path,
+    step: int,
+    workers: int,
+    jobs: int,
+    report: Report | None = None,
+    device: Device = CPU,
+    leads: bool = True,
+) -> Feed:
     """Samples from a step on, and clips to validate with.
 
     cache   a folder for clips; what is missing there is made again
     jobs    processes that make the first clips
+    device  what clips to train with are made on: a GPU, by another process, beside the processes that train, for the
+            one of them that leads
     """
-    pool = Pool(cache, job.clips, job.recipe.seed, **job.window.model_dump())
-    pool.fill(step * job.recipe.batch, jobs, report)
-    return Feed(_samples(job, pool), validation_of(job, cache / "validation"), job.recipe.batch, workers)
+    pool = Pool(cache, job.clips, job.recipe.seed, device=device, **job.window.model_dump())
+    sample = step * job.recipe.batch
+    ahead = Ahead(pool, sample) if device.name != "cpu" and leads else None
+    if ahead:
+        ahead.fill(sample, report)
+    else:
+        pool.fill(sample, jobs, report)
+    validation = validation_of(job, cache / "validation")
+    return Feed(_samples(job, pool), validation, job.recipe.batch, workers, ahead)
 
 
 def _samples(job: Job, pool: Pool) -> Dataset[Batch]:

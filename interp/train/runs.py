@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 
 from interp.train.checkpoints import read_checkpoint
@@ -16,6 +17,7 @@ from interp.train.starts import begin
 from vid2ev.commands.progress import counting
 from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
+from vid2ev.sensors.devices import CPU, Device
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 
@@ -30,6 +32,7 @@ def run(
     quiet: bool = False,
     stop: Stop = lambda: False,
     starts: Mapping[str, Path] = NOTHING,
+    clips_on: Device = CPU,
 ) -> Outcome:
     """Train in the folder `path`, or go on there.
 
@@ -38,6 +41,7 @@ def run(
     workers     processes that make samples, for each that trains; None for those cores that training leaves, at least 1
     stop        asked after each step
     starts      files of weights to begin with, by part, as the job says; to go on the run has its own
+    clips_on    the device that clips to train with are made on
     Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on.
     """
     begun_s = time.monotonic()
@@ -54,13 +58,14 @@ def run(
         spare = machines.spare(job.recipe.threads) if workers is None else workers
         try:
             with counting(quiet, CLIPS) as report:
-                feed = feed_of(job, folder.clips, step, spare, usable_cores(), report)
+                feed = feed_of(job, folder.clips, step, spare, usable_cores(), report, clips_on, machines.first)
             machines.check_clips(len(feed.validation))
         except UsageError:
             if not resume:
                 folder.give_up()
             raise
-        outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
+        with closing(feed):
+            outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:
             folder.forget_clips()
         return outcome

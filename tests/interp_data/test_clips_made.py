@@ -11,12 +11,13 @@ import pytest
 from pydantic import ValidationError
 
 from interp.data import alter
+from interp.data.cameras import Cameras, cameras_of, steps_for
 from interp.data.clip import Clip
 from interp.data.making import made
 from interp.data.sensor_ranges import SENSORS, frame_sensor
 from interp.data.settings import PRESETS, ClipSettings
 from interp.data.shot import SAME, Beside
-from interp.data.simulate import Light, simulated, steps_for
+from interp.data.simulate import Light, simulated
 from vid2ev import DvsSpec, load_cis, load_sensor
 from vid2ev.stream.frames import LUMINANCE
 
@@ -55,7 +56,7 @@ class Drift:
 def seen(shot: Drift, dvs: DvsSpec = IDEAL, steps: int = 32) -> Clip:
     """A clip of a shot by an event sensor and an ideal frame sensor."""
     cis = frame_sensor(GAP_US, 0.0, 0.0, 65535 / 1023, 0.0)
-    light = Light(cis, dvs, SMALL, 0, SAME, GAP_US, 8, steps, 0)
+    light = Light(Cameras(cis, dvs, 0, None, SMALL.size, SAME, GAP_US, 8, steps), SMALL)
     for j, (frame, luminance) in zip(range(-4, steps + 1), shot.pictures(steps, -4, steps), strict=True):
         light.add(j, frame, luminance)
     return light.clip({})
@@ -149,7 +150,7 @@ def test_a_part_of_the_world_gives_the_part_of_the_clip() -> None:
 
 def seen_small() -> Clip:
     cis = frame_sensor(GAP_US, 0.0, 0.0, 65535 / 1023, 0.0)
-    light = Light(cis, IDEAL, SMALL.model_copy(update={"size": (32, 16)}), 0, SAME, GAP_US, 8, 32, 0)
+    light = Light(Cameras(cis, IDEAL, 0, None, (32, 16), SAME, GAP_US, 8, 32), SMALL)
     for j, (frame, luminance) in zip(range(-4, 33), Drift((32, 16)).pictures(32, -4, 32), strict=True):
         light.add(j, frame, luminance)
     return light.clip({})
@@ -182,7 +183,7 @@ def test_coarser_sensors_see_means() -> None:
             for frame, luminance in super().pictures(steps, first, last):
                 yield frame, luminance.reshape(16, 2, 24, 2).mean(axis=(1, 3))
 
-    clip = simulated(Halved(), settings, 0, 0, 8, GAP_US, Beside(coarser=2))
+    clip = simulated(Halved(), cameras_of(Halved(), settings, 0, 0, 8, GAP_US, Beside(coarser=2)), settings)
     assert clip.coarser == 2 and clip.off_on.shape == (2, 32, 16, 24)
     ends = [shot.light(u) @ LUMINANCE for u in (0.0, 1.0)]
     before, after = (np.log(end.reshape(16, 2, 24, 2).mean(axis=(1, 3)) + 1e-3) for end in ends)

@@ -72,6 +72,13 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
+def test_clips_are_made_on_the_cpu_where_there_is_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vid2ev.sensors.devices.missing_for_cuda", lambda: "torch sees no GPU")
+    done = run(*FEW, "-o", "run", "--clips-on", "cuda")
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith("note: clips are made on the CPU: torch sees no GPU\nrun: step 3 of 3\n")
+
+
 def test_the_processes_that_train_are_the_runs(tmp_path: Path) -> None:
     """Which decide the last bits: a run goes on with those that it was begun with."""
     job = json.loads(run("--dry-run", "--json", "--cpu", "--devices", "4").output)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -39,9 +39,12 @@ class Frame:
     @property
     def luminance(self) -> np.ndarray:
         """Luminance [H, W]; `light` itself where it is that."""
-        if self.light.ndim == 2:
-            return self.light
-        if isinstance(self.light, np.ndarray):
-            return self.light @ LUMINANCE
-        red, green, blue = self.light.unbind(-1)
-        return float(LUMINANCE[0]) * red + float(LUMINANCE[1]) * green + float(LUMINANCE[2]) * blue
+        return self.light if self.light.ndim == 2 else luminance_of(self.light)
+
+
+def luminance_of(light: Any) -> Any:
+    """Luminance [...] of red, green and blue [..., 3], an array or a tensor of torch."""
+    if isinstance(light, np.ndarray):
+        return light @ LUMINANCE
+    red, green, blue = light.unbind(-1)
+    return float(LUMINANCE[0]) * red + float(LUMINANCE[1]) * green + float(LUMINANCE[2]) * blue
