@@ -24,6 +24,7 @@ from vid2ev.sensors.cis_on_card import CisOnCard
 from vid2ev.sensors.devices import Device
 from vid2ev.stream.upload import as_array
 
+FRAMES = 16  # that are walked at a time: room for events is made for those of so many
 WAITING = 1 << 27  # pixels of the pictures that wait until more go with them: half a gigabyte
 
 
@@ -107,6 +108,7 @@ def _walked(group: list[tuple[int, Seen]], settings: ClipSettings, device: Devic
     batch = DvsBatchOnCard(specs, cameras[0].size_of_events, seeds, memory=device.memory)
     counts = CountsOnCard(device.memory, cameras, settings.bins)
     batch.restart(light[0], times_ns[0].tolist())
-    batch.fill(counts, light[1:], times_ns[1:])
+    for k in range(1, len(light), FRAMES):
+        batch.fill(counts, light[k : k + FRAMES], times_ns[k : k + FRAMES])
     for (number, one), off_on in zip(group, counts.take(), strict=True):
         yield number, clip_of(one.cameras, one.frames, off_on, one.about)

@@ -49,8 +49,9 @@ LITTLE = ClipSettings(size=(16, 16), multiples=(4,), bins=8, scenes=0.0, sensors
     ],
     ids=["photographs", "scenes", "videos", "linear"],
 )
-def test_clips_of_a_card_are_those_of_the_cpu(said: dict[str, object]) -> None:
+def test_clips_of_a_card_are_those_of_the_cpu(said: dict[str, object], monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the last bits of the light, and with it of the aperture: hardly a code or event is another."""
+    monkeypatch.setattr("interp.data.on_card.FRAMES", 3)
     clips = ClipSettings.model_validate(LITTLE.model_dump() | said)
     got = dict(made_on_card(clips, 5, [1, 0], SIMULATED))
     assert sorted(got) == [0, 1]
