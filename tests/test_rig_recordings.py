@@ -305,6 +305,23 @@ def test_what_is_left_of_a_scene_is_seen_through_its_lens(
     assert part.source.centre_px == pytest.approx(centre_px)
 
 
+@pytest.mark.parametrize(
+    ("sensor", "changes", "sentence"),
+    [
+        ("mine.toml", [], r"rig.toml: camera 'left': Sensor file \S*mine.toml does not exist"),
+        ("papr", [], r"rig.toml: camera 'left': Sensor 'papr' is not a preset \(did you mean paper\?\)"),
+        ("paper", ["threshold_on=-1"], "^threshold_on = -1 in sensor paper is impossible"),
+    ],
+)
+def test_a_sensor_that_cannot_be_is_that_of_a_camera_of_a_file(
+    sensor: str, changes: list[str], sentence: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text(f"[[camera]]\nname = 'left'\nkind = 'dvs'\nsensor = '{sensor}'\n")
+    with pytest.raises(UsageError, match=sentence):
+        Recipe.of(CLIP, overrides=changes, rig=file)
+
+
 def test_other_depth_is_another_recording(tmp_path: Path) -> None:
     np.save(tmp_path / "depth.npy", np.full((48, 64), 2, np.float32))
     options = OPTIONS | {"rig": rig(translation_mm=(40.0, 0.0, 0.0)), "depth": f"{tmp_path / 'depth.npy'},scale=1"}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import UsageError, Vid2evError
 from vid2ev.rig.camera import Camera, ResolvedRig
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
@@ -65,6 +65,15 @@ class Sensors:
             return Loaded("own", sensor)
         changes = [*(f"{key}={toml_value(value)}" for key, value in camera.set.items()), *self._changes(camera.kind)]
         return Loaded(str(sensor), (load_sensor if camera.kind == "dvs" else load_cis)(sensor, changes))
+
+    def of_file(self, camera: Camera, file: str | Path) -> Loaded:
+        """As `of`, for a camera of a rig file, which is named where the sensor that it asks for cannot be."""
+        if camera.sensor is not None:
+            try:
+                replace(self, overrides=()).of(camera)  # (what is changed in all of them is not the file's)
+            except Vid2evError as error:
+                raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
+        return self.of(camera)
 
     def check_changes(self, cameras: Iterable[Camera]) -> None:
         """Raise UsageError for changes to sensors of a kind that none of the cameras has."""

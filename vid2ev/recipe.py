@@ -107,7 +107,8 @@ class Recipe:
         alone = rig is None and len(asked.cameras) == 1
         chosen = Sensors(sensor, cis or "paper", overrides)
         chosen.check_changes(asked.cameras)
-        sensors = [chosen.of(camera) for camera in asked.cameras]
+        of = partial(chosen.of_file, file=rig) if isinstance(rig, str | Path) else chosen.of
+        sensors = [of(camera) for camera in asked.cameras]
         coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
         maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
         options = {key: rest.pop(key) for key in OPTIONS if key in rest} | {"seen_through": maps}
