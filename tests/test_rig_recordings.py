@@ -152,9 +152,10 @@ def test_depth_maps_serve_as_a_plane_does(tmp_path: Path, depth: str) -> None:
     [
         Source(size=(64, 48), focal_px=(50.0, 50.0), centre_px=(30.0, 20.0)),  # of the video
         Source(size=(16, 12), focal_px=(25.0, 25.0), centre_px=(9.75, 5.75)),  # of what is left of it
-        Source(fov_deg=2 * math.degrees(math.atan(8 / 25))),
+        Source(fov_deg=2 * math.degrees(math.atan(32 / 50))),  # of the video
+        Source(focal_px=(50.0, 50.0), centre_px=(30.0, 20.0)),
     ],
-    ids=["whole", "part", "field"],
+    ids=["whole", "part", "field", "without-size"],
 )
 def test_a_part_of_a_video_is_as_far_as_the_video_and_seen_through_the_same_lens(
     tmp_path: Path, source: Source
@@ -164,9 +165,38 @@ def test_a_part_of_a_video_is_as_far_as_the_video_and_seen_through_the_same_lens
     depth = f"{tmp_path / 'disparity.npy'},baseline_m=0.1"
     recipe = Recipe.of(CLIP, rig=beside, depth=depth, crop="32x24+10+8", size=(16, 12))
     assert recipe.rig.source.size == (16, 12) and recipe.rig.source.focal_px == pytest.approx((25, 25))
-    if source.fov_deg is None:
-        assert recipe.rig.source.centre_px == pytest.approx((9.75, 5.75))
+    assert recipe.rig.source.centre_px == pytest.approx((9.75, 5.75) if source.fov_deg is None else (10.5, 7.5))
     np.testing.assert_allclose(next(recipe.source.frames()).depth, 4, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("edit", "focal", "centre_px"),
+    [
+        ({"size": "64x64!"}, (1, 4 / 3), (31.5, 31.5)),
+        ({"crop": "32x24+10+8"}, (1, 1), (21.5, 15.5)),
+        ({"crop": "32x24+10+8", "size": "64x24!"}, (2, 1), (43.5, 15.5)),
+        ({"size": "16x12"}, (1 / 4, 1 / 4), (7.5, 5.5)),
+        ({"size": "24x12"}, (3 / 8, 3 / 8), (11.5, 5.5)),
+    ],
+)
+def test_without_a_rig_the_whole_video_has_the_assumed_field(
+    edit: dict[str, str], focal: tuple[float, float], centre_px: tuple[float, float]
+) -> None:
+    whole_px = 32 / math.tan(math.radians(30))
+    assert Recipe.of(CLIP, frame_camera=True).rig.source.focal_px == pytest.approx((whole_px, whole_px))
+    part = Recipe.of(CLIP, frame_camera=True, **edit).rig
+    assert part.source_assumed and part.source.centre_px == pytest.approx(centre_px)
+    assert part.source.focal_px == pytest.approx([whole_px * each for each in focal])
+    assert part.viewpoints[0].intrinsics == part.source
+
+
+def test_a_camera_with_the_field_of_a_video_that_is_made_smaller_gets_its_very_frames() -> None:
+    """Whatever its size, to the last bit."""
+    for width in range(4, 200, 4):
+        size = (width, width * 3 // 4)
+        camera = Camera(name="left", kind="dvs", size=size, fov_deg=53.7)
+        around = Rig(source=Source(fov_deg=53.7), cameras=(camera,))
+        assert Recipe.of(CLIP, rig=around, size=size).sight().free
 
 
 def test_a_part_brought_to_the_size_of_the_whole_has_a_longer_lens(tmp_path: Path) -> None:

@@ -232,10 +232,7 @@ def _with_depth(text: str, rig: Rig, source: Source, framing: Framing | None) ->
     """A source with its depth, which may need to know how wide the source sees: as a rig says it of what is framed."""
     from vid2ev.sources.with_depth import WithDepth, parse_depth
 
-    if framing is None or rig.source.size == framing.whole:
-        lens = rig.source.intrinsics(source.size)
-    else:
-        lens = framing.lens_of_whole(rig.source.intrinsics(framing.size))
+    lens = rig.source.intrinsics_before(framing, source.size)
     return WithDepth(source, parse_depth(text, lens), text)
 
 

@@ -90,9 +90,10 @@ class Source(Optics):
 
     def intrinsics(self, size: tuple[int, int], framing: Framing | None = None) -> Intrinsics:
         """Of a video of this size, which may be that of `size` made smaller or larger, or framed out of pictures of
-        `size`.  Raises UsageError."""
+        `size`; without a `size` it is the lens of those pictures.  Raises UsageError."""
         stated = self.size or size
-        if framing is not None and self.size == framing.whole:
+        same_field = self.size is None and self.focal_px is None and framing is not None and framing.is_whole
+        if framing is not None and self._is_before(framing) and not same_field:
             return framing.lens_of_part(self.intrinsics(framing.whole))
         lens = self.lens(stated) or self.model_copy(update={"fov_deg": ASSUMED_FOV_DEG}).lens(stated)
         assert lens is not None
@@ -102,6 +103,16 @@ class Source(Optics):
                 f" {size[0]}x{size[1]}; give size, focal_px and centre_px of the video as it is or as it is read"
             )
         return lens.scaled_to(size) if stated != size else lens
+
+    def intrinsics_before(self, framing: Framing | None, size: tuple[int, int]) -> Intrinsics:
+        """Of the pictures of `size` out of which a video is framed, if it is.  Raises UsageError."""
+        if framing is None or self._is_before(framing):
+            return self.intrinsics(size)
+        return framing.lens_of_whole(self.intrinsics(framing.size))
+
+    def _is_before(self, framing: Framing) -> bool:
+        """Whether it says what the lens of the whole pictures is, not of what is framed out of them."""
+        return self.size in (None, framing.whole)
 
     @property
     def assumed(self) -> bool:

@@ -102,6 +102,12 @@ class Framing(NamedTuple):
     extent: tuple[float, float]  # width and height of the part [px]
     size: tuple[int, int]  # what they are brought to [px]
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is all of the picture in its own shape, so that its field is the same."""
+        all_of_it = self.corner == (0, 0) and self.extent == self.whole
+        return all_of_it and self.size[0] * self.whole[1] == self.size[1] * self.whole[0]
+
     def lens_of_part(self, lens: Intrinsics) -> Intrinsics:
         """The lens that the part is seen through, from that of the whole picture."""
         finer = [size / extent for size, extent in zip(self.size, self.extent, strict=True)]
