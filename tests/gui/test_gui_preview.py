@@ -19,7 +19,7 @@ import pytest
 from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
-from vid2ev.gui.light import Light, LightTable, smaller
+from vid2ev.gui.light import Light, LightTable, _part_of_video, smaller
 from vid2ev.gui.preview import VIEWS, Previewer, Request
 from vid2ev.gui.scene_edit import moved
 from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
@@ -28,12 +28,25 @@ from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
 from vid2ev.gui.worker import _serve
 from vid2ev.instants import Instant
+from vid2ev.recipe import Recipe
+from vid2ev.rig.camera import default_rig
 from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import DVS, load
 from vid2ev.stream.events import Events
 
 SMALL = "scene:spinning-shapes,size=64x48"
+
+
+@pytest.mark.parametrize("side", [64, 32])
+@pytest.mark.parametrize("size", [(64, 48), (128, 96)])
+def test_a_part_of_a_video_is_previewed_through_its_own_lens(size: tuple[int, int], side: int) -> None:
+    clip, edits = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.1", {"crop": "32x24+10+8", "size": size}
+    setup = Setup(clip, default_rig(), options=edits | {"size": f"{size[0]}x{size[1]}"})
+    lens = Recipe.of(clip, **edits).rig.source.scaled_to(smaller(size, side))
+    recipe, _, _ = _part_of_video(setup, 0.0, 0.02, side)
+    assert recipe.rig.source.focal_px == pytest.approx(lens.focal_px)
+    assert recipe.rig.source.centre_px == pytest.approx(lens.centre_px)
 
 
 @pytest.fixture(scope="module")

@@ -159,12 +159,13 @@ def _part_of_video(
     slower = float(options.get("slowdown") or 1)
     interval_s = _interval_s(source)
     lasting_s = source.duration_expected_s or length_s
-    whole = setup.rig.resolved(source.size, framing=framing_of(source))
-    rig = _smaller_rig(whole, whole.source.scaled_to(smaller(source.size, side)), side).settled()
+    framing, (width, height) = framing_of(source), smaller(source.size, side)
+    whole = setup.rig.resolved(source.size, framing=framing)
+    shown = _smaller_rig(whole, whole.source.scaled_to((width, height)), side)
+    rig = shown.settled(framing and framing._replace(size=(width, height)))
     origin_s = _origin_s(setup.source, _opening(setup))
     begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))
     latest_s = slower * (begin_s + length_s + 1.5 * interval_s)
-    width, height = smaller(source.size, side)
     stretched = "" if "size" in options and not str(options["size"]).endswith("!") else "!"
     options |= {
         "start": slower * max(begin_s - 1.5 * interval_s, origin_s),
