@@ -24,7 +24,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, lens_of, scene_of
+from vid2ev.sight import Sight, lens_of, scene_of, taken_by
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.upload import Upload
@@ -117,7 +117,7 @@ class Recipe:
             make_upsampler(rest.get("upsample", "flow"))  # (which is refused though it is not needed)
             rest |= {"upsample": "none"}
         scene = scene_of(source)
-        resolved = asked.resolved(source.size, lens_of(source), framing_of(source))
+        resolved = asked.around(taken_by(source)).resolved(source.size, lens_of(source), framing_of(source))
         mounts = mounts_of(resolved, sensors, seed, alone)
         if scene:
             reference = scene.world.intrinsics.focal_px[0]
@@ -232,7 +232,7 @@ def _with_depth(text: str, rig: Rig, source: Source, framing: Framing | None) ->
     """A source with its depth, which may need to know how wide the source sees: as a rig says it of what is framed."""
     from vid2ev.sources.with_depth import WithDepth, parse_depth
 
-    lens = rig.source.intrinsics_before(framing, source.size)
+    lens = rig.around(taken_by(source)).source.intrinsics_before(framing, source.size)
     return WithDepth(source, parse_depth(text, lens), text)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
+from vid2ev.rig.camera import Source as Taker
 from vid2ev.rig.homography import places_on_plane
 from vid2ev.rig.intrinsics import Framing, Intrinsics
 from vid2ev.rig.pose import Pose
@@ -90,6 +91,13 @@ def lens_of(source: Source) -> Intrinsics | None:
         return None
     framing = framing_of(source)
     return framing.lens_of_part(scene.world.intrinsics) if framing else scene.world.intrinsics
+
+
+def taken_by(source: Source) -> Taker | None:
+    """The camera that took the pictures of a source, where these come with it."""
+    while isinstance(source, Edit):
+        source = source.source
+    return getattr(source, "taken_by", None)
 
 
 class Stage:

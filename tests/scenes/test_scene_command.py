@@ -17,7 +17,10 @@ from scipy.spatial.transform import Rotation
 from vid2ev.commands import Commands
 from vid2ev.commands.convert import convert
 from vid2ev.commands.scene import scene
+from vid2ev.recipe import Recipe
 from vid2ev.recording.flow_files import read_flow
+from vid2ev.rig.camera import Camera, Rig, Source
+from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.scenes import folder as folder_module
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.world import World
@@ -134,6 +137,35 @@ def test_convert_reads_the_folder_and_many_of_them() -> None:
         ).exit_code
         == 0
     )
+
+
+def test_convert_sees_the_folder_through_the_lens_that_rendered_it() -> None:
+    assert vid2ev("scene", "spinning-shapes", "-o", "out", "--set", "camera.fov_deg=80", *QUICK).exit_code == 0
+    lens = Intrinsics.model_validate_json(Path("out/intrinsics.json").read_text())
+    assert lens.fov_deg == pytest.approx(80)
+    found = Recipe.of("out", frame_camera=True).rig
+    assert found.source == lens and not found.source_assumed
+    part = Recipe.of("out", frame_camera=True, crop="24x18+10+8", size="48x36", start=0.01, slowdown=2).rig
+    assert part.source.focal_px == pytest.approx([2 * each for each in lens.focal_px]) and not part.source_assumed
+    assert part.source.centre_px == pytest.approx((2 * 14 - 0.5, 2 * 10 - 0.5))
+    stated = Rig(source=Source(fov_deg=50.0), cameras=(Camera(name="left", kind="dvs"),))
+    assert Recipe.of("out", rig=stated).rig.source.fov_deg == pytest.approx(50)  # (who says something is believed)
+    np.save("disparity.npy", np.full((36, 48), 2.0, np.float32))
+    deep = Recipe.of("out", frame_camera=True, depth="disparity.npy,baseline_m=0.1", truth="depth")
+    depth = next(deep.source.frames()).depth
+    assert depth is not None and depth.min() == pytest.approx(lens.focal_px[0] * 0.1 / 2)
+
+
+@pytest.mark.parametrize("text", ["", "[" * 9999, '{"fx": 20}', "of others", "another size", "a number too large"])
+def test_a_file_of_others_says_nothing_of_the_lens(text: str) -> None:
+    Path("clip").mkdir()
+    for number in range(2):
+        cv2.imwrite(f"clip/{number}.png", np.full((12, 16), 90 * number, np.uint8))
+    lens = Intrinsics.of_field((16, 12), 80).model_dump_json()
+    said = {"another size": lens.replace("[16,12]", "[16,14]"), "a number too large": lens.replace("7.5", "1e300")}
+    Path("clip/intrinsics.json").write_text(said.get(text, text))
+    found = Recipe.of("clip", frame_camera=True, fps=30).rig
+    assert found.source_assumed and found.source.fov_deg == pytest.approx(60)
 
 
 def test_a_scene_with_photographs_of_its_own_is_rendered_again_from_its_folder() -> None:

@@ -25,6 +25,7 @@ from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sight import taken_by
 from vid2ev.sources import open_source
 from vid2ev.sources.framing import framing_of
 from vid2ev.sources.source import Source
@@ -160,7 +161,7 @@ def _part_of_video(
     interval_s = _interval_s(source)
     lasting_s = source.duration_expected_s or length_s
     framing, (width, height) = framing_of(source), smaller(source.size, side)
-    whole = setup.rig.resolved(source.size, framing=framing)
+    whole = setup.rig.around(taken_by(source)).resolved(source.size, framing=framing)
     shown = _smaller_rig(whole, whole.source.scaled_to((width, height)), side)
     rig = shown.settled(framing and framing._replace(size=(width, height)))
     origin_s = _origin_s(setup.source, _opening(setup))

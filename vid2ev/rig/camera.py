@@ -88,6 +88,11 @@ class Optics(BaseModel):
 class Source(Optics):
     """The camera that took the video."""
 
+    @classmethod
+    def of(cls, lens: Intrinsics) -> Source:
+        """One with these intrinsics.  Raises ValueError for numbers beyond those of rig files."""
+        return cls(**_stated(lens))
+
     def intrinsics(self, size: tuple[int, int], framing: Framing | None = None) -> Intrinsics:
         """Of a video of this size, which may be that of `size` made smaller or larger, or framed out of pictures of
         `size`; without a `size` it is the lens of those pictures.  Raises UsageError."""
@@ -214,6 +219,15 @@ class Rig(BaseModel):
         has_one = any(camera.kind == "cis" for camera in self.cameras)
         return self if has_one else Rig(source=self.source, cameras=(*self.cameras, Camera(name="cis", kind="cis")))
 
+    def around(self, source: Source | None) -> Rig:
+        """The rig around a video that comes with what took it, as far as [source] does not say how that sees."""
+        if source is None or not self.source.assumed:
+            return self
+        if self.source.distortion_model is not None:
+            bent = {"distortion_model": self.source.distortion_model, "distortion": self.source.distortion}
+            source = source.model_copy(update=bent)
+        return self.model_copy(update={"source": source})
+
     def resolved(
         self, source_size: tuple[int, int], known: Intrinsics | None = None, framing: Framing | None = None
     ) -> ResolvedRig:
@@ -252,7 +266,7 @@ class ResolvedRig:
         lens = self.source
         if framing is not None and framing.whole == framing.size:
             lens = framing.lens_of_whole(lens)
-        return Rig(source=Source(**_stated(lens)), cameras=tuple(cameras))
+        return Rig(source=Source.of(lens), cameras=tuple(cameras))
 
     def describe(self) -> dict[str, Any]:
         """All of it, ready for JSON; reading it again gives the same light."""

@@ -27,6 +27,7 @@ from vid2ev.recording.depth_files import write_depth
 from vid2ev.recording.flow_files import write_flow
 from vid2ev.recording.pose_text import HEADER, pose_lines
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens_file import write_lens
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.picture_writing import writer_of
 from vid2ev.scenes.reel import Reel
@@ -88,7 +89,7 @@ class CameraFolder:
         for name in ("", *(name for name in ("depth", "flow") if name in self.contents.formats)):
             (self.folder / name).mkdir(parents=True, exist_ok=True)
         intrinsics = self.camera[0]
-        (self.folder / "intrinsics.json").write_text(intrinsics.model_dump_json(indent=2) + "\n")
+        write_lens(self.folder, intrinsics)
         self._times = self._open.enter_context(open(self.folder / "timestamps.txt", "w", encoding="ascii"))
         self._times.write("# unit: ns\n")
         if "poses" in self.contents.formats:

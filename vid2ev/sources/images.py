@@ -23,6 +23,7 @@ from vid2ev.light.pictures import PictureReader
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
+from vid2ev.rig.lens_file import lens_in
 from vid2ev.sources.times import (
     Clock,
     digest_of,
@@ -42,7 +43,8 @@ FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of fra
 class Images:
     """Frames of a folder of images, or of a TIFF with pages.
 
-    fps   if given, image k is at k / fps; needed where there are no times
+    fps       if given, image k is at k / fps; needed where there are no times
+    taken_by  the camera that took them, where the folder says it (`rig/lens_file.py`)
 
     Raises UsageError without times, DataError if there is no image, if the times do not match, and for
     an image that cannot be read or has another size or kind of pixel than the first (the message names it).
@@ -77,6 +79,7 @@ class Images:
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         if transfer == "auto":
             transfer = "linear" if first.dtype.kind == "f" else _said(self.path, tagged or "srgb")
+        self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
         self._reader = PictureReader(transfer, colour)
         self._dtype = first.dtype
 

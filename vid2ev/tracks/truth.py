@@ -20,6 +20,7 @@ from vid2ev.mounts import Mount
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.pose_text import HEADER, pose_lines
 from vid2ev.recording.truth_files import write_depth, write_flow, write_mask, write_pixel_map
+from vid2ev.rig.lens_file import write_lens
 from vid2ev.truth import Truth
 
 TIMES, POSES = "truth_times", "truth_poses"  # files that grow
@@ -63,7 +64,7 @@ class TruthTrack:
         (target / "timestamps.txt").write_text("".join(f"{int(t_us)}\n" for t_us in times), encoding="ascii")
         poses = self._folder.written(f"{self._mount.within}{POSES}").read_text(encoding="ascii")
         (target / "poses.txt").write_text(HEADER + poses, encoding="ascii")
-        (target / "intrinsics.json").write_text(self._mount.intrinsics.model_dump_json(indent=2) + "\n")
+        write_lens(target, self._mount.intrinsics)
 
     def _place(self, kind: str, name: str) -> Path:
         (self._aside / kind).mkdir(parents=True, exist_ok=True)
