@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from vid2ev.commands import Commands
@@ -96,7 +97,7 @@ def test_every_camera_of_a_rig_has_its_folder() -> None:
     assert vid2ev(*arguments).exit_code == 0
     names = {path.name for path in Path("out").iterdir()}
     assert {"scene.toml", "timestamps.txt", "depth", "flow", "000000.png", "dvs", "cis"} <= names
-    assert {path.name for path in Path("out/cis").iterdir()} == names - {"scene.toml", "dvs", "cis"}
+    assert {path.name for path in Path("out/cis").iterdir()} == names - {"scene.toml", "files", "dvs", "cis"}
     assert np.array_equal(cv2.imread("out/000003.png"), cv2.imread("out/dvs/000003.png"))
     left, right = np.loadtxt("out/dvs/poses.txt"), np.loadtxt("out/cis/poses.txt")
     assert np.allclose(np.linalg.norm(left[:, 1:4] - right[:, 1:4], axis=1), 0.015)
@@ -180,6 +181,65 @@ def test_a_scene_with_photographs_of_its_own_is_rendered_again_from_its_folder()
     Path("first").rename("moved")
     assert vid2ev("scene", "moved/scene.toml", "-o", "second", "-q").exit_code == 0
     assert Path("moved/000000.png").read_bytes() == Path("second/000000.png").read_bytes()
+
+
+def scene_with_meshes_and_a_rig(folder: Path) -> Path:
+    """A scene file whose meshes name pictures and buffers, with a rig that names a sensor."""
+    trimesh = pytest.importorskip("trimesh", reason="trimesh reads meshes")
+    from trimesh.exchange.gltf import export_gltf
+
+    rng, shape = np.random.default_rng(0), "kind = 'mesh'\ntrajectory = { kind = 'fixed', position_m ="
+    (folder / "obj/skins").mkdir(parents=True)
+    (folder / "gltf").mkdir()
+    cv2.imwrite(str(folder / "obj/skins/skin.png"), rng.integers(0, 255, (16, 16, 3), np.uint8))
+    box = trimesh.creation.box()
+    skin = Image.open(folder / "obj/skins/skin.png")
+    box.visual = trimesh.visual.TextureVisuals(uv=rng.random((len(box.vertices), 2)), image=skin)
+    box.export(folder / "obj/box.obj")
+    material = folder / "obj/material.mtl"
+    material.write_text(material.read_text().replace("material_0.png", "skins/skin.png"))
+    for name, content in export_gltf(trimesh.Scene(box)).items():
+        (folder / "gltf" / name).write_bytes(content)
+    (folder / "sheet.ply").write_text(
+        "ply\nformat ascii 1.0\ncomment TextureFile obj/skins/skin.png\nelement vertex 3\nproperty float x\n"
+        "property float y\nproperty float z\nproperty float s\nproperty float t\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n-1 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
+    )
+    (folder / "mine.toml").write_text("[dvs]\nthreshold_on = 0.3\n")
+    (folder / "stereo.toml").write_text("[[camera]]\nname = 'left'\nkind = 'dvs'\nsensor = 'mine.toml'\n")
+    scene = folder / "scene.toml"
+    scene.write_text(
+        "[scene]\nduration_s = 0.01\nambient = 1\nrig = 'stereo.toml'\n[camera]\nsize = [24, 16]\n"
+        f"[[objects]]\nname = 'a'\nfile = 'obj/box.obj'\n{shape} [-0.7, 0, 3] }}\n"
+        f"[[objects]]\nname = 'b'\nfile = 'gltf/model.gltf'\n{shape} [0.7, 0, 3] }}\n"
+        f"[[objects]]\nname = 'c'\nfile = 'sheet.ply'\n{shape} [0, 0, 2] }}\n"
+    )
+    return scene
+
+
+def test_a_scene_with_meshes_and_a_rig_is_rendered_and_converted_again_from_its_folder() -> None:
+    Path("own").mkdir()
+    scene_file = scene_with_meshes_and_a_rig(Path("own"))
+    (Path("own/obj/material_0.png")).unlink()
+    assert vid2ev("scene", str(scene_file), "-o", "first", "-q").exit_code == 0
+    shutil.rmtree("own")
+    Path("first").rename("moved")
+    assert vid2ev("scene", "moved/scene.toml", "-o", "second", "-q").exit_code == 0
+    seen = cv2.imread("moved/000000.png")
+    assert np.array_equal(seen, cv2.imread("second/000000.png")) and np.ptp(seen, axis=2).max() > 40  # (their colours)
+    assert Recipe.of("second/scene.toml").mounts[0].sensor.spec.threshold_on == 0.3  # type: ignore[union-attr]
+    assert vid2ev("scene", "close-object", "-o", "close", *QUICK).exit_code == 0
+    assert len(Recipe.of("close/scene.toml").mounts) == 2
+
+
+def test_a_dry_run_names_files_as_they_are_seen_from_here() -> None:
+    Path("own").mkdir()
+    scene_file = scene_with_meshes_and_a_rig(Path("own"))
+    Path("again.toml").write_text(vid2ev("scene", str(scene_file), "--dry-run").stdout)
+    assert str(Path.cwd()) not in Path("again.toml").read_text()
+    assert read_scene("again.toml").resolved() == read_scene(scene_file).resolved()
+    Path("close.toml").write_text(vid2ev("scene", "close-object", "--dry-run").stdout)
+    assert read_scene("close.toml").resolved() == read_scene("close-object").resolved()
 
 
 def test_the_preview_is_a_film_of_the_scene() -> None:

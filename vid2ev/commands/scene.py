@@ -83,7 +83,9 @@ def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) 
     file, contents = _file(name, options), _contents(options)
     _check_renderer(options)
     if dry_run:
-        click.echo(toml_text(file.resolved(options["seed"]).tables()), nl=False)
+        from vid2ev.scenes.own_files import named_from
+
+        click.echo(toml_text(named_from(file.resolved(options["seed"]).tables(), Path())), nl=False)
         return
     made = list(_render(file, contents, options, quiet or as_json))
     if as_json:

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.gui.setup import PRESET, Setup, texts_of
+from vid2ev.recording.disk import writing
 from vid2ev.rig.camera import Camera, Rig, default_rig
-from vid2ev.rig.rig_file import rig_text, write_text
-from vid2ev.scenes.own_files import with_own_files
+from vid2ev.rig.rig_file import check_free, rig_text, write_text
+from vid2ev.scenes.own_files import copy_files, named_from, with_own_files
 from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.toml_text import toml_text
 
@@ -30,10 +31,12 @@ class Command:
 
     arguments  those after `vid2ev convert`
     files      text of the files that they name, by name
+    setup      what it does
     """
 
     arguments: tuple[str, ...]
     files: Mapping[str, str]
+    setup: Setup
 
     def __str__(self) -> str:
         return shlex.join(["vid2ev", "convert", *self.arguments])
@@ -42,7 +45,10 @@ class Command:
         """Write the files that the command names.  Raises UsageError where one is in the way, DataError where the disk
         cannot take it."""
         for name, text in self.files.items():
-            write_text(folder / name, text, overwrite)
+            if name == SCENE:
+                write_scene(self.setup, folder / name, overwrite)
+            else:
+                write_text(folder / name, text, overwrite)
 
 
 def command_of(setup: Setup, output: str | None = None) -> Command:
@@ -56,7 +62,7 @@ def command_of(setup: Setup, output: str | None = None) -> Command:
         words += ["--rig", RIG]
     for name, value in setup.options.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
-    return Command((*words, *(["-o", output] if output else [])), files)
+    return Command((*words, *(["-o", output] if output else [])), files, setup)
 
 
 def options_of(setup: Setup, folder: Path) -> dict[str, Any]:
@@ -64,11 +70,7 @@ def options_of(setup: Setup, folder: Path) -> dict[str, Any]:
     chosen: dict[str, Any] = {"video": setup.source} | dict(setup.options)
     if setup.scene is not None:
         chosen["video"] = str(folder / SCENE)
-        tables, files = with_own_files(setup.settled().tables())
-        write_text(folder / SCENE, toml_text(tables), overwrite=True)
-        for name, file in files.items():
-            (folder / name).parent.mkdir(exist_ok=True)
-            (folder / name).symlink_to(file)
+        write_scene(setup, folder / SCENE, overwrite=True)
     if not is_plain(setup):
         return chosen | {"rig": setup.rig}
     events, frames = _two(setup)
@@ -96,8 +98,26 @@ def sensor_text(setup: Setup, camera: int) -> str:
 
 
 def scene_text(setup: Setup) -> str:
-    """The file of a scene, with every number settled."""
-    return toml_text(setup.settled().tables())
+    """The file of a scene, with every number settled, as it is written where none of its files are."""
+    return toml_text(with_own_files(setup.settled().tables(), _beside(Path(SCENE)))[0])
+
+
+def write_scene(setup: Setup, path: Path, overwrite: bool = False) -> None:
+    """Write the file of a scene, and the files that it names beside it, but for those that are there or below already.
+
+    Raises UsageError where a file is in the way, DataError where the disk cannot take them.
+    """
+    tables, files = with_own_files(named_from(setup.settled().tables(), path.parent), _beside(path))
+    for place in (path, *(path.parent / name for name in files)):
+        check_free(place, overwrite)
+    with writing(path, "choose another place"):
+        copy_files(files, path.parent)
+    write_text(path, toml_text(tables), overwrite)
+
+
+def _beside(path: Path) -> str:
+    """The folder of the files of a scene that is written somewhere."""
+    return f"{path.stem}_files"
 
 
 def _sensor_words(setup: Setup) -> list[str]:

@@ -81,11 +81,16 @@ def rig_text(rig: Rig, folder: Path = Path()) -> str:
 def write_text(path: Path, text: str, overwrite: bool = False) -> None:
     """A text file, as a whole or not at all.  Raises UsageError where one is in the way, DataError where the disk
     cannot take it."""
+    check_free(path, overwrite)
+    with writing(path, "choose another place"), whole_file(path) as file:
+        file.write(text.encode())
+
+
+def check_free(path: Path, overwrite: bool) -> None:
+    """Raise UsageError where a file cannot be written, or would have to be replaced."""
     if path.is_dir() or (path.exists() and not overwrite):
         remedy = "give a file's name" if path.is_dir() else "--overwrite replaces it"
         raise UsageError(f"{path} exists; {remedy}")
-    with writing(path, "choose another place"), whole_file(path) as file:
-        file.write(text.encode())
 
 
 def read_text(path: Path) -> str:

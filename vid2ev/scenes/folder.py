@@ -1,14 +1,13 @@
 """The folder of a rendered scene: there as a whole or not at all.
 
 scene.toml   the scene with every number settled; its first line says how it was made
-files/       the photographs and meshes that it names
+files/       the photographs, meshes and rig that it names, with what these name
 ...          what the reference camera saw (`camera_folder.py`)
 NAME/        what a camera of the scene's rig saw, likewise
 """
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
 from importlib.metadata import version
@@ -18,7 +17,7 @@ from pathlib import Path
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import whole, writing
 from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
-from vid2ev.scenes.own_files import FOLDER, with_own_files
+from vid2ev.scenes.own_files import FOLDER, copy_files, with_own_files
 from vid2ev.scenes.source import SceneSource
 from vid2ev.toml_text import toml_text
 
@@ -49,9 +48,7 @@ def write_scene(
     with writing(directory, "make room or access there, or use -o"), whole(directory) as made:
         made.mkdir()
         (made / "scene.toml").write_text(text, encoding="utf-8")
-        for name, file in files.items():
-            (made / name).parent.mkdir(exist_ok=True)
-            shutil.copyfile(file, made / name)
+        copy_files(files, made)
         _write_all(made, source, contents, report)
     return True
 

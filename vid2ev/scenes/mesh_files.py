@@ -52,8 +52,22 @@ def load_mesh(path: Path | str) -> Mesh:
     return mesh
 
 
-def _geometries(path: Path) -> list[trimesh.Trimesh]:
-    """What in the file has triangles, each where it stands."""
+def named_by(path: Path) -> dict[str, Path]:
+    """The files that a mesh file names, by the names under which a copy of it finds them, as seen from its folder.
+
+    Raises as `load_mesh` does, and UsageError where two of them have one name.
+    """
+    opened: list[tuple[str, Path]] = []
+    _geometries(path, opened)
+    found = dict(opened)
+    two = next((name for name, file in opened if file != found[name]), None)
+    if two is not None:
+        raise UsageError(f"{path} names two files {two} in other folders; give each a name of its own")
+    return found
+
+
+def _geometries(path: Path, opened: list[tuple[str, Path]] | None = None) -> list[trimesh.Trimesh]:
+    """What in the file has triangles, each where it stands; the files that it names go into `opened`."""
     try:
         import trimesh
     except ImportError as error:
@@ -64,10 +78,7 @@ def _geometries(path: Path) -> list[trimesh.Trimesh]:
         raise DataError(f"{path}: no such file; give the path of a mesh")
     try:
         _check_claims(path)
-        # (pictures and buffers that the file names are looked for in its folder and below, nowhere else)
-        anywhere = os.environ.get(PATHS) == "anywhere"
-        found_by = trimesh.resolvers.FilePathResolver(str(path), allow_anywhere=anywhere)
-        found = trimesh.load_scene(path, process=False, resolver=found_by).dump(concatenate=False)
+        found = trimesh.load_scene(path, process=False, resolver=_resolver(path, opened)).dump(concatenate=False)
         meshes = [part for part in found if isinstance(part, trimesh.Trimesh) and len(part.faces)]
     except (UsageError, DataError):
         raise
@@ -78,6 +89,26 @@ def _geometries(path: Path) -> list[trimesh.Trimesh]:
     if any(not np.isfinite(part.vertices).all() for part in meshes):
         raise DataError(f"{path}: has vertices that are not finite numbers; export it anew")
     return meshes
+
+
+def _resolver(path: Path, opened: list[tuple[str, Path]] | None) -> trimesh.resolvers.FilePathResolver:
+    """What finds pictures and buffers that a file names: in its folder and below, nowhere else."""
+    import trimesh
+
+    class Resolver(trimesh.resolvers.FilePathResolver):
+        def absolute(self, name: str) -> Path:
+            place = super().absolute(name)
+            if opened is not None and place.is_file():
+                opened.append((_own_name(name.strip()), place))
+            return place
+
+    return Resolver(str(path), allow_anywhere=os.environ.get(PATHS) == "anywhere")
+
+
+def _own_name(name: str) -> str:
+    """A name in the file's folder or below; what is elsewhere is looked for under its last part as well."""
+    plain = os.path.normpath(name)
+    return os.path.basename(plain) if os.path.isabs(plain) or plain.startswith("..") else plain
 
 
 def _check_claims(path: Path) -> None:

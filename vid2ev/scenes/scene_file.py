@@ -102,6 +102,8 @@ class SceneFile:
         file = (self.path.parent / text).absolute() if text in self.asked else beside(self.path, text)
         if file.is_dir() and path.endswith(("texture", "environment")):
             return str(_one_of(file, chance(f"{path}.any"), f"{self.name}: {path}"))
+        if not file.is_file() and text in rigs_that_come_along():
+            return str(PREDEFINED / text)
         if not file.is_file():
             names = f"; photographs that come along are {', '.join(PHOTOGRAPHS)}" if "texture" in path else ""
             hint = nearest(text, [*PHOTOGRAPHS, ANY]) if names else ""
@@ -136,6 +138,11 @@ def _one_of(folder: Path, u: float, where: str) -> Path:
     if not found:
         raise UsageError(f"{where}: no pictures in {folder}; expected {', '.join(PICTURE_SUFFIXES)}")
     return found[int(u * len(found))]
+
+
+def rigs_that_come_along() -> list[str]:
+    """The names of the rigs of predefined scenes, which any scene file may name."""
+    return sorted(path.relative_to(PREDEFINED).as_posix() for path in PREDEFINED.glob("rigs/*.toml"))
 
 
 def scene_names() -> list[str]:
