@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+import shutil
 import socket
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from vid2ev.commands.convert import convert
 from vid2ev.commands.gui import gui
 from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
-from vid2ev.gui.command import command_of, options_of, sensor_text
+from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard
 from vid2ev.gui.loading import loaded
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
@@ -147,6 +148,32 @@ def test_a_changed_scene_keeps_photographs_of_its_own(tmp_path: Path) -> None:
     setup = setup.with_scene(with_values(setup.settled(), "scene", {"ambient": (0.2, 0.3, 0.4)}))
     source: Any = Recipe.of(**options_of(setup, tmp_path / "used")).source
     assert next(iter(source.frames())).light.shape == (12, 16, 3)
+
+
+def test_a_scene_is_saved_with_its_files_beside_it(tmp_path: Path) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    for name, code in (("dark", 40), ("light", 200)):
+        cv2.imwrite(str(own / f"{name}.png"), np.full((8, 8, 3), code, np.uint8))
+    thing = '[[objects]]\nname = "{0}"\nkind = "plane"\ntexture = "{0}.png"\n'
+    text = "[scene]\nduration_s = 0.01\n[camera]\nsize = [16, 12]\n"
+    (own / "own.toml").write_text(text + thing.format("dark") + thing.format("light"))
+    here = tmp_path / "here"
+    here.mkdir()
+    setup = setup_of(f"scene:{own / 'own.toml'}")
+    command_of(setup.with_scene(setup.settled())).write(here)
+    shutil.rmtree(own)
+    here.rename(tmp_path / "there")
+    saved = tmp_path / "there/scene.toml"
+    codes = [int(cv2.imread(thing.texture)[0, 0, 0]) for thing in read_scene(saved).resolved().objects]
+    assert codes == [40, 200]
+    with pytest.raises(UsageError, match=r"scene.toml exists; --overwrite replaces it"):
+        write_scene(setup_of(f"scene:{saved}"), saved)
+    settled = read_scene(saved).resolved()
+    turned = setup_of(f"scene:{saved}").with_scene(settled.model_copy(update={"objects": settled.objects[::-1]}))
+    write_scene(turned, saved, overwrite=True)  # (whose files are where they are to be)
+    codes = [int(cv2.imread(thing.texture)[0, 0, 0]) for thing in read_scene(saved).resolved().objects]
+    assert codes == [200, 40]
 
 
 def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

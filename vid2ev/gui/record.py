@@ -11,7 +11,7 @@ from nicegui import ui
 
 from vid2ev.conversion import default_directory
 from vid2ev.errors import Vid2evError
-from vid2ev.gui.command import RIG, SCENE, command_of, scene_text, sensor_text
+from vid2ev.gui.command import RIG, SCENE, command_of, sensor_text, write_scene
 from vid2ev.gui.jobs import Done, Job, Progress
 from vid2ev.gui.loading import loaded
 from vid2ev.gui.session import Session
@@ -68,11 +68,11 @@ class Record:
         with self._saves:
             for number, name in enumerate(names):
                 ui.menu_item(f"sensor of {name}", partial(self._save_sensor, number))
-            ui.menu_item("rig", lambda: self._save(RIG, lambda setup, folder: rig_text(setup.rig, folder)))
-            ui.menu_item("scene", lambda: self._save(SCENE, lambda setup, _: scene_text(setup)))
+            ui.menu_item("rig", lambda: self._save(RIG, _write_rig))
+            ui.menu_item("scene", lambda: self._save(SCENE, write_scene))
 
     def _save_sensor(self, number: int) -> None:
-        self._save(f"{self._name(number)}.toml", partial(_sensor, number))
+        self._save(f"{self._name(number)}.toml", partial(_write_sensor, number))
 
     def show(self) -> None:
         """Show the command."""
@@ -153,20 +153,20 @@ class Record:
     def _name(self, camera: int) -> str:
         return f"{self._session.setup.rig.cameras[camera].name}_sensor"
 
-    def _save(self, name: str, text: Callable[[Setup, Path], str]) -> None:
-        """Save what `text` makes of the setup, as seen from the folder where it is going to be."""
+    def _save(self, name: str, write: Callable[[Setup, Path, bool], None]) -> None:
+        """Have `write` save something of the setup at a place, where it may replace a file or not."""
         setup = self._session.setup
         if name == SCENE and not setup.is_scene:
             ui.notify("a video has no scene to save", position="bottom-right")
             return
-        self._ask_where(name, setup, text)
+        self._ask_where(name, setup, write)
 
-    def _ask_where(self, name: str, setup: Setup, text: Callable[[Setup, Path], str]) -> None:
+    def _ask_where(self, name: str, setup: Setup, write: Callable[[Setup, Path, bool], None]) -> None:
         """Ask for the place, then write the file, or say why not."""
 
-        def write() -> None:
+        def save() -> None:
             try:
-                write_text(Path(where.value), text(setup, Path(where.value).parent), over.value)
+                write(setup, Path(where.value), over.value)
             except Vid2evError as error:
                 why.text = str(error)
                 return
@@ -178,12 +178,16 @@ class Record:
             over = ui.switch("replace").props("dense")
             why = ui.label().classes("v-error")
             with ui.row():
-                ui.button("Save", on_click=write).props("unelevated dense")
+                ui.button("Save", on_click=save).props("unelevated dense")
                 ui.button("Cancel", on_click=dialog.close).props("flat dense")
 
 
-def _sensor(camera: int, setup: Setup, _: Path) -> str:
-    return sensor_text(setup, camera)
+def _write_sensor(camera: int, setup: Setup, path: Path, overwrite: bool) -> None:
+    write_text(path, sensor_text(setup, camera), overwrite)
+
+
+def _write_rig(setup: Setup, path: Path, overwrite: bool) -> None:
+    write_text(path, rig_text(setup.rig, path.parent), overwrite)
 
 
 def _count(result: dict[str, Any]) -> str:
