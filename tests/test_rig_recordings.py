@@ -307,6 +307,40 @@ def test_the_truth_of_a_scene_is_that_of_its_world(tmp_path: Path) -> None:
         assert not (folder / "flow" / "000002.npz").exists()
 
 
+@pytest.mark.parametrize(
+    "edit",
+    [
+        {"size": (24, 12)},
+        {"crop": "24x18+6+9"},
+        {"slowdown": 3},
+        {"start": 0.01, "stop": 0.04, "slowdown": 0.5, "crop": "24x18+6+9", "size": "12x18!"},
+    ],
+    ids=["size", "crop", "slowdown", "all"],
+)
+def test_the_truth_of_what_is_left_of_a_scene_is_that_of_its_world(tmp_path: Path, edit: dict[str, Any]) -> None:
+    scene, options = "scene:parallax,seed=4,scene.duration_s=0.05,size=48x36", OPTIONS | edit
+    del options["upsample"]
+    convert(scene, tmp_path / "plain", **options)
+    kinds = ("depth", "flow", "mask", "poses")
+    convert(scene, tmp_path / "out", truth=kinds, truth_rate_hz=40 * edit.get("slowdown", 1), **options)
+    assert columns(tmp_path / "out") == columns(tmp_path / "plain")
+    recipe = Recipe.of(scene, **options_of(options))
+    world, lens = open_source(scene).world, recipe.mounts[0].intrinsics  # type: ignore[attr-defined]
+    folder = tmp_path / "out/truth"
+    assert json.loads((folder / "intrinsics.json").read_text()) == lens.model_dump(mode="json")
+    t_ns, positions_m, _ = read_poses(folder / "poses.txt")
+    assert len(t_ns) >= 2 and set(t_ns.tolist()) <= {frame.t_ns for frame in recipe.source.frames()}
+    instants_ns = np.array([frame.t_ns for frame in open_source(scene).frames()])
+    at_ns = [int(instants_ns[np.abs(instants_ns - t * edit.get("slowdown", 1)).argmin()]) for t in t_ns.tolist()]
+    for number, here_ns in enumerate(at_ns):
+        picture = world.render(here_ns, lens)
+        np.testing.assert_array_equal(read_depth(folder / f"depth/{number:06d}.npy"), picture.depth)
+        np.testing.assert_allclose(positions_m[number], world.camera_pose(here_ns).translation_m)
+        if number + 1 < len(at_ns):
+            flow = world.flow(here_ns, at_ns[number + 1], picture, lens).shift
+            np.testing.assert_array_equal(read_flow(folder / f"flow/{number:06d}.npz"), flow)
+
+
 def test_a_scene_brings_its_own_rig(tmp_path: Path) -> None:
     scene = "scene:close-object,scene.duration_s=0.01,size=32x24"
     manifest = convert(scene, tmp_path / "out", **OPTIONS)

@@ -5,7 +5,7 @@ source -> intervals (motion between two frames) -> frames (light carried along i
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,13 +22,13 @@ from vid2ev.rig.depth import between
 from vid2ev.sensors.clock import LONGEST_INTERVAL_NS
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, Stage, arriving
+from vid2ev.sight import Sight, Stage, arriving, instants_of, scene_behind, scene_of
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.stream.upload import Upload, as_array, downloaded
-from vid2ev.truth import Truth, with_next
+from vid2ev.truth import Truth, Wanted, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
 from vid2ev.upsample.linear import LinearUpsampling
@@ -110,21 +110,43 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
 
 
 def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
-    sight = recipe.sight()
-    if recipe.source.dense and (recipe.truth or not sight.free):
+    sight, wanted, before_ns = recipe.sight(), recipe.truth, None
+    if recipe.source.dense and not (sight.free and (wanted is None or scene_of(recipe.source) is None)):
         return (yield from _rendered(recipe, start, upload))
-    wanted, before_ns = recipe.truth, None
+    of_scene = _of_scene(recipe, wanted) if wanted else None
     made = _light(recipe, start, upload)
     with closing(made if sight.free else ahead(made, LEAST_AHEAD)) as light:
         for frame, limited, shift_px in light:
             views, truth = sight.views(frame), tuple[Truth, ...]()
-            if wanted and frame.original:
+            if of_scene:
+                truth = of_scene(frame.t_ns)
+            elif wanted and frame.original:
                 if wanted.due(before_ns, frame.t_ns):
                     masks = [view.valid for view in views]
                     truth = wanted.of_views(frame, recipe.rig.source, recipe.plane_m, recipe.mounts, masks)
                 before_ns = frame.t_ns
             frames = arriving(frame, [view.light for view in views], recipe.mounts, recipe.bayer)
             yield Instant(frames, frame.t_ns, frame.original, frame.cut, limited, truth, shift_px, frame.depth)
+
+
+def _of_scene(recipe: Recipe, wanted: Wanted) -> Callable[[int], tuple[Truth, ...]] | None:
+    """What is known of a scene at an instant of a source that shows a part of it, or shows it at another size or speed:
+    nothing where it is not due.  None for other sources."""
+    scene = scene_behind(recipe.source)
+    if scene is None:
+        return None
+    world, mounts, shown = scene.world, recipe.mounts, instants_of(scene, recipe.source)
+    due = with_next([*shown], wanted)
+
+    def truth(t_ns: int) -> tuple[Truth, ...]:
+        if t_ns not in due:
+            return ()
+        at_ns, next_ns = shown[t_ns], due[t_ns]
+        pictures = [world.render(at_ns, *mount.view) for mount in mounts]
+        known = wanted.of_pictures(world, at_ns, None if next_ns is None else shown[next_ns], pictures, mounts)
+        return tuple(each._replace(t_ns=each.t_ns + t_ns - at_ns) for each in known)
+
+    return truth
 
 
 def _rendered(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:

@@ -20,7 +20,7 @@ from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.source import SceneSource
 from vid2ev.sources import Source
-from vid2ev.sources.cut import Cut
+from vid2ev.sources.cut import Cut, Slowed
 from vid2ev.sources.edit import Edit
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.frames import Frame
@@ -81,13 +81,28 @@ def scene_of(source: Source) -> SceneSource | None:
     return scene if isinstance(scene, SceneSource) else None
 
 
+def scene_behind(source: Source) -> SceneSource | None:
+    """The scene whose pictures a source shows, or what is left of them; None for other sources."""
+    unedited = _unedited(source)
+    return unedited if isinstance(unedited, SceneSource) else None
+
+
+def instants_of(scene: SceneSource, source: Source) -> dict[int, int]:
+    """When a source shows a scene, on the source's clock, and which instant of the scene that is [ns]."""
+    ends_ns: tuple[int | None, int | None] = (None, None)
+    slowed: Slowed | None = None
+    while isinstance(source, Edit):
+        ends_ns = source.ends_ns() if isinstance(source, Cut) else ends_ns
+        slowed = source if isinstance(source, Slowed) else slowed
+        source = source.source
+    return {slowed.slowed_ns(t_ns) if slowed else t_ns: t_ns for t_ns in scene.instants_between(*ends_ns)}
+
+
 def lens_of(source: Source) -> Intrinsics | None:
     """The lens of the scene that a source renders, through which what is left of its pictures is seen; None for other
     sources."""
-    scene = source
-    while isinstance(scene, Edit):
-        scene = scene.source
-    if not isinstance(scene, SceneSource):
+    scene = scene_behind(source)
+    if scene is None:
         return None
     framing = framing_of(source)
     return framing.lens_of_part(scene.world.intrinsics) if framing else scene.world.intrinsics
@@ -95,9 +110,13 @@ def lens_of(source: Source) -> Intrinsics | None:
 
 def taken_by(source: Source) -> Taker | None:
     """The camera that took the pictures of a source, where these come with it."""
+    return getattr(_unedited(source), "taken_by", None)
+
+
+def _unedited(source: Source) -> Source:
     while isinstance(source, Edit):
         source = source.source
-    return getattr(source, "taken_by", None)
+    return source
 
 
 class Stage:

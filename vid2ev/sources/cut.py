@@ -135,13 +135,17 @@ class Slowed(Edit):
         """The frames from index `start` on, each at the nearest nanosecond; DataError if two come to lie on one."""
         before_ns: int | None = None
         for frame in self.source.frames(start):
-            t_ns = round_ns(Fraction(frame.t_ns, 10**9) / self._slowdown)
+            t_ns = self.slowed_ns(frame.t_ns)
             if (before_ns is not None and t_ns <= before_ns) or abs(t_ns) > LONGEST_NS:
                 raise DataError(
                     f"slowdown {float(self._slowdown):g}: two frames come to lie on one nanosecond; use less"
                 )
             yield replace(frame, t_ns=t_ns)
             before_ns = t_ns
+
+    def slowed_ns(self, t_ns: int) -> int:
+        """When what the source has at t_ns comes."""
+        return round_ns(Fraction(t_ns, 10**9) / self._slowdown)
 
 
 def _instant(seconds: float | Fraction | None, name: str) -> Fraction | None:
