@@ -57,6 +57,17 @@ def test_a_camera_where_the_video_was_taken_sends_what_it_sends_alone(tmp_path: 
         assert one[:2] == other[:2] and one[3] == other[3] and abs(one[2] - other[2]) <= 1
 
 
+def test_the_only_event_camera_of_a_rig_is_the_one_that_is_meant(tmp_path: Path) -> None:
+    convert(CLIP, tmp_path / "one", cis="paper", **OPTIONS)
+    convert(CLIP, tmp_path / "two", rig=rig(), **OPTIONS)
+    for verb, into, target in (("reformat", [], "events.npz"), ("render", ["-o"], "picture.png")):
+        made = CliRunner().invoke(main, [verb, str(tmp_path / "one"), *into, str(tmp_path / target)])
+        assert made.exit_code == 0, made.output
+        unclear = CliRunner().invoke(main, [verb, str(tmp_path / "two"), *into, str(tmp_path / f"two.{target}")])
+        assert unclear.exit_code == 2 and "of the cameras aps, left, right; give one" in unclear.output
+    assert columns(tmp_path / "events.npz") == columns(tmp_path / "one" / "dvs")
+
+
 def test_a_recording_holds_the_sensor_files_of_its_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine").mkdir()

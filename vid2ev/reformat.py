@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats import FORMATS, check_holds, format_named, open_events, recognise, survey
+from vid2ev.formats import FORMATS, check_holds, format_named, of_only_camera, open_events, recognise, survey
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.recording.disk import sync, writing
 from vid2ev.stream.events import Events
@@ -48,7 +48,7 @@ def reformat(
         raise UsageError(f"format '{kind.name}' is only read; expected one of {', '.join(writable())}")
     if target.exists() and not overwrite:
         raise UsageError(f"{target} exists; --overwrite replaces it")
-    file = open_events(source)
+    file = open_events(of_only_camera(source))
     recording = survey(file) if start_s is None and stop_s is None else _part(file, start_s, stop_s)
     check_holds(kind, recording.size, recording.duration_us, recording.start_us)
     made = _write(target, kind, _reported(recording, report), overwrite)

@@ -22,7 +22,7 @@ from interp.reconstruct.of_network import OfNetwork
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events
 from vid2ev.errors import UsageError
-from vid2ev.formats import event_cameras, open_events
+from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
 from vid2ev.sensors.limits import is_whole
@@ -98,7 +98,7 @@ def reconstruct(
     All of the file is read in blocks; memory depends on the sensor's size alone, and with `events_per_frame` on that.
     Raises UsageError for requests that cannot be meant, DataError for what cannot be read or written.
     """
-    output, path = Path(output), _of_only_camera(Path(events))
+    output, path = Path(output), of_only_camera(events)
     kind, slicing = kind_of(output, format), _slicing(fps, events_per_frame)
     check_contrast(contrast)
     file, recording = _window(path, start_s, stop_s)
@@ -194,12 +194,6 @@ def _slicing(fps: Number | None, events_per_frame: int | None) -> Duration | Cou
     if not SLOWEST_HZ <= rate <= 10**5:
         raise UsageError(f"--fps {fps}: expected from {float(SLOWEST_HZ):g} to 100000 pictures per second")
     return Duration(10**6 / rate)
-
-
-def _of_only_camera(path: Path) -> Path:
-    """The folder of the event camera in a recording of several cameras, if there is no other; or the path itself."""
-    cameras = event_cameras(path)
-    return cameras[0] if len(cameras) == 1 else path
 
 
 def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[EventFile, Recording]:

@@ -27,6 +27,7 @@ __all__ = [
     "describe_events",
     "event_cameras",
     "format_named",
+    "of_only_camera",
     "open_events",
     "read_events",
     "recognise",
@@ -224,6 +225,12 @@ def event_cameras(folder: Path) -> list[Path]:
     """The folders of the event cameras in a recording of several cameras; none in a folder that has events itself."""
     itself = (folder / "metadata.yaml").exists() or any(folder.glob("events.*"))
     return [] if itself else [camera for camera in _cameras(folder) if any(camera.glob("events.*"))]
+
+
+def of_only_camera(path: str | Path) -> Path:
+    """The folder of the event camera in a recording of several cameras, if there is no other; or the path itself."""
+    cameras = event_cameras(Path(path))
+    return cameras[0] if len(cameras) == 1 else Path(path)
 
 
 def _cameras(folder: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.formats import open_events
+from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.pictures.film import film_size
 from vid2ev.recording.disk import whole, writing
@@ -74,7 +74,7 @@ def render(
     _check_numbers(fps=fps, speed=speed, start=start_s, stop=stop_s, size=size)
     rate = Fraction(str(fps)).limit_denominator(10**6)  # films have no finer ones
     slicing, kind = _slicing(by, rate, speed), _kind(view)
-    file = open_events(events)
+    file = open_events(of_only_camera(events))
     zero_us = beginning_us(file)
     recording = _recording(file, zero_us, start_s, stop_s, frames)
     if isinstance(slicing, Source):
