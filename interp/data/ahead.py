@@ -17,7 +17,7 @@ from vid2ev.errors import DataError, Vid2evError
 
 MANY = AHEAD // 2  # clips that are made together, unless they are needed now
 LOOKED_FOR_S = 0.1  # how often the folder is looked into
-ENDING_S = 20.0  # what the process has to end, when asked to
+ENDING_S = 5.0  # what the process has to end, when asked to
 STOP = -1
 
 
