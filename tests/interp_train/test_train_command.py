@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,11 @@ from interp.commands.train import train
 from interp.networks import names
 from interp.train import runs
 from interp.train.batches import Feed
+from interp.train.job import Job
+from interp.train.machines import Machines
 from vid2ev.commands import Commands
 from vid2ev.recording.exposures import write_codes
+from vid2ev.sensors.devices import Device
 
 FEW = ["--steps", "3", "--set", "batch=2", "--set", "processes=1", "--set", "validations=1", "--workers", "0", "--cpu"]
 
@@ -142,6 +146,24 @@ def test_data_that_cannot_be_used_leave_room_for_another_run(monkeypatch: pytest
         shown = run("--data", "nothing", "-o", "run", *FEW)
     assert shown.exit_code == 2 and "nothing: no recordings in it" in shown.output
     assert run("-o", "run", *FEW).exit_code == 0
+
+
+@pytest.mark.long
+def test_training_has_its_clips_made_by_another_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As on a GPU: clips of recordings, which need no device though they are to be made on one."""
+    from interp.train.made_of import feed_of
+
+    monkeypatch.setattr(runs, "feed_of", feed_of)
+    write_hsergb(tmp_path / "data" / "long", 20)
+    settings = [
+        "clips.size=[32,24]", "clips.scenes=0", "clips.photographs=0", "clips.recordings=1", "samples.size=16",
+        "window.begin=3", "window.most=4", "window.fresh=1.0", "validation.clips=1", "batch=2", "steps=3", "seed=0",
+    ]  # fmt: skip
+    job = Job.of("rrin-events-light", "tiny", settings, [], [str(tmp_path / "data")], [], {})
+    alone = Machines.of("auto", 1, True, 1)
+    done = runs.run(job, tmp_path / "run", machines=alone, workers=0, quiet=True, clips_on=Device("simulated"))
+    assert done.finished and not active_children()
+    assert not (tmp_path / "run" / "clips").exists()
 
 
 def test_recordings_that_give_no_clips_are_named_before_training(tmp_path: Path) -> None:
