@@ -32,7 +32,8 @@ from vid2ev.recording.manifest import machine, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
 MULTIPLE = 8
-UNEVEN = 1.05  # times the shortest gap is the longest of frames at a constant rate, whose times are rounded
+UNEVEN = 1.05  # times the shortest gap is the longest of frames at a constant rate
+CLOCK_US = 1000  # what Matroska, ASF and FLV round times to
 LINE = {"key_us": int, "remark": str, "shot": int}  # of each stretch
 
 
@@ -235,12 +236,19 @@ def _of(name: str, memory: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def _unevenly(shelf: Shelf, grid: Grid) -> list[str]:
     """That a film plays frames evenly which are not, if it does."""
     gaps_us = [after["key_us"] - line["key_us"] for line, after in pairwise(shelf.done)]
-    if shelf.kind != "mp4" or not isinstance(grid, Times) or not gaps_us or max(gaps_us) <= UNEVEN * min(gaps_us):
+    if shelf.kind != "mp4" or not isinstance(grid, Times) or not gaps_us or _are_even(gaps_us):
         return []
     return [
         f"frames lie {min(gaps_us) / 1000:g} to {max(gaps_us) / 1000:g} ms apart, and the film plays what is made of"
         " them evenly; --fps, or a folder of pictures, keeps their times"
     ]
+
+
+def _are_even(gaps_us: list[int]) -> bool:
+    """Whether gaps are those of frames at a constant rate, whose times are rounded."""
+    least_us, most_us = min(gaps_us), max(gaps_us)
+    rounded = not any(gap_us % CLOCK_US for gap_us in gaps_us) and most_us - least_us <= CLOCK_US < least_us
+    return rounded or most_us <= UNEVEN * least_us
 
 
 def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:

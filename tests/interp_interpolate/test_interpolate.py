@@ -164,6 +164,16 @@ def test_a_film_that_plays_frames_evenly_which_are_not_says_so(tmp_path: Path, u
         assert any("17 to 33 ms apart" in text for text in told["remarks"]) == (uneven and output == "a.mp4")
 
 
+@pytest.mark.parametrize(("times_ms", "even"), [([0, 17, 33, 50], True), ([0, 8, 17, 25], True), ([0, 1, 3, 4], False)])
+def test_frames_at_a_constant_rate_whose_file_counts_milliseconds_are_even(
+    tmp_path: Path, times_ms: list[int], even: bool
+) -> None:
+    source = images(tmp_path / "in", moving(4))
+    (source / "timestamps.txt").write_text("# us\n" + "".join(f"{t}000\n" for t in times_ms))
+    told = interpolate(source, tmp_path / "film.mp4", multiple=2, method="linear")
+    assert any("ms apart" in text for text in told["remarks"]) != even
+
+
 def test_the_default_is_said_with_its_reason(tmp_path: Path) -> None:
 
     said: list[str] = []
