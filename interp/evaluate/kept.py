@@ -4,7 +4,8 @@
     kept/SEQUENCE/METHOD.jsonl     a line for each group, when it is done: {"group": 3, "rows": [[...], ...]}
     kept/SEQUENCE/about.json       what is known of the sequence; there when it is done
 
-A line is written at once and brought to the disk; half a line at the end, of a kill, is cut off.
+A line is written at once and brought to the disk; half a line at the end, of a kill, is cut off.  What fails before the
+first line leaves nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ import math
 import operator
 import os
 import reprlib
+import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -109,6 +112,7 @@ class Kept(KeptRows):
         begun, asked = (before | {"methods": {name: known[name] for name in shared}}, wanted | {"methods": shared})
         if changed := difference(begun, asked):
             raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
+        self._begins, self._makes_folder = not there, not folder.exists()
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
             self._handle = lock(folder)
@@ -118,8 +122,15 @@ class Kept(KeptRows):
     def __enter__(self) -> Kept:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        nothing = kind is not None and self._begins and not any((self.folder / KEPT).rglob("*.jsonl"))
+        if nothing:
+            shutil.rmtree(self.folder / KEPT, ignore_errors=True)
+            (self.folder / JOB).unlink(missing_ok=True)
         unlock(self.folder, self._handle)
+        if nothing and self._makes_folder:
+            with suppress(OSError):  # (somebody else has begun there meanwhile)
+                self.folder.rmdir()
 
 
 def read_job(folder: Path) -> dict[str, Any]:

@@ -41,6 +41,7 @@ from vid2ev.recording.manifest import versions
 from vid2ev.sensors.limits import is_whole
 
 SUMMARY = "summary.json"
+FEWEST = 3  # frames of which one can be rebuilt
 ALONE = Workers()
 Report = Callable[[int, int, str], object]  # groups done, of about how many, and the sequence
 
@@ -130,7 +131,8 @@ def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
     """Why nothing of a sequence was scored."""
     if reasons := left_out({"sequences": {name: about}}):
         return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in reasons.items())
-    return f"{name}: {about['frames']} frames, expected {protocol.multiple + 1} or more; give a smaller --skip"
+    remedy = "give a smaller --skip" if about["frames"] >= FEWEST else "give more of it"
+    return f"{name}: {about['frames']} frames, expected {protocol.multiple + 1} or more; {remedy}"
 
 
 def _check(methods: Sequence[Rebuilder]) -> None:

@@ -392,12 +392,28 @@ def test_what_cannot_be_scored_is_said(tmp_path: Path) -> None:
     write_film(tmp_path / "film.npz", pictures(4))
     with pytest.raises(DataError, match=r"film: 4 frames, expected 9 or more; give a smaller --skip"):
         evaluate([str(tmp_path / "film.npz")], tmp_path / "report", baselines=("linear",))
+    write_film(tmp_path / "two.npz", pictures(2))
+    with pytest.raises(DataError, match=r"two: 2 frames, expected 9 or more; give more of it"):
+        evaluate([str(tmp_path / "two.npz")], tmp_path / "report", baselines=("linear",))
     folder = tmp_path / "frames"
     write_predictions(folder, pictures(4))
     (folder / "timestamps.txt").write_text("# us\n0\n8000\n4000\n12000\n")
     found = evaluate([str(folder)], tmp_path / "other", baselines=("linear",), protocol=Protocol(1, 1))
     (known,) = found.summary["sequences"].values()
     assert any("dropped 1 of 4 frames" in remark for remark in known["remarks"])
+
+
+def test_what_fails_before_anything_is_scored_leaves_nothing(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.npz", pictures(4))
+    (tmp_path / "mine").mkdir()
+    for report in (tmp_path / "report", tmp_path / "mine"):
+        with pytest.raises(DataError, match="give a smaller --skip"):
+            evaluate([str(tmp_path / "film.npz")], report, baselines=("linear",))
+        assert report.exists() == (report.name == "mine") and not [*report.glob("*")]
+        evaluate([str(tmp_path / "film.npz")], report, baselines=("linear",), protocol=Protocol(1, 1))
+        with pytest.raises(UsageError, match="holds an evaluation"):
+            evaluate([str(tmp_path / "film.npz")], report, baselines=("linear",))
+        assert (report / "rows.csv").exists() and (report / "job.json").exists()
 
 
 def test_predictions_that_are_missing_or_cannot_be_used_are_named_and_counted(tmp_path: Path) -> None:
