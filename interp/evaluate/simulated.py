@@ -17,6 +17,7 @@ from interp.own_codes import codes_of, curve_of
 from vid2ev import Dvs, DvsSpec, Events, load_sensor, open_source
 from vid2ev.instants import Instant, instants
 from vid2ev.recipe import Recipe
+from vid2ev.rig.camera import default_rig
 from vid2ev.sources import is_scene
 from vid2ev.sources.source import Source
 from vid2ev.toml_text import toml_value
@@ -85,7 +86,8 @@ class Simulated:
         between: those that `vid2ev convert` writes."""
         edited = self.edited(video)
         denser = {"fps": DENSER * edited["fps"]} if is_scene(video) else {}
-        recipe = Recipe.of(video, self.spec, seed=self.seed, **(edited | denser))
+        # (where the frames are from, whatever cameras a scene comes with)
+        recipe = Recipe.of(video, self.spec, seed=self.seed, rig=default_rig(), **(edited | denser))
         dvs, curve = recipe.mounts[0].dvs(), curve_of(film.describe())
         with closing(instants(recipe)) as light:
             for frame in film.frames():

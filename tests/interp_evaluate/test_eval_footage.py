@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from footage_made import STEP_US, pictures, write_film, write_hsergb, write_predictions
 
+import vid2ev
 from interp.data.dataset import write_dataset
 from interp.data.dataset_spec import DatasetSpec
 from interp.data.layouts import open_sequence, sequences_in
@@ -204,6 +205,22 @@ def test_a_film_is_seen_by_the_event_camera_of_convert(tmp_path: Path) -> None:
     codes = [each.shape for each in groups[1].truth]
     assert codes == [frames[0].shape] * 3
     assert film.about()["remarks"] == ["1 frames after the last complete group of 4 are not rebuilt"]
+
+
+@pytest.mark.parametrize("first", ["cis", "dvs"])
+def test_a_scene_is_seen_from_where_its_frames_are_whatever_rig_it_comes_with(tmp_path: Path, first: str) -> None:
+    predefined = Path(vid2ev.__file__).parent / "scenes" / "predefined" / "close-object.toml"
+    text, named = predefined.read_text(), 'rig = "rigs/close-object.toml"'
+    assert named in text
+    away = f'[[camera]]\nname = "{first}"\nkind = "{first}"\nsize = [20, 10]\ntranslation_mm = [300, 0, 0]\n'
+    (tmp_path / "rig.toml").write_text(away)
+    (tmp_path / "with.toml").write_text(text.replace(named, 'rig = "rig.toml"'))
+    (tmp_path / "without.toml").write_text(text.replace(named, ""))
+    simulated = Simulated.of("clean", size="32x24", stop=0.03)
+    films = (Film(f"scene:{tmp_path / name}.toml", Protocol(3, 3), name, simulated, 1) for name in ("with", "without"))
+    (seen,), (expected,) = (list(film.groups()) for film in films)
+    assert expected.events.off_on.sum() > 20
+    np.testing.assert_array_equal(seen.events.off_on, expected.events.off_on)
 
 
 def test_films_are_gone_through_a_group_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
