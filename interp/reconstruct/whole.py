@@ -21,7 +21,7 @@ from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
 from interp.reconstruct.of_network import OfNetwork
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
@@ -206,8 +206,11 @@ def _window(path: Path, start_s: float | None, stop_s: float | None) -> tuple[Ev
     zero_us = beginning_us(file)
     start_us, stop_us = (None if second is None else zero_us + round(second * 1e6) for second in (start_s, stop_s))
     recording = window(file, zero_us if start_us is None else start_us, stop_us)
+    if not recording.count and start_s is None and stop_s is None:
+        raise DataError(f"{path} holds no events, of which pictures are made; give another file")
     if not recording.count:
-        raise UsageError(f"{path}: no events from {start_s or 0:g} s on; choose another part")
+        stop = "on" if stop_s is None else f"to {stop_s:g} s"
+        raise UsageError(f"{path}: no events from {start_s or 0:g} s {stop}; choose another part")
     return file, recording
 
 

@@ -225,7 +225,9 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
         (["a.npz", "--cutoff", "-1"], 2, "0 to 10000"),
         (["a.npz", "--network", "rrin.safetensors"], 1, "takes frames"),
         (["a.npz", "--network", "rrin.safetensors", "--cutoff", "1"], 2, "leave out one"),
-        (["a.npz", "--start", "5"], 2, "no events"),
+        (["a.npz", "--start", "5"], 2, "no events from 5 s on"),
+        (["a.npz", "--stop", "-1"], 2, "no events from 0 s to -1 s"),
+        (["empty.csv"], 1, "empty.csv holds no events"),
         (["a.npz", "--start", "nan"], 2, "expected seconds"),
         (["a.npz", "--stop", "inf"], 2, "expected seconds"),
         (["a.npz", "--start", "0.5", "--stop", "0.2"], 2, "not after"),
@@ -237,6 +239,7 @@ def test_what_is_wrong_is_said_in_one_sentence(
     monkeypatch.chdir(tmp_path)
     written(tmp_path / "a.npz", drawn(100))
     (tmp_path / "text.txt").write_text("nothing here\n")
+    (tmp_path / "empty.csv").write_text("t,x,y,p\n")
     save(tmp_path / "rrin.safetensors", "rrin", make("rrin"))
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(command, arguments)
