@@ -12,7 +12,7 @@ import numpy as np
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
-from interp.interpolate.take import Key, Options
+from interp.interpolate.take import Key, Options, refuse_edits
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
@@ -75,9 +75,7 @@ class OfEventFile:
     apart = False  # one sensor
 
     def __init__(self, path: Path, options: Options):
-        unfit = {"--crop": options.crop, "--size": options.size, "the rate of frames": options.source_hz}
-        if asked := [name for name, value in unfit.items() if value is not None]:
-            raise UsageError(f"{path} is a recording, whose frames stay as they are; leave {asked[0]} out")
+        refuse_edits(path, options)
         self._cursor, self._path = EventCursor(path), path
         if not self._cursor.file.has_frames:
             raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")

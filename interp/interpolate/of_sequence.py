@@ -11,7 +11,7 @@ import numpy as np
 
 from interp.data.layouts import open_sequence
 from interp.interpolate.instants import rate_of
-from interp.interpolate.take import Key, Options
+from interp.interpolate.take import Key, Options, refuse_edits
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
@@ -30,17 +30,13 @@ class OfSequence:
     bits = 8
 
     def __init__(self, folder: Path, options: Options):
-        unfit = {"--crop": options.crop, "--size": options.size, "the rate of frames": options.source_hz}
-        if asked := [name for name, value in unfit.items() if value is not None]:
-            raise UsageError(f"{folder} is a recording, whose frames stay as they are; leave {asked[0]} out")
+        refuse_edits(folder, options)
         self._sequence = sequence = open_sequence(folder)
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.remarks = sequence.remarks
         self._numbers = self._part(options)
-        if self.apart:
-            self.remarks.append("its cameras stand apart: events are brought to where the frames saw the same change")
         times_us = sequence.times_us[self._numbers]
         span_us = int(times_us[-1] - times_us[0])
         self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)

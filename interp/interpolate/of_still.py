@@ -42,7 +42,10 @@ class OfStill:
     apart = False
 
     def __init__(self, picture: Path, events: Path, options: Options):
-        unfit = {"--crop": options.crop, "--size": options.size, "--start": options.start_s, "--stop": options.stop_s}
+        unfit = {
+            "--crop": options.crop, "--size": options.size, "--start": options.start_s, "--stop": options.stop_s,
+            "--source-fps": options.source_hz,
+        }  # fmt: skip
         if asked := [name for name, value in unfit.items() if value is not None]:
             raise UsageError(f"{picture} is a single frame, which stays as it is; leave {asked[0]} out")
         self._picture, self._path, self.name = picture, events, picture.stem

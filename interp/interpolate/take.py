@@ -16,7 +16,7 @@ import numpy as np
 from vid2ev import Events
 from vid2ev.errors import UsageError
 
-__all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take"]
+__all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take", "refuse_edits"]
 
 LATEST_S, MOST_NATS = 1e9, 10.0
 
@@ -90,6 +90,14 @@ def check_second(second: float | None, option: str) -> None:
     """Raise UsageError for a time [s] that no clock shows."""
     if second is not None and not (isinstance(second, int | float) and abs(second) <= LATEST_S):
         raise UsageError(f"{option} {second}: expected seconds, such as 1.5")
+
+
+def refuse_edits(path: Path, options: Options) -> None:
+    """Raise UsageError for options of videos that a recording cannot have."""
+    transfer = None if options.transfer == "auto" else options.transfer
+    unfit = {"--crop": options.crop, "--size": options.size, "--transfer": transfer, "--source-fps": options.source_hz}
+    if asked := [name for name, value in unfit.items() if value is not None]:
+        raise UsageError(f"{path} is a recording, whose frames stay as they are; leave {asked[0]} out")
 
 
 def check_contrast(contrast: tuple[float, float] | None) -> None:

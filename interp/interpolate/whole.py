@@ -18,6 +18,7 @@ from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
+from interp.interpolate.of_sequence import OfSequence
 from interp.interpolate.of_still import OfStill
 from interp.interpolate.pictures import Pictures, film_rate
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
@@ -107,7 +108,7 @@ def interpolate(
         _fill(shelf, ready, pictures, report)
         seconds = time.perf_counter() - started
         run = {"seconds": round(seconds, 3), "frames": shelf.count - there, "device": str(where), "machine": machine()}
-        manifest = shelf.job | _result(shelf, take, grid) | {"run": run}
+        manifest = shelf.job | _result(shelf, ready) | {"run": run}
         shelf.publish(manifest)
     return manifest
 
@@ -251,8 +252,17 @@ def _are_even(gaps_us: list[int]) -> bool:
     return rounded or most_us <= UNEVEN * least_us
 
 
-def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:
+def _brought(ready: Ready) -> list[str]:
+    """That events are brought to the frames, if they are asked for and their camera stands elsewhere."""
+    wanted = ready.fill.events or ready.fill.method.needs_events
+    if not (wanted and isinstance(ready.take, OfSequence) and ready.take.apart):
+        return []
+    return ["its cameras stand apart: events are brought to where the frames saw the same change"]
+
+
+def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:
     """What the manifest says of what was made."""
+    take = ready.take
     named: dict[str, list[list[float]]] = {}
     for line, after in zip(shelf.done, [*shelf.done[1:], None], strict=True):
         if line["remark"]:
@@ -265,6 +275,6 @@ def _result(shelf: Shelf, take: Take, grid: Grid) -> dict[str, Any]:
         "start_us": shelf.done[0]["key_us"],
         "stop_us": max([shelf.done[-1]["key_us"], *shelf.done[-1]["t_us"]]),
         "gaps_s": named,
-        "remarks": [*take.remarks, *_unevenly(shelf, grid), *shelf.remarks_on(take.size)],
+        "remarks": [*take.remarks, *_brought(ready), *_unevenly(shelf, ready.grid), *shelf.remarks_on(take.size)],
         "manifest": str(manifest_of(shelf.output, shelf.kind)),
     }

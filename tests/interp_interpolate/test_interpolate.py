@@ -203,6 +203,8 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--contrast", "0.2"], 2, "has none"),
         (["b", "--contrast", "much"], 2, "expected nats"),
         (["b", "--size", "32"], 2, "leave --size out"),
+        (["b", "--transfer", "linear"], 2, "leave --transfer out"),
+        (["b", "--source-fps", "30"], 2, "leave --source-fps out"),
         (["a", "--tile", "8x8"], 2, "expected none, auto"),
         (["a", "-o", "out.avi"], 2, "cannot be made"),
         (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),

@@ -285,6 +285,8 @@ def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_pat
     told = interpolate(tmp_path / "apart", tmp_path / "out", multiple=2)
     assert told["source"]["event_size"] == [32, 24] and read_codes(tmp_path / "out" / "000001.png").shape[1] == SIZE[0]
     assert any("stand apart" in remark for remark in told["remarks"])
+    told = interpolate(tmp_path / "apart", tmp_path / "flow", multiple=2, method="flow")
+    assert not any("stand apart" in remark for remark in told["remarks"])  # (it asks for no events)
 
 
 def still_and_events() -> tuple[np.ndarray, Events, np.ndarray]:
