@@ -397,6 +397,18 @@ def test_a_sensor_that_cannot_be_is_that_of_a_camera_of_a_file(
         Recipe.of(CLIP, overrides=changes, rig=file)
 
 
+@pytest.mark.parametrize(
+    ("scene", "options"), [("scene:close-object", {}), ("scene:flicker", {"rig": rig(fov_deg=30)})]
+)
+def test_a_scene_that_cannot_be_rendered_for_its_cameras_is_refused_before_its_first_frame(
+    scene: str, options: dict[str, Any]
+) -> None:
+    with pytest.raises(UsageError, match="a rig sees all of a scene: leave --crop, --size"):
+        Recipe.of(scene, size="64x48", **options)
+    Recipe.of(scene, stop=0.1, **options)
+    Recipe.of("scene:flicker", size="64x48")  # (by one camera, where the scene's own is)
+
+
 def test_other_depth_is_another_recording(tmp_path: Path) -> None:
     np.save(tmp_path / "depth.npy", np.full((48, 64), 2, np.float32))
     options = OPTIONS | {"rig": rig(translation_mm=(40.0, 0.0, 0.0)), "depth": f"{tmp_path / 'depth.npy'},scale=1"}

@@ -22,7 +22,7 @@ from vid2ev.rig.depth import between
 from vid2ev.sensors.clock import LONGEST_INTERVAL_NS
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, Stage, arriving, instants_of, scene_behind, scene_of
+from vid2ev.sight import Sight, Stage, arriving, instants_of, scene_behind
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -111,7 +111,7 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
 
 def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
     sight, wanted, before_ns = recipe.sight(), recipe.truth, None
-    if recipe.source.dense and not (sight.free and (wanted is None or scene_of(recipe.source) is None)):
+    if recipe.rendered:
         return (yield from _rendered(recipe, start, upload))
     of_scene = _of_scene(recipe, wanted) if wanted else None
     made = _light(recipe, start, upload)

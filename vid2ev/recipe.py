@@ -24,7 +24,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, lens_of, scene_of, taken_by
+from vid2ev.sight import Sight, lens_of, scene_of, staged, taken_by
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.upload import Upload
@@ -139,6 +139,8 @@ class Recipe:
         if self.source.dense:
             if self.depth is not None:
                 raise UsageError(f"depth '{self.depth}' of a scene, which knows its own; leave --depth out")
+            if self.rendered:
+                staged(self.source)
             return
         if self.plane_m is None and self.depth is not None and self.source.describe().get("kind") == "photograph":
             raise UsageError(f"depth '{self.depth}' of a photograph that moves: expected plane:METRES")
@@ -187,6 +189,13 @@ class Recipe:
     def sight(self) -> Sight:
         """What the cameras see, before the first frame."""
         return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer)
+
+    @property
+    def rendered(self) -> bool:
+        """Whether a scene is rendered for each camera; with truth, a scene of which all is seen is."""
+        if not self.source.dense:
+            return False
+        return not self.sight().free or (self.truth is not None and scene_of(self.source) is not None)
 
     @property
     def alone(self) -> bool:

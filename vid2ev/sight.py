@@ -119,18 +119,23 @@ def _unedited(source: Source) -> Source:
     return source
 
 
+def staged(source: Source) -> SceneSource:
+    """The scene of a source, to be rendered for each camera.  Raises UsageError for one that is seen through a crop, at
+    another size or speed."""
+    scene = scene_of(source)
+    if scene is None:
+        raise UsageError("a rig sees all of a scene: leave --crop, --size and --slowdown out; set its camera's size")
+    return scene
+
+
 class Stage:
     """A scene whose pictures are rendered for each camera, in place of views of one.
 
-    Raises UsageError for a scene that is seen through a crop, at another size or speed.
+    Raises UsageError as `staged` does.
     """
 
     def __init__(self, source: Source, mounts: Sequence[Mount]):
-        scene = scene_of(source)
-        if scene is None:
-            raise UsageError(
-                "a rig sees all of a scene: leave --crop, --size and --slowdown out; set its camera's size"
-            )
+        scene = staged(source)
         self.world, self._mounts = scene.world, mounts
         self._memory = None if scene.world.renderer else scene.memory  # (another renderer is not asked on a device)
         self.instants_ns = scene.instants_between(*(source.ends_ns() if isinstance(source, Cut) else (None, None)))
