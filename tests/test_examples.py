@@ -19,6 +19,7 @@ from matplotlib.image import imread
 
 from vid2ev import CisSpec, DvsSpec, cis_names, load_sensor
 from vid2ev.commands import main
+from vid2ev.recording.depth_files import write_depth
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.devices import missing_for_cuda
@@ -209,11 +210,13 @@ def test_the_depths_of_the_page_are_understood(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "maps").mkdir()
     for name in ("depth.npy", "disparity.npy", "inverse.npy", "maps/0.npy"):
         np.save(name, np.ones((6, 8), np.float32))
+    (tmp_path / "room" / "depth").mkdir(parents=True)
+    write_depth(tmp_path / "room" / "depth" / "000000.png", np.full((6, 8), 3, np.float32))
     table = CAMERAS.read_text(encoding="utf-8").partition("| `--depth` |")[2].partition("\n\n")[0]
     texts = [text for text in re.findall(r"^\| `([^`]+)`", table, re.MULTILINE) if not text.startswith("model:")]
-    assert len(texts) == 5
+    assert len(texts) == 6
     found = {text: parse_depth(text, Intrinsics.of_field((8, 6), 60)).at(0)[0, 0] for text in texts}
-    assert [float(f"{depth_m:.4g}") for depth_m in found.values()] == [2.5, 1, 0.001, 5.985, 5]
+    assert [float(f"{depth_m:.4g}") for depth_m in found.values()] == [2.5, 1, 0.001, 3, 5.985, 5]
 
 
 def test_the_python_of_the_page_runs() -> None:
