@@ -201,7 +201,8 @@ def _number(text: str | None, option: str) -> Any:
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
     film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
-    facts = [("made", f"{path}: {made['frames']:,} frames of {width}x{height} as {kind}{film}")]
+    frames = f"{made['frames']:,} frame{'s' * (made['frames'] != 1)}"
+    facts = [("made", f"{path}: {frames} of {width}x{height} as {kind}{film}")]
     keys = f"{made['key_frames']:,} key frame{'s' * (made['key_frames'] != 1)}"
     facts.append(("from", f"{keys}, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
     if made["tiles"] != "none":

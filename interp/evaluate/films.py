@@ -94,7 +94,7 @@ class Film:
             with closing(self._simulated.seen(self.video, source)) as coming:
                 for seen in coming:
                     if told.groups == self._limit:
-                        told.remarks.append(f"limited to the first {self._limit} groups")
+                        told.remarks.append(f"limited to the first {self._limit} group{'s' * (self._limit != 1)}")
                         break
                     told.see(seen.t_us)
                     part.append(seen)
