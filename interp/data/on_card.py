@@ -21,6 +21,7 @@ from interp.data.simulate import MOST, Frames, clip_of
 from vid2ev.sensors.batch_on_card import DvsBatchOnCard
 from vid2ev.sensors.card_events import CardSent
 from vid2ev.sensors.cis_on_card import CisOnCard
+from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.devices import Device
 from vid2ev.stream.upload import as_array
 
@@ -87,7 +88,7 @@ def made_on_card(
 
 def _kind(cameras: Cameras) -> tuple[Any, ...]:
     """What clips have in common that go together."""
-    return tuple(cameras.dvs.effects()), cameras.size_of_events, cameras.steps - cameras.first
+    return flags_of(cameras.dvs, labels=False), cameras.size_of_events, cameras.steps - cameras.first
 
 
 def _all_walked(
