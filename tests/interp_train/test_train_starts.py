@@ -55,15 +55,21 @@ def learnt(path: Path) -> dict[str, torch.Tensor]:
 
 
 def test_it_begins_with_the_weights_of_a_file(tmp_path: Path) -> None:
-    """The network and its options are those of the file; where nothing is learnt its weights stay."""
-    starts = parsed([SHIPPED])
+    """The network and its options are those of the file, and the weights that come with vid2ev go by their name; where
+    nothing is learnt weights stay."""
+    assert Job.of(settings=FEW, starts=parsed([SHIPPED])).network == "rrin_events_guided"
+    torch.manual_seed(8)
+    weights.save(
+        tmp_path / "given.safetensors", "rrin_events_guided", make("rrin_events_guided", "tiny", flow_scale=3.0)
+    )
+    starts = parsed([str(tmp_path / "given.safetensors")])
     job = Job.of(settings=FEW, starts=starts)
     assert (job.network, job.size, job.options) == ("rrin_events_guided", "tiny", {"flow_scale": 3.0})
     done = run(job, tmp_path / "run", machines=ALONE, quiet=True, starts=starts)
     assert done.finished
     trained(tmp_path / "still", [*FEW, "rate=1e-30", "weight_decay=0"], starts)
-    kept, shipped = (load_file(path) for path in (tmp_path / "still" / "weights.safetensors", starts[WHOLE]))
-    assert all(torch.equal(kept[name], shipped[name].float()) for name in shipped)
+    kept, given = (load_file(path) for path in (tmp_path / "still" / "weights.safetensors", starts[WHOLE]))
+    assert all(torch.equal(kept[name], given[name].float()) for name in given)
 
 
 def test_a_pretrained_part_stays_and_what_is_around_it_learns(tmp_path: Path, flow: Path) -> None:
