@@ -68,12 +68,13 @@ class Sensors:
 
     def of_file(self, camera: Camera, file: str | Path) -> Loaded:
         """As `of`, for a camera of a rig file, which is named where the sensor that it asks for cannot be."""
-        if camera.sensor is not None:
-            try:
-                replace(self, overrides=()).of(camera)  # (what is changed in all of them is not the file's)
-            except Vid2evError as error:
-                raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
-        return self.of(camera)
+        if camera.sensor is None:
+            return self.of(camera)
+        try:
+            loaded = replace(self, overrides=()).of(camera)  # (what is changed in all of them is not the file's)
+        except Vid2evError as error:
+            raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
+        return self.of(camera) if self.overrides else loaded
 
     def check_changes(self, cameras: Iterable[Camera]) -> None:
         """Raise UsageError for changes to sensors of a kind that none of the cameras has."""

@@ -24,7 +24,7 @@ from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, lens_of, scene_of, staged, taken_by
+from vid2ev.sight import Sight, are_free, lens_of, scene_of, staged, taken_by
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.upload import Upload
@@ -195,7 +195,8 @@ class Recipe:
         """Whether a scene is rendered for each camera; with truth, a scene of which all is seen is."""
         if not self.source.dense:
             return False
-        return not self.sight().free or (self.truth is not None and scene_of(self.source) is not None)
+        free = are_free(self.rig.source, self.mounts)
+        return not free or (self.truth is not None and scene_of(self.source) is not None)
 
     @property
     def alone(self) -> bool:

@@ -43,7 +43,7 @@ class Sight:
         bayer: str | None = None,
     ):
         self._mounts = mounts
-        self.free = all(is_same(source, mount.intrinsics, mount.pose) for mount in mounts)  # of any work
+        self.free = are_free(source, mounts)
         self._groups = [  # (those that see colours, and those that see luminance: a third of the work)
             (coloured, places, Views(source, [mounts[k].view for k in places], plane_m))
             for coloured in (True, False)
@@ -62,6 +62,11 @@ class Sight:
             light = frame.light if coloured else frame.luminance
             seen |= dict(zip(places, views.see(light, frame.depth), strict=True))
         return [seen[k] for k in range(len(self._mounts))]
+
+
+def are_free(source: Intrinsics, mounts: Sequence[Mount]) -> bool:
+    """Whether all cameras see what the source's sees, so that their views are no work."""
+    return all(is_same(source, mount.intrinsics, mount.pose) for mount in mounts)
 
 
 def sees_nothing(source: Intrinsics, mount: Mount, plane_m: float | None) -> bool:

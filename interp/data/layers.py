@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
 
 from interp.data.chance import chance, log_uniform, uniform
 from interp.data.layer_kernel import lay
@@ -80,8 +81,6 @@ class Layers:
 
     def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
         """The same on a device (`Shot`)."""
-        import torch
-
         times, beside = [j / steps for j in range(first, last + 1)], self._beside
         pixels = [torch.from_numpy(layer.pixels).to(device.light) for layer in self._layers]
         light = self._seen_on(pixels, times, (0.0, 0.0))
@@ -99,8 +98,6 @@ class Layers:
 
     def _seen_on(self, pixels: list[Any], times: list[float], stand_m: tuple[float, float]) -> Any:
         """Light [n, H, W, 3] at some times, as a tensor beside those of the layers' pixels."""
-        import torch
-
         layers = []
         for there, layer in zip(pixels, self._layers, strict=True):
             places = torch.tensor([self._place(layer, u, stand_m) for u in times], dtype=torch.float64)

@@ -70,7 +70,6 @@ class SceneShot:
 
     def on_device(self, device: Device, steps: int, first: int, last: int) -> tuple[Any, Any]:
         """The same on a device (`Shot`)."""
-
         instants_ns = self._instants_ns(steps, first, last)
         light = self._painted(device, instants_ns, self._lens)
         there = self._painted(device, instants_ns, *self._there) if self._there else light
