@@ -8,6 +8,8 @@ Triangles are met one by one; light is albedo times the thing's own, and every l
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -20,11 +22,16 @@ def main() -> None:
     note(diary, "started")
     if mode == "no-start":
         sys.exit("libGL is not there\nthis Blender does not start")
-    print("Blender of someone else\nvid2ev: 0.0 of tests", flush=True)
+    if mode == "no-module":
+        print("Traceback of something\nModuleNotFoundError: No module named 'that'\n\nBlender quit")
+        sys.exit(1)
+    print(f"Blender of someone else\nvid2ev: {'3.4.1' if mode == 'old' else '5.0 of tests'}", flush=True)
     for count, line in enumerate(sys.stdin):
         if mode == "dies" or (mode == "dies-later" and count >= 2):
             sys.stderr.write("Traceback of something\nMemoryError: the scene is too large\n")
             sys.exit(3)
+        if mode == "crashes":
+            os.kill(os.getpid(), signal.SIGKILL)
         path = Path(line.rstrip("\n"))
         request = json.loads(path.read_text())
         for asked in request["passes"]:

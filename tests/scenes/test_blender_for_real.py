@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 
 import cv2
 import numpy as np
 import pytest
 
+from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
-from vid2ev.scenes.blender.program import VARIABLE
+from vid2ev.scenes.blender.program import Blender, find_blender
 from vid2ev.scenes.blender.renderer import Cycles
 from vid2ev.scenes.flow import flow
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.snapshot import Kind, Lamp, Mesh, Shape, Snapshot, Surface, Texture, Thing
 from vid2ev.scenes.world import World
-
-pytestmark = pytest.mark.skipif(
-    not (os.environ.get(VARIABLE) or shutil.which("blender")), reason=f"there is no Blender here: set {VARIABLE}"
-)
 
 ODD = Intrinsics(size=(160, 120), focal_px=(150.0, 127.0), centre_px=(71.3, 66.8))  # nothing in it is even
 CAMERA = Pose.of((10, -25, 15), (0.3, -0.2, 0.1))
@@ -31,6 +26,10 @@ ROUND: tuple[Kind, ...] = ("sphere", "cylinder", "box")
 
 @pytest.fixture(scope="module")
 def cycles() -> Iterator[Cycles]:
+    try:
+        Blender(find_blender()).close()
+    except UsageError as error:
+        pytest.skip(str(error))
     with Cycles(256, threads=1) as running:
         yield running
 

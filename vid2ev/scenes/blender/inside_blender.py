@@ -36,8 +36,8 @@ TO_EQUIRECTANGULAR = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # Blender'
 
 def main() -> None:
     """Answer requests until there are no more."""
+    print(f"vid2ev: {bpy.app.version_string}", flush=True)  # (first: an old one fails at the rest)
     stage = Stage()
-    print(f"vid2ev: {bpy.app.version_string}", flush=True)
     for line in sys.stdin:
         answer(stage, Path(line.rstrip("\n")))
         print("vid2ev: done", flush=True)

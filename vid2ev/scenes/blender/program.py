@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
+import signal
 import subprocess
 import tempfile
 from pathlib import Path
@@ -20,7 +22,9 @@ from vid2ev.errors import DataError, UsageError
 VARIABLE = "VID2EV_BLENDER"
 SCRIPT = Path(__file__).with_name("inside_blender.py")
 SIGN = "vid2ev: "
+OLDEST = (4, 2)  # 3.4 has another sampling pattern, and dies of the passes
 PATIENCE_S = 20.0  # for Blender to end
+ERROR = re.compile(r"[\w.]*(Error|Exception): ")  # the last line of a traceback, which may stand on either stream
 
 
 def find_blender(program: str | None = None) -> Path:
@@ -41,9 +45,11 @@ def command_of(program: Path) -> list[str]:
 
 
 class Blender:
-    """A running Blender, as a context.
+    """A running Blender.
 
     version  what it says of itself
+
+    Raises UsageError if it cannot be run or is too old, DataError if it ends at once.
     """
 
     def __init__(self, program: Path):
@@ -62,6 +68,9 @@ class Blender:
             self._errors.close()
             raise UsageError(f"Blender '{program}' cannot be run: {error.strerror}; give another") from error
         self.version = self._answer()
+        if tuple(int(part) for part in re.findall(r"\d+", self.version)[:2]) < OLDEST:
+            self.close()
+            raise UsageError(f"Blender '{program}' is of version {self.version}; give one of 4.2 or later")
 
     def ask(self, request: Path) -> None:
         """Have a request answered.  Raises DataError if Blender fails."""
@@ -87,12 +96,16 @@ class Blender:
     def _answer(self) -> str:
         """Its next sign."""
         assert self._process.stdout is not None
+        said = []
         for line in self._process.stdout:
             if line.startswith(SIGN):
                 return line[len(SIGN) :].strip()
+            if ERROR.match(line):
+                said.append(line.strip())
         code = self._process.wait()
         self._errors.seek(0)
-        said = [line.strip() for line in self._errors if line.strip()]
+        said += [line.strip() for line in self._errors if line.strip()]
         self.close()
-        reason = said[-1] if said else f"exit code {code}"
+        ending = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
+        reason = next((line for line in reversed(said) if ERROR.match(line)), said[-1] if said else ending)
         raise DataError(f"Blender '{self._program}' failed: {reason}; run it on its own to see whether it works")

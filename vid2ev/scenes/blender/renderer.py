@@ -18,7 +18,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Self
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import writing
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
@@ -71,7 +71,11 @@ class Cycles:
             request = self._made().request(snapshot, intrinsics, pose)
         if not all(answer.exists() for answer in request.answers):
             blender, began_s = self._running(), monotonic()
-            blender.ask(request.path)
+            try:
+                blender.ask(request.path)
+            except DataError:  # (it has ended)
+                self._blender = None
+                raise
             self._pictures, self._seconds = self._pictures + 1, self._seconds + monotonic() - began_s
         picture = read_answers(request.answers, intrinsics.size, request.larger)
         if self._temporary:
