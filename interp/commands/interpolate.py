@@ -67,6 +67,11 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     help="What an event stands for [nat].  [default: as the recording says, or else what fits the frames]",
 )  # fmt: skip
 @click.option(
+    "--refractory", "refractory_us", type=float, metavar="US",
+    help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the recording"
+    " says, or else nothing is]",
+)  # fmt: skip
+@click.option(
     "--tile", default="auto", show_default=True, metavar="WxH|auto|none",
     help="Pixels made at a time; auto: all of frames of up to a million, tiles of about as many of larger ones.",
 )  # fmt: skip
@@ -116,6 +121,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         transfer=options.pop("transfer"),
         source_hz=_number(options.pop("source_fps"), "--source-fps"),
         contrast=contrast_of(options.pop("contrast")),
+        refractory_us=options.pop("refractory_us"),
         events=options.pop("events"),
     )
     found = [each for source in sources for each in sources_in(source)]

@@ -21,6 +21,7 @@ from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
 from interp.own_codes import curve_of
+from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import count_events
 from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
@@ -133,7 +134,8 @@ class Film:
         protocol, spec = self._protocol, self._simulated.spec
         start_us, stop_us = part[0].t_us, part[-1].t_us
         contrast = spec.threshold_off, spec.threshold_on
-        counts = count_events(events, self.size, start_us, stop_us, protocol.steps, contrast)
+        dead_time = DeadTime.of(spec.model_dump())
+        counts = count_events(events, self.size, start_us, stop_us, protocol.steps, contrast, dead_time)
         keys = np.stack([part[0].codes, part[-1].codes])
         truth = np.stack([part[k].codes for k in protocol.positions])
         times_us = np.array([each.t_us for each in part])

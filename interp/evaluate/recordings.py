@@ -74,7 +74,8 @@ class Recording:
         truth = np.stack([sequence.frame(first + k) for k in protocol.positions])
         start_us, stop_us = int(times_us[0]), int(times_us[-1])
         seen, _ = sequence.events(start_us, stop_us).within(sequence.event_size)
-        counts = count_events(seen, sequence.event_size, start_us, stop_us, protocol.steps)
+        size, dead_time = sequence.event_size, sequence.dead_time
+        counts = count_events(seen, size, start_us, stop_us, protocol.steps, dead_time=dead_time)
         number = (first - self._begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
         events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart)

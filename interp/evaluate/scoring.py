@@ -66,7 +66,7 @@ def conditions_of(group: Group) -> dict[str, float]:
     return {
         "motion_px": moved,
         "motion_px_per_s": moved * 1e6 / group.gap_us,
-        "events_per_px": float(group.events.off_on.sum()) / (height * width),
+        "events_per_px": float(group.events.off_on.double().sum()) / (height * width),
         "blur_px": moved * group.cameras.exposure_us / group.gap_us,
         "disparity_px": group.cameras.disparity_px,
         "offset_us": group.cameras.offset_us,

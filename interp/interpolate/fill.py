@@ -150,7 +150,8 @@ class Fill:
         events = self.take.events(first.t_us, second.t_us)
         if events is None:
             return None
-        counts = count_events(events, size, first.t_us, second.t_us, steps_for(self.parts)).to(self.device)
+        steps, dead_time = steps_for(self.parts), self.take.dead_time
+        counts = count_events(events, size, first.t_us, second.t_us, steps, dead_time=dead_time).to(self.device)
         return calibrated(frames, counts, self.take.contrast, self.take.apart)
 
 

@@ -13,6 +13,7 @@ from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
 from interp.interpolate.take import Key, Options, refuse_edits
+from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
@@ -25,7 +26,8 @@ class FramesBesideEvents(OfSource):
 
     def __init__(self, path: str, options: Options, events: Path):
         super().__init__(path, options, has_events=True)
-        self._cursor, self._events_path, self.contrast = EventCursor(events), events, options.contrast
+        self._cursor, self._events_path = EventCursor(events), events
+        self.contrast, self.dead_time = options.contrast, options.dead_time()
         corner, self._guessed = self._cursor.size, self._cursor.file.size is None
         within = corner[0] <= self.size[0] and corner[1] <= self.size[1]
         self.event_size: tuple[int, int] = self.size if self._guessed and within else corner
@@ -57,7 +59,8 @@ class FramesBesideEvents(OfSource):
     def describe(self) -> dict[str, Any]:
         """What source and event file are."""
         about = {"path": str(self._events_path), "size": list(self.event_size), "contrast": self.contrast}
-        return super().describe() | {"events": about | {"identity": identity(self._events_path)}}
+        known = {"dead_time": stated(self.dead_time), "identity": identity(self._events_path)}
+        return super().describe() | {"events": about | known}
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
@@ -94,7 +97,8 @@ class OfEventFile:
         self._first_us, self._last_us, self.gaps_expected = inside[0], inside[-1], len(inside) - 1
         self.name, self.size = path.stem, (first.pixels.shape[1], first.pixels.shape[0])
         self.channels = 1 if first.pixels.ndim == 2 else 3
-        self.event_size, self.contrast = self._cursor.size, options.contrast
+        self.event_size = self._cursor.size
+        self.contrast, self.dead_time = options.contrast, options.dead_time()
         span_us = self._last_us - self._first_us
         self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
 
@@ -109,6 +113,7 @@ class OfEventFile:
         return about | {
             "event_size": list(self.event_size),
             "contrast": self.contrast,
+            "dead_time": stated(self.dead_time),
             "identity": identity(self._path),
         }
 

@@ -12,6 +12,7 @@ import numpy as np
 from interp.data.layouts import open_sequence
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
+from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
@@ -35,6 +36,7 @@ class OfSequence:
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
+        self.dead_time = options.dead_time(sequence.dead_time)
         self.remarks = sequence.remarks
         self._numbers = self._part(options)
         times_us = sequence.times_us[self._numbers]
@@ -50,7 +52,8 @@ class OfSequence:
     def describe(self) -> dict[str, Any]:
         """Folder and sizes."""
         about = {"kind": type(self._sequence).__name__.lower(), "path": str(self.folder), "size": list(self.size)}
-        return about | {"event_size": list(self._sequence.event_size), "contrast": self.contrast} | self._identity()
+        sent = {"event_size": list(self._sequence.event_size), "contrast": self.contrast}
+        return about | sent | {"dead_time": stated(self.dead_time)} | self._identity()
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""

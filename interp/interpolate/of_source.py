@@ -15,6 +15,7 @@ from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from interp.own_codes import BRIGHT, curve_of
+from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
@@ -25,11 +26,13 @@ class OfSource:
 
     event_size: tuple[int, int] | None = None
     contrast: tuple[float, float] | None = None
+    dead_time: DeadTime | None = None
     apart = False
 
     def __init__(self, path: str, options: Options, has_events: bool = False):
-        if options.contrast and not has_events:
-            raise UsageError(f"--contrast says what events stand for, and {path} has none; leave it out")
+        of_events = {"--contrast": options.contrast, "--refractory": options.refractory_us}
+        if (asked := [name for name, value in of_events.items() if value is not None]) and not has_events:
+            raise UsageError(f"{asked[0]} is of events, and {path} has none; leave it out")
         try:
             self._source = open_source(
                 path,

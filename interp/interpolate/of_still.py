@@ -20,6 +20,7 @@ import torch
 
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
+from interp.representation.dead_time import stated
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
@@ -60,7 +61,7 @@ class OfStill:
             raise DataError(f"{events} holds {len(self._events)} events; expected those of the exposure of a frame")
         corner = int(self._events.x.max()) + 1, int(self._events.y.max()) + 1
         self.event_size: tuple[int, int] = self.size if all(np.less_equal(corner, self.size)) else corner
-        self.contrast = options.contrast or (USUAL_NATS, USUAL_NATS)
+        self.contrast, self.dead_time = options.contrast or (USUAL_NATS, USUAL_NATS), options.dead_time()
         self.gaps_expected = 1
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
@@ -79,7 +80,8 @@ class OfStill:
         """What both files are."""
         about = {"kind": "single frame", "path": str(self._picture), "size": list(self.size)}
         events = {"path": str(self._path), "identity": identity(self._path), "contrast": list(self.contrast)}
-        return about | {"identity": identity(self._picture), "events": events}
+        events_too = events | {"dead_time": stated(self.dead_time)}
+        return about | {"identity": identity(self._picture), "events": events_too}
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """The frame, at both ends of its exposure."""

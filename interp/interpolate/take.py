@@ -6,13 +6,14 @@ A new kind is a class that satisfies `Take`, and a line in `open_take`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from interp.representation.dead_time import DeadTime
 from vid2ev import Events
 from vid2ev.errors import UsageError
 
@@ -46,6 +47,7 @@ class Take(Protocol):
     gaps_expected  how many gaps there should be; None if there is no telling
     event_size   width and height of the event camera [px]; None without one
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera
     remarks      what a person should know, one sentence each; more may come while it is read
     """
@@ -70,6 +72,8 @@ class Take(Protocol):
     def event_size(self) -> tuple[int, int] | None: ...
     @property
     def contrast(self) -> tuple[float, float] | None: ...
+    @property
+    def dead_time(self) -> DeadTime | None: ...
     @property
     def apart(self) -> bool: ...
     @property
@@ -114,8 +118,9 @@ class Options:
     crop, size, transfer   of videos and images, as `vid2ev.open_source` takes them
     source_hz   frames per second, where the source has no times
     contrast    what an OFF and an ON event stand for [nat], in place of what the recording says
+    refractory_us   how long a pixel is blind after an event, likewise; 0 for not at all
     events      file of the events, where the frames are in another one
-    Raises UsageError for times and contrasts that are none.
+    Raises UsageError for times, contrasts and refractory periods that are none.
     """
 
     start_s: float | None = None
@@ -125,12 +130,22 @@ class Options:
     transfer: str = "auto"
     source_hz: Fraction | None = None
     contrast: tuple[float, float] | None = None
+    refractory_us: float | None = None
     events: Path | None = None
 
     def __post_init__(self) -> None:
         check_second(self.start_s, "--start")
         check_second(self.stop_s, "--stop")
         check_contrast(self.contrast)
+        self.dead_time()
+
+    def dead_time(self, said: DeadTime | None = None) -> DeadTime | None:
+        """Of an event camera, of which the recording says `said`."""
+        if self.refractory_us is None:
+            return said
+        if self.refractory_us == 0:
+            return None
+        return replace(said, refractory_us=self.refractory_us) if said else DeadTime(self.refractory_us)
 
 
 AS_IT_IS = Options()

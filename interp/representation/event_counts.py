@@ -23,6 +23,7 @@ from torch.nn import functional as F
 
 from interp.precision import in_full_precision
 from interp.representation.bins import bin_weights
+from interp.representation.dead_time import DeadTime
 from vid2ev.errors import UsageError
 from vid2ev.sensors.limits import is_whole
 
@@ -38,7 +39,7 @@ LARGEST = 10.0
 class EventCounts:
     """Counts of B pairs of frames.
 
-    off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals
+    off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals, with what dead time hid if known
     contrast   [B, 2] nats that an OFF and an ON event stand for
     footprint  pixels across of the frames that a pixel of the event camera looks at, where it has been laid over them
     """
@@ -124,11 +125,13 @@ def count_events(
     stop_us: int,
     steps: int = 32,
     contrast: tuple[float, float] = (USUAL_NATS, USUAL_NATS),
+    dead_time: DeadTime | None = None,
 ) -> EventCounts:
     """Counts, B = 1, of the events in (start_us, stop_us] on a sensor of `size` (width, height).
 
     steps      S; an event at the edge of two sub-intervals is in the earlier one
     contrast   nats that an OFF and an ON event stand for
+    dead_time  of the pixels: an event counts for the crossings that it hides, too; None if that is not known
     Raises UsageError for events outside of the sensor and for less than one sub-interval.
     """
     if not is_whole(steps, 1):
@@ -140,12 +143,14 @@ def count_events(
     if len(x) and (min(x.min(), y.min()) < 0 or x.max() >= width or y.max() >= height):
         raise UsageError(f"events outside of the {width}x{height} sensor; give the size of the sensor that sent them")
     step = ((t[kept] - start_us) * steps - 1) // max(stop_us - start_us, 1)
-    place, counts = (np.minimum(p, 1) * height + y) * width + x, np.zeros((2, steps, height, width), np.uint8)
+    place = (np.minimum(p, 1) * height + y) * width + x
+    worth = dead_time.crossings(t[kept], y * width + x, p) if dead_time else None
+    counts = np.zeros((2, steps, height, width), np.uint8 if worth is None else np.float16)
     for k, chosen in enumerate(_parts(step, steps)):
-        part = np.bincount(place[chosen], minlength=2 * height * width).reshape(2, height, width)
+        part = np.bincount(place[chosen], None if worth is None else worth[chosen], 2 * height * width)
         if counts.dtype == np.uint8 and part.max(initial=0) > 255:
             counts = counts.astype(np.int32)
-        counts[:, k] = part
+        counts[:, k] = part.reshape(2, height, width)
     return EventCounts(torch.from_numpy(counts)[None], torch.tensor([contrast], dtype=torch.float32))
 
 

@@ -28,6 +28,7 @@ from interp.evaluate.remarks import left_out
 from interp.evaluate.run import evaluate
 from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
+from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import count_events
 from vid2ev import DataError, Events, UsageError, convert, events_of, open_source
 from vid2ev.light.eight_bits import srgb_codes
@@ -199,7 +200,7 @@ def test_a_film_is_seen_by_the_event_camera_of_convert(tmp_path: Path) -> None:
     assert len(events) > 100 and len(groups) == 2
     for group in groups:
         start_us, stop_us = int(group.times_us[0]), int(group.times_us[-1])
-        counts = count_events(events, film.size, start_us, stop_us, 32)
+        counts = count_events(events, film.size, start_us, stop_us, 32, dead_time=DeadTime(100.0, "quantised"))
         np.testing.assert_array_equal(group.events.off_on, counts.off_on)
         assert group.events.contrast.flatten().tolist() == pytest.approx([0.15, 0.2])
     codes = [each.shape for each in groups[1].truth]

@@ -201,6 +201,8 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--method", "bridge"], 2, "needs events"),
         (["a", "--method", "brige"], 2, "did you mean bridge"),
         (["a", "--contrast", "0.2"], 2, "has none"),
+        (["a", "--refractory", "100"], 2, "has none"),
+        (["b", "--refractory", "-1"], 2, "expected 1 to"),
         (["b", "--contrast", "much"], 2, "expected nats"),
         (["b", "--size", "32"], 2, "leave --size out"),
         (["b", "--transfer", "linear"], 2, "leave --transfer out"),

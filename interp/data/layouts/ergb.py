@@ -23,6 +23,7 @@ import numpy as np
 
 from interp.data.layouts.event_parts import EventParts, numbered
 from interp.data.layouts.sequence import Placed
+from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
 from vid2ev.light.picture_files import decoded
 
@@ -53,6 +54,7 @@ class Ergb:
     """
 
     contrast: tuple[float, float] | None = None
+    dead_time: DeadTime | None = None
     apart = True  # two cameras, brought together for one distance
 
     def __init__(self, folder: Path, layout: str):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from interp.data.layouts.sequence import Placed
+from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DataError, UsageError, read_events
 from vid2ev.formats import open_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes, read_spans
@@ -60,7 +61,7 @@ class Own:
         first = self._frames.codes(0)
         self.size, self.grey = first.shape[1::-1], first.ndim == 2
         self.event_size = tuple(sent["size"])
-        self.contrast = sent["contrast"]
+        self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
         self.apart = _apart(folder, keys, sent)
         self._span_us = sent["span_us"]
 
@@ -133,7 +134,7 @@ def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
     contrast = tuple(float(numbers[key]) for key in ("threshold_off", "threshold_on"))
     if not all(0 < each < 100 for each in contrast):
         raise ValueError(f"thresholds {contrast}")
-    return facts | {"contrast": contrast, "span_us": (begin, begin + length)}
+    return facts | {"contrast": contrast, "dead_time": DeadTime.of(numbers), "span_us": (begin, begin + length)}
 
 
 def _whole(said: Any, least: int, most: int) -> int:

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from interp.representation.dead_time import DeadTime
 from vid2ev import Events
 
 EVEN = 0.25  # of a step, that a frame may be off its place; where one is lost, some are off by 0.4 or more
@@ -38,6 +39,7 @@ class Sequence(Protocol):
     event_size   the same of the event camera
     times_us     when the frames were taken, int64; not always increasing in files of the field
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
+    dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera, or sees through another lens
     remarks      what cannot be used, with numbers, one sentence each; more may come while events are read
     """
@@ -48,6 +50,7 @@ class Sequence(Protocol):
     event_size: tuple[int, int]
     times_us: np.ndarray
     contrast: tuple[float, float] | None
+    dead_time: DeadTime | None
     apart: bool
     remarks: list[str]
 

@@ -1,0 +1,122 @@
+"""What events count for behind a dead time: the light that was there adds up again, and nothing else changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from interp.interpolate.take import Options
+from interp.representation.dead_time import FAR, MOST, DeadTime, Law
+from interp.representation.event_counts import count_events
+from vid2ev import Dvs, Events, UsageError, load_sensor
+
+THRESHOLD, BLIND_US = 0.15, 100
+PARAMETERS = {"refractory_us": 100.0, "refractory": "track", "timing": "response", "frame_rate_hz": 0.0}
+
+
+def flash(law: Law, span_us: int) -> Events:
+    """Of 64 pixels that become up to 40 times as bright, evenly over a time, and dark again."""
+    settings = [f"refractory_us={BLIND_US}", f'refractory="{law}"']
+    dvs = Dvs(load_sensor("ideal", [f"threshold_on={THRESHOLD}", f"threshold_off={THRESHOLD}", *settings]), (64, 1))
+    dark, bright = np.full((1, 64), 0.02, np.float32), np.linspace(0.2, 0.8, 64, dtype=np.float32)[None]
+    shares = np.concatenate([[0], np.linspace(0, 1, 21), np.linspace(1, 0, 21)])
+    times_us = np.cumsum([0, 1000, *[span_us / 20] * 20, 1000, *[span_us / 20] * 20])
+    light = [dark + np.float32(share) * (bright - dark) for share in shares]
+    return Events.concatenate([dvs.step(each, round(1000 * t_us)) for each, t_us in zip(light, times_us, strict=True)])
+
+
+def rise(events: Events, worth: np.ndarray, sign: int) -> np.ndarray:
+    """Log light that the events of a sign stand for in each of the pixels of `flash`."""
+    return THRESHOLD * np.bincount(events.x, worth * (events.p == sign), 64)
+
+
+@pytest.mark.parametrize("law", ["track", "quantised"])
+@pytest.mark.parametrize("span_us", [2_000, 4_000])
+def test_light_that_was_not_seen_is_made_good(law: Law, span_us: int) -> None:
+    events = flash(law, span_us)
+    worth = DeadTime(BLIND_US, law).crossings(events.t, events.x.astype(np.int64), events.p)
+    true = np.log(np.linspace(0.2, 0.8, 64) / 0.02)
+    for sign in (1, 0):
+        plain, made_good = (true - rise(events, each, sign) for each in (np.ones(len(events)), worth))
+        assert plain.mean() > 0.4  # nat, of 3
+        assert abs(made_good.mean()) < 0.35 * plain.mean() and np.abs(made_good).mean() < 0.6 * plain.mean()
+
+
+@settings(deadline=None)
+@given(st.floats(1e-4, 0.9), st.integers(2, 40))
+def test_of_an_even_slope_a_memory_that_tracks_makes_all_good(share: float, number: int) -> None:
+    """After each event the signal goes on for R unseen, then a threshold more; `share` is R's of that time."""
+    blind_us = 10_000.0
+    every_us = blind_us / share
+    t_us = np.rint(np.arange(number) * every_us).astype(np.int64)
+    worth = DeadTime(blind_us).crossings(t_us, np.zeros(number, np.int64), np.ones(number, np.uint8))
+    crossings = np.minimum(every_us / (every_us - blind_us), MOST)  # a threshold each
+    np.testing.assert_allclose(worth, [1, *[crossings] * (number - 1)], rtol=2e-3)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3), st.integers(0, 1)), max_size=80), st.integers(1, 4))
+def test_pixels_and_signs_have_nothing_to_do_with_each_other(sent: list[tuple[int, int, int]], blind_us: int) -> None:
+    t_us = np.cumsum([each[0] for each in sent], dtype=np.int64)
+    pixel, p = (np.array([each[k] for each in sent], np.int64) for k in (1, 2))
+    for law in ("track", "quantised"):
+        dead_time = DeadTime(blind_us, law)
+        worth = dead_time.crossings(t_us, pixel, p)
+        assert worth.shape == t_us.shape and (worth >= 1).all() and (worth <= MOST).all()
+        for which in range(4):
+            alone = pixel == which
+            np.testing.assert_array_equal(dead_time.crossings(t_us[alone], 0 * pixel[alone], p[alone]), worth[alone])
+        turned = dead_time.crossings(t_us, pixel, 1 - p)
+        np.testing.assert_array_equal(turned, worth)
+
+
+def test_what_changes_evenly_and_no_faster_than_can_be_told_counts_as_one() -> None:
+    even = np.arange(20, dtype=np.int64) * int(1.3 * BLIND_US)
+    assert (DeadTime(BLIND_US, "quantised").crossings(even, 0 * even, 0 * even) == 1).all()
+
+
+def test_what_is_not_behind_a_dead_time_counts_as_one() -> None:
+    slow = np.arange(20, dtype=np.int64) * int(FAR * BLIND_US)
+    sooner = np.arange(20, dtype=np.int64) * (BLIND_US // 2)
+    signs = np.arange(20, dtype=np.int64) % 2
+    for law, t_us, p in (("quantised", slow, signs * 0), ("quantised", sooner, signs * 0), ("track", sooner, signs * 0),
+                         ("track", sooner * 3, signs), ("quantised", sooner * 3, signs)):  # fmt: skip
+        assert (DeadTime(BLIND_US, law).crossings(t_us, 0 * t_us, p) == 1).all()
+
+
+def test_counts_are_of_crossings_where_the_dead_time_is_known() -> None:
+    t_us = np.array([1000, 1150, 6000, 6200], np.int64)
+    zeros = np.zeros(4, np.uint16)
+    events = Events(t_us, zeros, zeros, np.array([1, 1, 0, 0], np.uint8))
+    found = count_events(events, (2, 1), 0, 10_000, 2, dead_time=DeadTime(BLIND_US)).off_on[0, :, :, 0]
+    torch.testing.assert_close(found[..., 0].float(), torch.tensor([[0.0, 1 + 2], [1 + 3, 0]]), rtol=1e-3, atol=0)
+    assert (found[..., 1] == 0).all()
+    none = count_events(events, (2, 1), 0, 10_000, 2).off_on
+    assert none.dtype == torch.uint8 and none.sum() == 4
+    empty = count_events(Events.empty(), (2, 1), 0, 10_000, 2, dead_time=DeadTime(BLIND_US)).off_on
+    assert (empty == 0).all()
+
+
+def test_of_sensors_that_send_by_a_clock_nothing_is_known() -> None:
+    assert DeadTime.of(PARAMETERS) == DeadTime(100.0, "track")
+    assert DeadTime.of(load_sensor("paper").model_dump()) == DeadTime(100.0, "quantised")
+    for other in ({"timing": "frame"}, {"frame_rate_hz": 1000.0}, {"refractory_us": 0.0}):
+        assert DeadTime.of(PARAMETERS | other) is None
+    with pytest.raises(ValueError, match="refractory period"):
+        DeadTime.of(PARAMETERS | {"refractory": "blind"})
+    with pytest.raises(ValueError, match="refractory period"):
+        DeadTime.of(PARAMETERS | {"refractory_us": float("nan")})
+
+
+def test_what_is_asked_for_is_taken_in_place_of_what_is_said() -> None:
+    said = DeadTime(100.0, "quantised")
+    assert Options().dead_time(said) == said and Options().dead_time() is None
+    assert Options(refractory_us=0).dead_time(said) is None
+    assert Options(refractory_us=300).dead_time(said) == DeadTime(300, "quantised")
+    assert Options(refractory_us=300).dead_time() == DeadTime(300, "track")
+    for wrong in (-1.0, 0.5, float("nan"), 1e10):
+        with pytest.raises(UsageError, match="expected 1 to"):
+            Options(refractory_us=wrong)
