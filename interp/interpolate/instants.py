@@ -39,6 +39,10 @@ class Instant:
     share: Fraction
 
 
+class TooFine(UsageError):
+    """More frames than microseconds between two key frames: what was begun of them can never be finished."""
+
+
 class Grid(Protocol):
     """Says which frames are to be made.  `zero_us` is the time of the first key frame."""
 
@@ -73,12 +77,12 @@ class Times:
             raise UsageError(f"-x {float(self.multiple):g}: expected more than 0 and at most {MOST}, such as 32 or 2.5")
 
     def between(self, k: int, start_us: int, stop_us: int, zero_us: int) -> list[Instant]:
-        """See `Grid`.  Raises UsageError where two instants come to lie on one microsecond."""
+        """See `Grid`.  Raises TooFine where two instants come to lie on one microsecond."""
         numbers = range(ceil(k * self.multiple), ceil((k + 1) * self.multiple))
         shares = [Fraction(number) / self.multiple - k for number in numbers]
         times = [_rounded(start_us + share * (stop_us - start_us)) for share in shares]
         if any(t >= after for t, after in pairwise([*times, stop_us])):
-            raise UsageError(
+            raise TooFine(
                 f"-x {float(self.multiple):g} of frames {stop_us - start_us} us apart: more than one in a microsecond;"
                 " choose fewer"
             )

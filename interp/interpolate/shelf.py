@@ -30,6 +30,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
+from interp.interpolate.instants import TooFine
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.pictures.film import film_size, join_films, remarks_on_size, write_film
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
@@ -96,7 +97,7 @@ class Shelf:
     ) -> None:
         if self._lock is None:
             return
-        if self._begun and not self.done:
+        if self._begun and (not self.done or isinstance(error, TooFine)):
             shutil.rmtree(self.partial, ignore_errors=True)
         os.close(self._lock)
 

@@ -135,6 +135,16 @@ def test_a_folder_of_frames_is_a_source_again(tmp_path: Path) -> None:
     assert times == [30_000 * k for k in range(9)]  # (microseconds, though their spacing looks like milliseconds)
 
 
+def test_more_frames_than_microseconds_leave_nothing_wherever_they_are_found(tmp_path: Path) -> None:
+    source = images(tmp_path / "in", moving(4), step_us=100)
+    for times in ("0\n50\n100\n150\n", "0\n100\n200\n250\n"):  # (us: at once, and after two gaps of three)
+        (source / "timestamps.txt").write_text(f"# us\n{times}")
+        for name in ("out", "out.mp4"):
+            with pytest.raises(UsageError, match="50 us apart: more than one in a microsecond; choose fewer"):
+                interpolate(source, tmp_path / name, multiple=75, method="nearest")
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
 def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
     frames = moving(4)
     source = images(tmp_path / "in", frames)
