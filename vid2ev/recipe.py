@@ -260,7 +260,8 @@ def refuse_recordings(path: Path, transfer: str = "auto") -> None:
     """Raise UsageError for what holds events already, and for frames that would be taken for something else."""
     if holds_adc_codes(path) and transfer == "auto":
         raise UsageError(
-            f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted"
+            f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted,"
+            " --transfer linear takes the codes for light"
         )
     if (path / "manifest.json").is_file():
         if (path / "frames").is_dir():

@@ -38,6 +38,28 @@ def test_codes_of_either_depth_are_srgb(tmp_path: Path, dtype, bits: int) -> Non
     np.testing.assert_array_equal(linear.light, code_table("linear", bits)[pictures[0]])
 
 
+@pytest.mark.parametrize("bits", [10, 12])
+def test_codes_of_a_sensor_in_16_bits_are_light_where_their_bits_are_said(tmp_path: Path, bits: int) -> None:
+    codes = np.arange(48, dtype=np.uint16).reshape(6, 8) * ((2**bits - 1) // 47)
+    cv2.imwrite(str(tmp_path / "0.png"), codes)
+    np.save(tmp_path / "clip.npy", codes[None])
+    for path in (tmp_path, tmp_path / "clip.npy"):
+        plain = open_source(path, fps=1, transfer="linear")
+        assert len(plain.warnings) == 1 and f"linear:{bits}bit" in plain.warnings[0]
+        source = open_source(path, fps=1, transfer=f"linear:{bits}bit")
+        assert source.warnings == [] and source.describe()["bits"] == bits
+        np.testing.assert_array_equal(next(source.frames()).light, code_table("linear", bits)[codes])
+    moved = open_source(tmp_path / "0.png", transfer=f"gamma:2:{bits}bit", motion="pan:speed=1")
+    assert moved.describe()["transfer"] == "gamma:2" and moved.describe()["bits"] == bits
+
+
+def test_bits_that_codes_cannot_have_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, ["0.png"])
+    for transfer in ("linear:10bit", "linear:0bit", "linear:17bit", "linear:manybit", "x:10bit"):
+        with pytest.raises(UsageError, match=r"bit|transfer 'x'"):
+            open_source(tmp_path, fps=1, transfer=transfer)
+
+
 def test_frame_10_comes_after_frame_9(tmp_path: Path) -> None:
     names = ["frame9.png", "frame10.png", "frame100.png"]
     pictures = write(tmp_path, names)

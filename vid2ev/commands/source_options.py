@@ -15,7 +15,8 @@ SOURCE_OPTIONS = (
         default="auto",
         show_default=True,
         metavar="CURVE",
-        help="Codes to light: auto, srgb, bt709, pq, hlg, gamma:G, linear or another curve of the standards.",
+        help="Codes to light: auto, srgb, bt709, pq, hlg, gamma:G, linear or another curve of the standards;"
+        " linear:10bit of a sensor's codes that do not fill 16 bits.",
     ),
     click.option(
         "--fps",

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from vid2ev.errors import UsageError
 from vid2ev.light.colour import rgb_of_rgb
 from vid2ev.light.luminance import luminance_of_rgb
 from vid2ev.light.primaries import BT709, Primaries, primaries_of
-from vid2ev.light.transfer import code_table, parse_transfer
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.stream.frames import Colour
 
 TYPES = "uint8, uint16 or floating point"
+UNIT = "bit"  # of `linear:10bit`
+MOST = 16  # bits of codes
+SENSORS = 12  # bits of sensors whose codes are stored as they are, at the most; 10 of many
 
 
 class PictureReader:
@@ -19,11 +25,16 @@ class PictureReader:
     uint8 and uint16 are full-range codes of `transfer`; floating point is the signal of `transfer`, 1.0 at
     full code, so that "linear" is light as it stands, with NaN and negative values left to the sensor, which
     counts them.
+
+    transfer  a name of `parse_transfer`, with the bits of codes that do not fill 16 behind it: `linear:10bit`
+    bits      the same, where `transfer` does not say it; None for codes that do
+    Raises UsageError for either that cannot be meant.
     """
 
-    def __init__(self, transfer: str, colour: Colour = "luminance"):
-        self.transfer, self.colour = transfer, colour
-        self._curve = parse_transfer(transfer)
+    def __init__(self, transfer: str, colour: Colour = "luminance", bits: int | None = None):
+        self.transfer, said = with_bits(transfer)
+        self.bits, self.colour = said or bits, colour
+        self._curve = parse_transfer(self.transfer)
         self._tables: dict[int, np.ndarray] = {}
 
     def light(self, picture: np.ndarray, primaries: Primaries | None = None) -> np.ndarray:
@@ -31,10 +42,7 @@ class PictureReader:
         weights, to_bt709 = primaries or primaries_of(BT709)
         if picture.dtype.kind == "f":
             return self._light_of_signal(picture, weights, to_bt709)
-        bits = 8 * picture.dtype.itemsize
-        if bits not in self._tables:
-            self._tables[bits] = code_table(self.transfer, bits)
-        table = self._tables[bits]
+        table = self._table(8 * picture.dtype.itemsize)
         if picture.ndim == 2:
             return self._grey(table[picture])
         picture = picture.astype(picture.dtype.newbyteorder("="), copy=False)  # (the kernels take no other)
@@ -43,6 +51,32 @@ class PictureReader:
         if self.colour == "rgb":
             return rgb_of_rgb(channels, (width, height), table, to_bt709)
         return luminance_of_rgb(channels, (width, height), table, weights)
+
+    def about(self) -> dict[str, Any]:
+        """The curve, and of how many bits codes are that do not fill theirs, for JSON."""
+        return {"transfer": self.transfer} | ({"bits": self.bits} if self.bits else {})
+
+    def remarks_on(self, first: np.ndarray) -> list[str]:
+        """That 16-bit codes look like those of a sensor of fewer bits, where nobody has said that they are.
+
+        Raises UsageError for pixels that are not of so many bits as somebody has said."""
+        kind = first.dtype
+        if self.bits and (kind.kind == "f" or self.bits > 8 * kind.itemsize):
+            raise UsageError(f"{self.bits} bits of {kind} pixels: expected uint16; leave ':{self.bits}{UNIT}' out")
+        most = 0 if self.bits or kind.kind == "f" else int(first.max(initial=0))
+        if not 2**8 <= most < 2**SENSORS:
+            return []
+        return [
+            f"16-bit codes, but none of the first picture's is above {most}: if they are those of a sensor of 10 or"
+            f" {SENSORS} bits, light comes out too dark; --transfer linear:10{UNIT} or linear:{SENSORS}{UNIT} says so"
+        ]
+
+    def _table(self, held: int) -> np.ndarray:
+        """Light [float32] of each code that so many bits hold; those above the full one go on as the curve does."""
+        if held not in self._tables:
+            full = 2 ** (self.bits or held) - 1
+            self._tables[held] = self._curve.to_light(np.arange(2**held) / full).astype(np.float32)
+        return self._tables[held]
 
     def _light_of_signal(self, picture: np.ndarray, weights: object, to_bt709: np.ndarray) -> np.ndarray:
         light = picture if self.transfer == "linear" else self._curve.to_light(picture)
@@ -55,3 +89,21 @@ class PictureReader:
 
     def _grey(self, light: np.ndarray) -> np.ndarray:
         return light if self.colour == "luminance" else np.repeat(light[..., None], 3, axis=-1)
+
+
+def with_bits(transfer: str) -> tuple[str, int | None]:
+    """A curve's name, and the bits of codes that stand behind it, as in `linear:10bit`.  Raises UsageError."""
+    name, colon, said = str(transfer).rpartition(":")
+    if not colon or not said.endswith(UNIT):
+        return transfer, None
+    try:
+        return name, bits_of(int(said.removesuffix(UNIT)))
+    except ValueError:
+        raise UsageError(f"transfer '{transfer}': expected 1 to {MOST} bits, such as linear:10{UNIT}") from None
+
+
+def bits_of(number: object) -> int:
+    """Bits that codes can be of.  Raises ValueError."""
+    if type(number) is not int or not 1 <= number <= MOST:
+        raise ValueError(f"codes of {number!r} bits")
+    return number

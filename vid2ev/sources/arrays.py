@@ -62,6 +62,8 @@ class ArrayStack:
         if transfer == "auto" and dtype.kind != "f":
             raise UsageError(f"{self.path}: {dtype} codes that may mean anything; say what with --transfer {KNOWN}")
         self._reader = PictureReader("linear" if transfer == "auto" else transfer, colour)
+        with stack.opened() as read:
+            self.warnings += self._reader.remarks_on(read(0))
         self.size = (shape[2], shape[1])
         self.frames_expected: int | None = shape[0]
         self._fps = None if fps is None else parse_fps(fps)
@@ -79,7 +81,7 @@ class ArrayStack:
             "size": list(self.size),
             "shape": list(self._stack.shape),
             "type": str(self._stack.dtype),
-            "transfer": self._reader.transfer,
+            **self._reader.about(),
             "fps": None if self._fps is None else str(self._fps),
             "timestamps_unit": self._unit,
             "timestamps_sha256": digest_of(self._stamps),

@@ -4,8 +4,8 @@
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
 rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB,
 16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose folder it is, or
-the first PNG says one; floating point is linear light, 1.0 white as it stands.
-Transparency is ignored.
+the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs.  Floating point is
+linear light, 1.0 white as it stands.  Transparency is ignored.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
-from vid2ev.light.pictures import PictureReader
+from vid2ev.light.pictures import PictureReader, bits_of
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
@@ -77,10 +77,12 @@ class Images:
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
+        curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path)
         if transfer == "auto":
-            transfer = "linear" if first.dtype.kind == "f" else _said(self.path, tagged or "srgb")
+            transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
-        self._reader = PictureReader(transfer, colour)
+        self._reader = PictureReader(transfer, colour, bits)
+        self.warnings += self._reader.remarks_on(first)
         self._dtype = first.dtype
 
     def describe(self) -> dict[str, Any]:
@@ -90,7 +92,7 @@ class Images:
             "path": str(self.path),
             "size": list(self.size),
             "type": str(self._dtype),
-            "transfer": self._reader.transfer,
+            **self._reader.about(),
             "fps": None if self._fps is None else str(self._fps),
             "timestamps_unit": self._unit,
             "timestamps_sha256": digest_of(self._stamps),
@@ -142,26 +144,27 @@ class Images:
         return stamps, unit
 
 
-def _said(folder: Path, otherwise: str) -> str:
-    """The transfer curve that pictures of a folder are said to be coded by: by whoever made them, or by the manifest of
-    the frame camera that sent them; another if nothing is said."""
+def _said(folder: Path) -> tuple[str | None, int | None]:
+    """The transfer curve that pictures of a folder are said to be coded by, and the bits of codes that do not fill
+    theirs: by whoever made them, or by the manifest of the frame camera that sent them; None where nothing is said."""
     for path, said_of in ((folder / FRAMES, _of_frames), (folder.parent / "manifest.json", _of_camera)):
         try:
-            return parse_transfer(str(said_of(json_of(read_text(path)), folder.name))).name
+            curve, bits = said_of(json_of(read_text(path)), folder.name)
+            return parse_transfer(str(curve)).name, bits
         except (OSError, ValueError, LookupError, TypeError):  # (there is none, or it is none of ours)
             continue
-    return otherwise
+    return None, None
 
 
-def _of_frames(said: Any, _: str) -> Any:
-    return said["transfer"]
+def _of_frames(said: Any, _: str) -> tuple[Any, None]:
+    return said["transfer"], None
 
 
-def _of_camera(said: Any, folder: str) -> Any:
-    """The curve of a frame camera's codes, which are linear, or of its pictures.  Raises LookupError, TypeError."""
-    gamma = said["sensor"]["parameters"]["gamma"]
+def _of_camera(said: Any, folder: str) -> tuple[str, int | None]:
+    """Of a frame camera's codes, which are linear, or of its pictures.  Raises LookupError, TypeError, ValueError."""
+    gamma, bits = (said["sensor"]["parameters"][key] for key in ("gamma", "bits"))
     curve = gamma if gamma == "srgb" else f"gamma:{gamma}"
-    return {KINDS["raw"]: "linear", KINDS["png"]: curve}[folder]
+    return {KINDS["raw"]: ("linear", bits_of(bits)), KINDS["png"]: (curve, None)}[folder]
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:

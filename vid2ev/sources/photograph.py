@@ -67,8 +67,9 @@ class Photograph:
         pixels, primaries, tagged = read_picture(self.path)
         if transfer == "auto":
             transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
-        self._transfer, self._crop = transfer, crop
-        self._light = PictureReader(transfer, colour).light(pixels, primaries)
+        self._reader, self._crop = PictureReader(transfer, colour), crop
+        self.warnings += self._reader.remarks_on(pixels)
+        self._light = self._reader.light(pixels, primaries)
         if crop is not None:
             x, y, width, height = map(int, crop_box(crop, (pixels.shape[1], pixels.shape[0])))
             self._light = np.ascontiguousarray(self._light[y : y + height, x : x + width])
@@ -99,7 +100,7 @@ class Photograph:
             "kind": "photograph",
             "path": str(self.path),
             "size": list(self.size),
-            "transfer": self._transfer,
+            **self._reader.about(),
             "crop": self._crop,
             "scale": self._scale,
             "fps": str(self._fps),
