@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from recordings import all_events, assert_same, events_of, recording_of, recordings_for, sparse, written
 
 from vid2ev.errors import UsageError
-from vid2ev.formats import FORMATS, format_named, open_events, read_events, recognise, survey
+from vid2ev.formats import FORMATS, describe_events, format_named, open_events, read_events, recognise, survey
 from vid2ev.stream.events import Events
 
 WRITABLE = [name for name in FORMATS if format_named(name).write]
@@ -114,6 +114,8 @@ def test_dat_goes_on_in_further_files(tmp_path: Path) -> None:
     path, events = written(kind, recording, tmp_path), all_events(recording)
     parts = sorted(tmp_path.iterdir())
     assert [part.name for part in parts] == ["events.dat", *(f"events_{k}.dat" for k in range(1, 6))]
+    said = describe_events(path)
+    assert said["events"] == len(events) and said["bytes"] == sum(part.stat().st_size for part in parts)
     alone = Events.concatenate(read_events(tmp_path / "events_2.dat"))
     assert_same(alone, events.select(events.t >> 32 == 2))
     assert open_events(tmp_path / "events_2.dat").start_us == 2 << 32

@@ -113,7 +113,7 @@ def describe_events(path: str | Path) -> dict[str, Any]:
         "times_going_back": disorder.places,
         "labels": file.labelled,
         "frames": file.has_frames,
-        "bytes": sum(part.stat().st_size for part in _parts_of(file.path)),
+        "bytes": sum(part.stat().st_size for part in _parts_of(kind, file.path)),
         "stored": file.describe(),
         "warnings": file.warnings,
     }
@@ -246,9 +246,11 @@ def _opened(path: str | Path) -> tuple[Format, EventFile]:
     return kind, kind.open(path)
 
 
-def _parts_of(path: Path) -> list[Path]:
-    """The file, or all files of the bag that a metadata.yaml speaks for."""
-    return [part for part in path.parent.iterdir() if part.is_file()] if path.name == "metadata.yaml" else [path]
+def _parts_of(kind: Format, path: Path) -> list[Path]:
+    """The file and those in which it goes on, or all files of the bag that a metadata.yaml speaks for."""
+    if path.name == "metadata.yaml":
+        return [part for part in path.parent.iterdir() if part.is_file()]
+    return [path, *(kind.further(path) if kind.further else ())]
 
 
 def _within(folder: Path) -> Path:
