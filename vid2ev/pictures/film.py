@@ -31,19 +31,25 @@ ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 
 
 class Film:
-    """A film of `size` (width, height), both even, at `fps` pictures a second, as a context; raises OSError."""
+    """A film of pictures of `size` (width, height), at `fps` a second, as a context; raises OSError.
+
+    Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.
+    """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: Fraction | int):
         self.rate = Fraction(fps)
         self.frames = 0
-        self._container, self._stream = open_film(path, size, self.rate, ENCODER, MUXER)
+        width, height = size
+        self._margin = (0, height % 2), (0, width % 2), (0, 0)
+        self._container, self._stream = open_film(path, film_size(size), self.rate, ENCODER, MUXER)
 
     def __enter__(self) -> Self:
         return self
 
     def add(self, picture: np.ndarray) -> None:
         """The next picture: R'G'B' uint8 [height, width, 3]."""
-        self._container.mux(self._stream.encode(film_frame(planes(picture), self.frames, self.rate)))
+        coded = planes(np.pad(picture, self._margin, mode="edge"))
+        self._container.mux(self._stream.encode(film_frame(coded, self.frames, self.rate)))
         self.frames += 1
 
     def __exit__(
@@ -59,20 +65,19 @@ class Film:
 def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int) -> int:
     """A film of pictures of one size, at least one, R'G'B' uint8 [height, width, 3]; returns how many there are.
 
-    Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.  Raises OSError.
+    Raises OSError.
     """
     coming = iter(pictures)
     first = next(coming)
     height, width = first.shape[:2]
-    margin = (0, height % 2), (0, width % 2), (0, 0)
-    with Film(path, film_size((width, height)), fps) as film:
+    with Film(path, (width, height), fps) as film:
         for picture in chain([first], coming):
-            film.add(np.pad(picture, margin, mode="edge"))
+            film.add(picture)
     return film.frames
 
 
 def film_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Width and height of the film that `write_film` makes of pictures of a size."""
+    """Width and height of a `Film` of pictures of a size."""
     width, height = size
     return width + width % 2, height + height % 2
 

@@ -126,11 +126,9 @@ class _Preview(Film):
     """A film that shows, PREVIEW_FPS times a second, the first picture that is not earlier."""
 
     def __init__(self, path: Path, size: tuple[int, int]):
-        self._width, self._height = (max(2, side - side % 2) for side in size)  # (4:2:0 needs even sides)
-        super().__init__(path, (self._width, self._height), PREVIEW_FPS)
+        super().__init__(path, size, PREVIEW_FPS)
 
     def show(self, light: np.ndarray, t_ns: int) -> None:
         """Show the picture, if it is its turn."""
         while t_ns * PREVIEW_FPS >= self.frames * 10**9:
-            padded = np.pad(srgb_codes(light), ((0, 1), (0, 1), (0, 0)), mode="edge")
-            self.add(np.ascontiguousarray(padded[: self._height, : self._width]))
+            self.add(srgb_codes(light))
