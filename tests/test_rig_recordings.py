@@ -480,6 +480,18 @@ def test_codes_and_pictures_of_a_frame_camera_are_read_by_its_curve(tmp_path: Pa
     assert np.ptp(lights[0]) > 0.4 and np.array(lights) == pytest.approx(np.array([lights[0]] * 4), abs=0.01)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_frames_of_a_recording_are_seen_through_the_lens_of_their_camera(tmp_path: Path, known: bool) -> None:
+    """Where that is known, not guessed; whether they are pictures or codes, and with or without truth."""
+    taken = Source(fov_deg=80.0) if known else Source()
+    cameras = Rig(source=taken, cameras=(Camera(name="aps", kind="cis", size=(32, 24)),))
+    convert(CLIP, tmp_path / "out", rig=cameras, pictures="raw,png", **OPTIONS)
+    for kind in ("frames", "raw"):
+        found = Recipe.of(tmp_path / "out" / "aps" / kind, frame_camera=True, transfer="linear").rig
+        assert found.source_assumed != known and found.source.size == (32, 24)
+        assert found.source.fov_deg == pytest.approx(80 if known else 60)
+
+
 def test_a_camera_with_finer_pixels_sees_a_scene_more_often() -> None:
     scene = "scene:parallax,seed=4,scene.duration_s=0.3,size=48x36,scene.min_fps=1"
     alone = Recipe.of(scene).source.frames_expected

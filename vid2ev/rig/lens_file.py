@@ -1,4 +1,5 @@
-"""intrinsics.json: the lens of a folder of pictures, as `vid2ev scene` and truth write it: the fields of `Intrinsics`.
+"""The lens of a folder of pictures: intrinsics.json there, as `vid2ev scene` and truth write it, with the fields of
+`Intrinsics`; or what a recording says of the frame camera whose pictures they are.
 
 Others call files so, too, and mean other things: what is none of ours says nothing.
 """
@@ -6,7 +7,9 @@ Others call files so, too, and mean other things: what is none of ours says noth
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+from vid2ev.recording.exposures import KINDS
 from vid2ev.rig.camera import Source
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.untrusted import json_of, read_text
@@ -21,9 +24,26 @@ def write_lens(folder: Path, lens: Intrinsics) -> None:
 
 def lens_in(folder: Path, size: tuple[int, int]) -> Source | None:
     """The camera that took the pictures of a folder, which have this size; None where nothing, or nothing that fits,
-    is said of it."""
-    try:
-        lens = Intrinsics.model_validate(json_of(read_text(folder / LENS)))
-        return Source.of(lens) if lens.size == size else None
-    except (OSError, ValueError):
-        return None
+    is said of it: by the folder, or by the recording that has them from one of its cameras."""
+    for said_in in (_beside, _of_recording):
+        try:
+            lens = Intrinsics.model_validate(said_in(folder))
+            return Source.of(lens) if lens.size == size else None
+        except (OSError, ValueError, LookupError, TypeError):
+            continue
+    return None
+
+
+def _beside(folder: Path) -> Any:
+    return json_of(read_text(folder / LENS))
+
+
+def _of_recording(folder: Path) -> Any:
+    """What DIR/manifest.json says of the camera of DIR/CAMERA/frames, or raw.  Raises LookupError where it was guessed
+    how wide the video sees, around which the cameras were."""
+    taker = folder.absolute().parent
+    if folder.name not in (KINDS["raw"], KINDS["png"]):
+        raise LookupError
+    rig = json_of(read_text(taker.parent / "manifest.json"))["rig"]
+    known = [] if rig["source"]["assumed"] else rig["cameras"]
+    return {camera["name"]: camera["intrinsics"] for camera in known}[taker.name]
