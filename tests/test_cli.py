@@ -21,7 +21,7 @@ from click.testing import CliRunner, Result
 
 from vid2ev import UsageError, conversion, instants
 from vid2ev.commands import main
-from vid2ev.commands.summary import of_the_clip
+from vid2ev.commands.summary import of_the_clip, result_facts
 from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
 
@@ -156,6 +156,15 @@ def test_info_on_everything() -> None:
     for path, size in (("clip.mp4", "64x48"), ("clip_events/preview.mp4", "x480"), (CLIP, "64x48")):
         assert size in vid2ev("info", path).stdout
     assert json.loads(vid2ev("info", "clip.mp4", "--json").stdout)["size"] == [64, 48]
+
+
+def test_warnings_of_a_rig_say_which_cameras_they_are_about() -> None:
+    """Those of all are of no single one."""
+    counts = {"frames": 2, "subframes": 0, "events": 0, "on": 0}
+    said = {"left": ["a", "b", "c"], "right": ["c", "b"], "up": ["b"]}
+    results = {name: {"counts": counts, "duration_us": 1, "warnings": texts} for name, texts in said.items()}
+    facts = result_facts({"results": results, "cameras": {name: {"size": [1, 1]} for name in said}})
+    assert [text for name, text in facts if name == "warning"] == ["left: a", "b", "left, right: c"]
 
 
 def test_a_truncated_video_is_converted_with_a_warning() -> None:

@@ -67,8 +67,7 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     if "results" in manifest:
         results, cameras = manifest["results"], manifest["cameras"]
         counts = [(name, _count_text(result, cameras[name])) for name, result in results.items()]
-        warnings = {text: None for result in results.values() for text in result["warnings"]}
-        return [*counts, _duration(next(iter(results.values()))), *(("warning", text) for text in warnings)]
+        return [*counts, _duration(next(iter(results.values()))), *_warnings_of(results)]
     sensor = manifest["sensor"]
     what = "frames" if sensor.get("kind") == "cis" else "events"
     warnings = manifest["warnings"]
@@ -76,6 +75,18 @@ def result_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
         (what, _count_text(manifest, sensor, named=True)),
         _duration(manifest),
         *(("warning", text) for text in warnings),
+    ]
+
+
+def _warnings_of(results: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The warnings of cameras, each once; those that not all of them have say whose they are."""
+    having: dict[str, list[str]] = {}
+    for name, result in results.items():
+        for text in result["warnings"]:
+            having.setdefault(text, []).append(name)
+    return [
+        ("warning", text if len(names) == len(results) else f"{', '.join(names)}: {text}")
+        for text, names in having.items()
     ]
 
 
