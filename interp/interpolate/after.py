@@ -22,7 +22,7 @@ from interp.light import to_codes, to_light
 from interp.networks.hdr import Hdr, HdrState
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import sha256
 
 
@@ -30,13 +30,13 @@ class After:
     """Post-processing with the weights of a file.
 
     events   whether there are any
-    Raises UsageError for weights that need events without them, DataError for those of another network.
+    Raises UsageError for weights of another network, and for such as need events without them.
     """
 
     def __init__(self, path: Path, events: bool, device: torch.device | str):
         network = load(path).to(device)
         if not isinstance(network, Hdr):
-            raise DataError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
+            raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
         self.network, self.device = network, device
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"

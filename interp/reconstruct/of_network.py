@@ -13,7 +13,7 @@ from interp.networks.event_fed import EventFed, States
 from interp.representation.event_counts import as_voxels
 from interp.weights import load
 from vid2ev import Events
-from vid2ev.errors import DataError
+from vid2ev.errors import UsageError
 from vid2ev.views.voxel import Voxel
 
 
@@ -21,7 +21,7 @@ class OfNetwork:
     """The network of a file for a sensor of a size (width, height).
 
     contrast   what an OFF and an ON event stand for [nat]
-    Raises DataError for a file that holds none which takes events alone.
+    Raises UsageError for a network that takes frames, DataError for a file that holds none.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class OfNetwork:
     ):
         network = load(path).to(device)
         if not isinstance(network, EventFed):
-            raise DataError(f"{path} holds a network that takes frames; give weights of e2vid or firenet")
+            raise UsageError(f"{path} holds a network that takes frames; give weights of e2vid or firenet")
         self.name, self.network, self.device = path.stem, network, device
         off, on = contrast
         self._worth = torch.tensor([-off, on], dtype=torch.float32)[:, None, None, None]

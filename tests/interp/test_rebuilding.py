@@ -126,7 +126,7 @@ def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
         open_method("brige")
     path = tmp_path / "hdr.safetensors"
     save(path, "hdr", make("hdr", "tiny"))
-    with pytest.raises(DataError, match="rebuilds no frames"):
+    with pytest.raises(UsageError, match="rebuilds no frames"):
         open_method(str(path))
 
 

@@ -223,7 +223,7 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
         (["a.npz", "--fps", "10", "--events-per-frame", "9"], 2, "leave out one"),
         (["a.npz", "--events-per-frame", "0"], 2, "at least 1"),
         (["a.npz", "--cutoff", "-1"], 2, "0 to 10000"),
-        (["a.npz", "--network", "rrin.safetensors"], 1, "takes frames"),
+        (["a.npz", "--network", "rrin.safetensors"], 2, "takes frames"),
         (["a.npz", "--network", "rrin.safetensors", "--cutoff", "1"], 2, "leave out one"),
         (["a.npz", "--start", "5"], 2, "no events from 5 s on"),
         (["a.npz", "--stop", "-1"], 2, "no events from 0 s to -1 s"),
