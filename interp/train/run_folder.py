@@ -11,6 +11,7 @@
     pictures/             inputs, prediction, truth
     tensorboard/          the curves and pictures again
     clips/                a cache: what is missing there is made again
+    finished.json         how it came out, once it is done
 
 No path stands in it but those of the data that it was given, so it can be carried to wherever these are.
 """
@@ -34,6 +35,7 @@ from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
+FINISHED = "finished.json"
 MOST_STEPS = 1 << 40
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
 OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end
@@ -72,8 +74,19 @@ class RunFolder:
                         file.write(starts[part].read_bytes())
                 self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
 
+    def finished(self) -> dict[str, Any] | None:
+        """How it came out; None until it is done."""
+        file = self.path / FINISHED
+        return read_json(file) if file.exists() else None
+
+    def finish(self, outcome: Mapping[str, Any]) -> None:
+        """Training is done: keep how it came out, and nothing that is needed to go on only."""
+        if self.first:
+            self._write(FINISHED, outcome)
+        self.forget_clips()
+
     def forget_clips(self) -> None:
-        """Remove them when training is done."""
+        """Remove them."""
         if self.first:
             shutil.rmtree(self.clips, ignore_errors=True)
 

@@ -7,16 +7,18 @@ from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 
+from interp.train import told
 from interp.train.checkpoints import read_checkpoint
 from interp.train.fit import Fit, Outcome, Stop
 from interp.train.job import NOTHING, Job
 from interp.train.machines import Machines
 from interp.train.made_of import feed_of, learner_of
-from interp.train.run_folder import RunFolder
+from interp.train.run_folder import FINISHED, RunFolder
 from interp.train.starts import begin
 from vid2ev.commands.progress import counting
 from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import as_stated
 from vid2ev.sensors.devices import CPU, Device
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
@@ -34,7 +36,7 @@ def run(
     starts: Mapping[str, Path] = NOTHING,
     clips_on: Device = CPU,
 ) -> Outcome:
-    """Train in the folder `path`, or go on there.
+    """Train in the folder `path`, or go on there; what is done is left as it is.
 
     machines    by default all GPUs of this one, or what the recipe says of those without
     session_s   seconds after which to stop, to go on another time
@@ -52,6 +54,9 @@ def run(
         begin(learner, starts)
     folder = RunFolder(path, job.kept(), resume, machines.first, starts)
     try:
+        if resume and (done := folder.finished()) is not None:
+            with as_stated(folder.path / FINISHED):
+                return told.outcome_of(done)
         if resume:
             begin(learner, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
@@ -67,7 +72,7 @@ def run(
         with closing(feed):
             outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:
-            folder.forget_clips()
+            folder.finish(told.as_json(outcome))
         return outcome
     finally:
         folder.close()

@@ -1,13 +1,15 @@
-"""What people are told of a run: what it will do, and how it came out."""
+"""What is told of a run: what it will do, and how it came out."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from interp.train.fit import Outcome
 from interp.train.job import Job
+from interp.train.scores import Scores
 from vid2ev.commands.summary import lines
 
 COLUMNS = ("psnr", "ssim", "moving", "static")
@@ -57,3 +59,10 @@ def as_json(outcome: Outcome) -> Mapping[str, Any]:
         "best": outcome.best,
         "scores": scores,
     }
+
+
+def outcome_of(said: Mapping[str, Any]) -> Outcome:
+    """The outcome of `as_json`.  Raises LookupError, TypeError for what is none."""
+    none = dict.fromkeys(COLUMNS, math.nan)
+    scores = {g: {m: Scores(**none | values) for m, values in of.items()} for g, of in said["scores"].items()}
+    return Outcome(said["step"], said["steps"], said["skipped"], said["best"], scores)

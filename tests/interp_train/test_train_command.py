@@ -55,6 +55,19 @@ def test_a_run_in_two_sessions_ends_with_a_table() -> None:
     assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}
 
 
+def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = run(*FEW, "-o", "run", "--json")
+    before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
+    monkeypatch.setattr(runs, "feed_of", lambda *_: pytest.fail("clips are made"))
+    again = run("-o", "run", "--resume", "--json")
+    assert again.exit_code == 0 and again.output == made.output
+    assert run("-o", "run", "--resume").output.startswith("run: step 3 of 3\nweights.safetensors: ")
+    assert {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()} == before
+    Path("run/finished.json").write_text('{"step": 3, "scores": []}')
+    damaged = run("-o", "run", "--resume")
+    assert damaged.exit_code == 1 and "finished.json does not say what it should" in damaged.output
+
+
 @pytest.mark.parametrize(
     "said", [["--steps", "3"], ["--seed", "7"], ["--network", "rrin-events-guided"], ["--size", "tiny"]]
 )
