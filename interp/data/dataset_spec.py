@@ -109,7 +109,11 @@ def _of_videos(spec: DatasetSpec) -> list[Scene]:
         rig, exposure_s = _rig(spec, place)
         length_s = ((spec.frames - 1) / spec.cis_fps + exposure_s) * spec.slowdown + EDGES * frame_s
         if seconds < length_s:
-            raise UsageError(f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames")
+            slower = f", or a smaller --slowdown than {spec.slowdown:g}" * (spec.slowdown > 1)
+            raise UsageError(
+                f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames; give a longer"
+                f" video{slower}, or leave this one out"
+            )
         begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
         for part in range(math.floor(seconds / length_s)):
             start_s = round(begin_s + part * length_s, 6)

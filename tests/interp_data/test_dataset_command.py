@@ -115,8 +115,10 @@ def test_a_film_whose_clock_does_not_begin_at_0_is_cut_from_its_beginning(film: 
 
 
 def test_a_film_that_is_too_short_is_refused(film: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="expected at least"):
+    with pytest.raises(UsageError, match="a longer video, or a smaller --slowdown than 10, or leave this one out"):
         write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), slowdown=10))
+    with pytest.raises(UsageError, match="give a longer video, or leave this one out"):
+        write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), frames=1000))
     assert not list(tmp_path.iterdir())
 
 
