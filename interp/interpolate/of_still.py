@@ -26,6 +26,7 @@ from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.pictures import PictureReader
+from vid2ev.light.png_tags import remarks_on_tags
 from vid2ev.recording.manifest import identity
 
 MAT = b"MATLAB 5.0 MAT-file"
@@ -66,6 +67,8 @@ class OfStill:
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
         ]
+        if options.transfer == "auto":
+            self.remarks += remarks_on_tags(picture)
         if options.transfer == "auto" and is_mat(events):
             self.remarks.append("its codes are taken for sRGB; of raw frames, --transfer linear says what they are")
         if not options.contrast:

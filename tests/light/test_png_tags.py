@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vid2ev import open_source
+from vid2ev.errors import DataError
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.primaries import primaries_of
 from vid2ev.light.transfer import parse_transfer
@@ -85,3 +86,32 @@ def test_a_folder_of_them_is_read_so_unless_told_otherwise(tmp_path: Path) -> No
         assert source.describe()["transfer"] == curve
         light = next(iter(source.frames())).luminance
         assert light == pytest.approx(float(parse_transfer(curve).to_light(np.array(128 / 255))), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("tag", "remark"),
+    [
+        ((b"iCCP", b"Display P3\0\0" + bytes(500)), "its ICC profile 'Display P3' is not read"),
+        ((b"iCCP", b"sRGB IEC61966-2.1\0\0" + bytes(500)), None),
+        ((b"cICP", bytes([9, 16, 0, 0])), "codes of limited range"),
+        ((b"cICP", bytes([9, 99, 0, 1])), "transfer curve 99 of H.273 is not known"),
+        ((b"cICP", bytes([9, 16, 0, 1])), None),
+        ((b"gAMA", struct.pack(">I", 50000)), None),
+    ],
+)
+def test_what_is_not_taken_up_of_tags_is_said(tmp_path: Path, tag: tuple[bytes, bytes], remark: str | None) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (40, 40, 3), np.uint8)
+    one = png(tmp_path / "one.png", pixels, tag)
+    for source in (open_source(tmp_path, fps=10), open_source(one, motion="pan:speed=1")):
+        assert len(source.warnings) == (remark is not None) and (remark or "") in "".join(source.warnings)
+    assert open_source(tmp_path, fps=10, transfer="srgb").warnings == []  # (who says something is believed)
+
+
+def test_pictures_of_one_folder_are_coded_alike(tmp_path: Path) -> None:
+    pixels = np.full((4, 4, 3), 128, np.uint8)
+    png(tmp_path / "0.png", pixels, (b"sRGB", b"\0"))
+    png(tmp_path / "1.png", pixels)
+    png(tmp_path / "2.png", pixels, (b"gAMA", struct.pack(">I", 100000)))
+    with pytest.raises(DataError, match=r"2\.png: codes of linear by its tags, expected srgb like those of the first"):
+        list(open_source(tmp_path, fps=10).frames())
+    assert len(list(open_source(tmp_path, fps=10, transfer="srgb").frames())) == 3

@@ -1,7 +1,7 @@
 """What a PNG says of its colours: the curve of its codes, and which red, green and blue they are of.
 
     cICP      code points of Rec. ITU-T H.273; before all others
-    iCCP      a profile, which is not read: sRGB
+    iCCP      a profile, of which only the name is read: sRGB
     sRGB      sRGB
     gAMA      codes are light ^ g.  1 / 2.2 is what programs write beside sRGB, and taken for that
     cHRM      chromaticities, where none of the first three is there
@@ -15,12 +15,14 @@ from pathlib import Path
 
 from vid2ev.errors import UsageError
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
-from vid2ev.light.tags import TRANSFERS
+from vid2ev.light.recognise import PNG, head_of
+from vid2ev.light.tags import TRANSFERS, UNSPECIFIED
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.untrusted import png_chunks
 
 LARGEST = 64  # bytes of a tag that is read
 USUAL_GAMMA = 45455  # hundred thousandths
+REMEDY = "unless --transfer says another curve"
 
 
 def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
@@ -31,6 +33,22 @@ def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
     if b"iCCP" in chunks or b"sRGB" in chunks:
         return None, None
     return _curve(chunks.get(b"gAMA", b"")), _primaries(chunks.get(b"cHRM", b""))
+
+
+def remarks_on_tags(path: Path) -> list[str]:
+    """That a file is a PNG which says of its codes what is not taken up, if it is."""
+    if not head_of(path).startswith(PNG):
+        return []
+    chunks = _chunks(path)
+    if len(code := chunks.get(b"cICP", b"")) == 4:
+        curve, full_range = code[1], code[3]
+        unknown = f"{path}: transfer curve {curve} of H.273 is not known; its codes are taken for sRGB, {REMEDY}"
+        limited = f"{path}: codes of limited range by its tag cICP are taken for those of full range; write it anew so"
+        return [unknown] * (curve not in (*TRANSFERS, UNSPECIFIED)) + [limited] * (not full_range)
+    name = chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1")
+    if "srgb" in name.lower():
+        return []
+    return [f"{path}: its ICC profile {name!r} is not read; its codes are taken for sRGB, {REMEDY}"]
 
 
 def _chunks(path: Path) -> dict[bytes, bytes]:

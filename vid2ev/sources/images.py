@@ -20,6 +20,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.light.pictures import PictureReader, bits_of
+from vid2ev.light.png_tags import remarks_on_tags
 from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
@@ -78,7 +79,9 @@ class Images:
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
         curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path)
+        self._tagged = transfer == "auto" and curve is None, tagged
         if transfer == "auto":
+            self.warnings += [] if curve else remarks_on_tags(self._places[0][0])
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
         self._reader = PictureReader(transfer, colour, bits)
@@ -119,7 +122,7 @@ class Images:
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _light(self, file: Path, picture: Picture) -> np.ndarray:
-        pixels, primaries, _ = picture
+        pixels, primaries, tagged = picture
         if (pixels.shape[1], pixels.shape[0]) != self.size:
             width, height = self.size
             raise DataError(
@@ -128,6 +131,12 @@ class Images:
             )
         if (pixels.dtype.kind == "f") != (self._dtype.kind == "f"):
             raise DataError(f"{file}: {pixels.dtype} pixels, expected {self._dtype} like those of the first image")
+        count, first = self._tagged
+        if count and (tagged or "srgb") != (first or "srgb"):
+            raise DataError(
+                f"{file}: codes of {tagged or 'srgb'} by its tags, expected {first or 'srgb'} like those of the first"
+                " image; bring them to one curve, or say with --transfer which one it is"
+            )
         return self._reader.light(pixels, primaries)
 
     def _read_stamps(self) -> tuple[list[Fraction], str]:
