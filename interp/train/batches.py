@@ -90,3 +90,10 @@ class Feed(LightningDataModule):
         assert trainer is not None
         mine = self.validation[trainer.global_rank :: trainer.world_size]
         return DataLoader(mine, batch_size=None)  # type: ignore[arg-type]
+
+    def is_first_of_group(self, number: int) -> bool:
+        """Whether the clip of this number among a process's own is the first of its group among all."""
+        assert self.trainer is not None
+        place = self.trainer.global_rank + number * self.trainer.world_size
+        groups = [group for group, _ in self.validation]
+        return groups.index(groups[place]) == place

@@ -20,24 +20,19 @@ class Keeping(Callback):
 
     def __init__(self, folder: RunFolder, network: str):
         self.folder, self.network = folder, network
-        self._pictured: set[str] = set()
-
-    def on_validation_epoch_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
-        """No pictures yet."""
-        self._pictured = set()
 
     def on_validation_batch_end(
-        self, trainer: Trainer, pl_module: LightningModule, outputs: Any, batch: Any, *_: Any
+        self, trainer: Trainer, pl_module: LightningModule, outputs: Any, batch: Any, batch_idx: int, *_: Any
     ) -> None:
-        """A picture of the first clip of each group."""
+        """A picture of the first clip of each group, by the process that has it."""
         group, clip = batch
-        if group in self._pictured or not trainer.is_global_zero:
+        feed: Any = trainer.datamodule  # type: ignore[attr-defined]
+        if not feed.is_first_of_group(batch_idx):
             return
-        self._pictured.add(group)
         assert isinstance(pl_module, Learner)
         rgb = pl_module.picture(clip, outputs)
         with self._writing():
-            self.folder.pictures.mkdir(exist_ok=True)
+            self.folder.pictures.mkdir(parents=True, exist_ok=True)
             with whole_file(self.folder.pictures / f"step-{trainer.global_step:07d}-{group}.png") as file:
                 file.write(encoded(rgb))
         for logger in trainer.loggers:

@@ -54,9 +54,10 @@ class Made(Dataset):  # type: ignore[type-arg]
         return found | {"truth": found["truth"] * float("nan")} if number in self.spoilt else found
 
 
-def clips(count: int = 2) -> list[tuple[str, dict[str, torch.Tensor]]]:
+def clips(count: int = 2, groups: int = 1) -> list[tuple[str, dict[str, torch.Tensor]]]:
     """Clips to validate with."""
-    return [("scenes", {name: part[None] for name, part in sample(-1 - k).items()}) for k in range(count)]
+    names = [f"group{k}" for k in range(1, groups)] + ["scenes"]
+    return [(names[-1 - k % groups], {name: part[None] for name, part in sample(-1 - k).items()}) for k in range(count)]
 
 
 def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range = range(0), **changed: Any) -> Any:
@@ -71,7 +72,7 @@ def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range 
     from interp.train.schedule import Schedule
 
     of_fit = {name: changed.pop(name) for name in ("session_s", "stop", "begun_s") if name in changed}
-    workers = changed.pop("workers", 0)
+    workers, groups = changed.pop("workers", 0), changed.pop("groups", 1)
     of_network = changed.pop("network", {})
     few = {"steps": STEPS_OF_RUN, "batch": 4, "save_s": 1e-6, "validations": 2, "threads": 1, "warm_up": 3}
     recipe = Recipe(**(few | changed))
@@ -82,7 +83,7 @@ def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range 
     machines = Machines(devices, accelerator="cpu")
     place = RunFolder(folder, {"recipe": recipe.model_dump(mode="json")}, resume, machines.first)
     try:
-        feed = Feed(Made(spoilt), clips(), recipe.batch, workers)
+        feed = Feed(Made(spoilt), clips(groups=groups), recipe.batch, workers)
         return Fit(learner, feed, place, NETWORK, machines, quiet=True, **of_fit).run()
     finally:
         place.close()

@@ -19,9 +19,11 @@ pytestmark = pytest.mark.long
 
 
 def test_two_processes_learn_what_one_does(tmp_path: Path) -> None:
-    session(tmp_path / "one", steps=3)
-    shared = in_a_process(tmp_path / "two", devices=2, steps=3)
+    session(tmp_path / "one", steps=3, groups=2)
+    shared = in_a_process(tmp_path / "two", devices=2, steps=3, groups=2)
     assert shared.returncode == 0, shared.stderr
+    pictured = [{path.name for path in (tmp_path / run / "pictures").iterdir()} for run in ("one", "two")]
+    assert pictured[0] == pictured[1] and len(pictured[0]) == 2 * len({name[:12] for name in pictured[0]})
     one, two = kept(tmp_path / "one"), kept(tmp_path / "two")
     assert one.keys() == two.keys()
     moved = 0
