@@ -34,4 +34,5 @@ def test_the_flag_of_the_range_counts_and_without_it_the_format(pixels: str) -> 
 
 def test_a_transfer_that_is_asked_for_counts_and_then_the_tag() -> None:
     assert [transfer_of(16, asked) for asked in ("auto", "srgb")] == ["pq", "srgb"]
-    assert transfer_of(2, "auto") == "bt709"
+    assert transfer_of(2, "auto") == transfer_of(2, "auto", "h264") == "bt709"
+    assert [transfer_of(tag, "auto", "apng") for tag in (2, 16)] == ["srgb", "pq"]

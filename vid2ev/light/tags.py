@@ -26,6 +26,8 @@ TRANSFERS = dict.fromkeys((1, 6, 11, 12, 14, 15), "bt709") | {
     18: "hlg",
 }
 
+PICTURES = ("apng", "bmp", "gif", "png", "webp")  # FFmpeg's names of codecs of pictures, not of cameras
+
 # table 4: shares of red and blue in luma
 MATRICES = {
     1: (0.2126, 0.0722),  # BT.709
@@ -48,9 +50,9 @@ WEIGHTS = {
 }
 
 
-def transfer_of(tag: int, asked: str) -> str:
-    """Name of the transfer curve: what was asked for, else the tag's, else BT.709."""
-    return asked if asked != "auto" else TRANSFERS.get(tag, "bt709")
+def transfer_of(tag: int, asked: str, codec: str = "") -> str:
+    """Name of the transfer curve: what was asked for, else the tag's, else sRGB of pictures that move, and BT.709."""
+    return asked if asked != "auto" else TRANSFERS.get(tag, "srgb" if codec in PICTURES else "bt709")
 
 
 def matrix_of(tag: int, width: int, height: int, path: object) -> tuple[float, float] | None:

@@ -45,8 +45,9 @@ def open_source(
     or a scene file, `-` for standard input, `camera:0`, and otherwise a video.  What a file is, its content says.
 
     transfer     what codes mean: "srgb", "bt709", "pq", "hlg", "linear", "gamma:G" and others; "auto" is the tag of a
-                 video, BT.709 without one, sRGB for images, linear light for floating point, and a refusal for integer
-                 arrays, which say nothing; "linear:10bit" of codes of a sensor that do not fill their 16 bits
+                 video, BT.709 without one, sRGB for images, still or animated, linear light for floating point, and a
+                 refusal for integer arrays, which say nothing; "linear:10bit" of codes of a sensor that do not fill
+                 their 16 bits
     fps          frames per second; it overrules the times of the source; images and arrays without times need it
     colour       "luminance" gives frames [H, W], "rgb" [H, W, 3] (see `Frame`)
     start, stop  the part to read [s on the source's own clock], both ends included

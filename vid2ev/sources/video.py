@@ -29,7 +29,8 @@ from vid2ev.stream.frames import Colour, Frame
 class Video:
     """Frames of footage: the first video stream of a file, of standard input, or a camera.
 
-    transfer  "auto" (the file's tag; BT.709 if it has none) or a name of `transfer.parse_transfer`
+    transfer  "auto" (the file's tag; without one sRGB of GIF, animated PNG and WebP, else BT.709) or a name of
+              `transfer.parse_transfer`
     fps       if given, frame k is at k / fps and the file's times do not count
     colour    "luminance" or "rgb"
 
@@ -58,7 +59,7 @@ class Video:
         self.path, self.rewindable, self.kept = footage.name, footage.rewindable, footage.kept
         first = footage.first
         self.frames_expected = footage.planned or self._estimate()
-        self._transfer = transfer_of(first.color_trc, transfer)
+        self._transfer = transfer_of(first.color_trc, transfer, footage.codec)
         self._tables: dict[Any, np.ndarray] = {}
         self._orientation = orientation_of(first)
         self._coded_size = (first.width, first.height)
