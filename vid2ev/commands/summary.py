@@ -94,7 +94,8 @@ def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: boo
     """Events or frames of a camera; `named`: which of them it is stands before."""
     counts, seconds, (width, height) = result["counts"], result["duration_us"] / 1e6, sensor["size"]
     if sensor.get("kind") == "cis":
-        return f"{counts['exposures']:,}{'' if named else ' frames'}, {counts['unfinished']:,} cut off by the end"
+        exposures = f"{counts['exposures']:,}" if named else _frames(counts["exposures"])
+        return f"{exposures}, {counts['unfinished']:,} cut off by the end"
     per_s = counts["events"] / seconds if seconds else 0.0
     rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"
     share = f", {100 * counts['on'] / counts['events']:.1f} % ON" if counts["events"] else ""
@@ -103,7 +104,7 @@ def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: boo
 
 def _duration(result: Mapping[str, Any]) -> tuple[str, str]:
     counts, seconds = result["counts"], result["duration_us"] / 1e6
-    return "duration", f"{seconds:.3f} s: {counts['frames']:,} frames, {counts['subframes']:,} made between them"
+    return "duration", f"{seconds:.3f} s: {_frames(counts['frames'])}, {counts['subframes']:,} made between them"
 
 
 def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -156,7 +157,11 @@ def _frames_text(source: Mapping[str, Any]) -> str:
     if not source.get("frames_expected"):
         return ""
     guessed = source.get("frames_estimated") or {"start_s", "stop_s"} & {*source.get("edits", {})}
-    return f"{'about ' * bool(guessed)}{source['frames_expected']} frames"
+    return f"{'about ' * bool(guessed)}{_frames(source['frames_expected'])}"
+
+
+def _frames(count: int) -> str:
+    return f"{count:,} frame{'s' * (count != 1)}"
 
 
 def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
