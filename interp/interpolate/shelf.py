@@ -271,12 +271,14 @@ def _line_of(text: bytes, wanted: Mapping[str, type]) -> dict[str, Any]:
 def kind_of(output: Path | None, asked: str | None) -> Kind:
     """What is made: as asked, or as the name says.  Raises UsageError if both differ."""
     suffix = "" if output is None or output.is_dir() else output.suffix.lower()
-    if suffix not in ("", ".mp4"):
-        raise UsageError(f"{output}: '{suffix}' cannot be made; expected .mp4, or a folder's name without a dot")
+    if asked is None and suffix not in ("", ".mp4"):
+        raise UsageError(
+            f"{output}: '{suffix}' cannot be made; expected .mp4, or a folder's name without a dot, or --format png"
+        )
     if asked is None:
         return "mp4" if output is None or suffix else "png"
     if asked not in ("mp4", "png", "exr") or (output is not None and (asked == "mp4") != (suffix == ".mp4")):
-        wanted = "a name that ends in .mp4" if asked == "mp4" else "a folder's name without a dot"
+        wanted = "a name that ends in .mp4" if asked == "mp4" else "the name of a folder"
         raise UsageError(f"format {asked} to {output}: expected {wanted}, and mp4, png or exr")
     return asked  # type: ignore[return-value]
 

@@ -254,6 +254,16 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_a_folder_is_called_by_its_source_and_the_multiple_whatever_dots_these_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    images(tmp_path / "v1.2", moving(2))
+    made = CliRunner().invoke(command, ["v1.2", "-x", "2.5", "--format", "png", "--method", "nearest"])
+    assert made.exit_code == 0, made.exception
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["v1.2", "v1.2_x2.5"]
+
+
 def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tmp_path: Path) -> None:
     hour_us = 3600 * 10**6
     source = images(tmp_path / "in", moving(3), step_us=hour_us)
