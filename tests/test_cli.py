@@ -302,6 +302,12 @@ def test_nothing_is_not_taken_for_the_folder_one_is_in_or_the_default(words: lis
     refused(2, f"nothing after '{before}': expected a value", *words)
 
 
+@pytest.mark.parametrize("words", ["convert x -o -", "render x --output=-", "render x -o-", "reformat x -"])
+def test_nothing_is_made_that_is_called_as_standard_output(words: str) -> None:
+    refused(2, "nothing goes to standard output; give a name", *words.split())
+    assert not Path("-").exists()
+
+
 def test_a_list_of_videos_is_one_to_all_commands() -> None:
     Path("list.txt").write_text("clip.mp4\n")
     refused(2, "a list of videos; give one of them", "info", "list.txt")

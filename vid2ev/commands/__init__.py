@@ -51,6 +51,7 @@ class Commands(click.Group):
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         refuse_nothing(args)
+        refuse_standard_output(args)
         names = self.list_commands(ctx)
         if args and args[0] not in names and not args[0].startswith("-"):
             close = difflib.get_close_matches(args[0], names, n=1, cutoff=0.5)
@@ -87,6 +88,13 @@ def refuse_nothing(words: list[str]) -> None:
     for before, word in pairwise(["vid2ev", *words]):
         if word == "" or (word.startswith("--") and word.endswith("=")):
             raise UsageError(f"nothing after '{word or before}': expected a value; a shell's variable may be empty")
+
+
+def refuse_standard_output(words: list[str]) -> None:
+    """Raise UsageError where what is to be made is called `-`: it would be a file or folder of that name."""
+    for before, word in pairwise(words):
+        if word in ("-o-", "--output=-") or (word == "-" and (before in ("-o", "--output") or words[0] == "reformat")):
+            raise UsageError("-: files and folders are made, nothing goes to standard output; give a name")
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
