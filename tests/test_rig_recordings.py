@@ -295,6 +295,14 @@ def test_truth_lies_beside_what_each_camera_sends(tmp_path: Path) -> None:
     assert read_mask(tmp_path / "out" / "left" / "truth" / "mask" / "000001.png").all()
 
 
+@pytest.mark.parametrize("video", [CLIP, "scene:parallax,seed=4,scene.duration_s=0.05,size=48x36"])
+def test_a_map_to_other_cameras_needs_some(tmp_path: Path, video: str) -> None:
+    depth = "plane:2" if video == CLIP else None
+    with pytest.raises(UsageError, match="truth 'map' is of pixels in other cameras, and there is one"):
+        Recipe.of(video, depth=depth, truth="depth,map")
+    assert Recipe.of(video, depth=depth, truth="depth,map", frame_camera=True).truth is not None
+
+
 def test_the_truth_of_a_scene_is_that_of_its_world(tmp_path: Path) -> None:
     scene = "scene:parallax,seed=4,scene.duration_s=0.05,size=48x36"
     around = rig(translation_mm=(15.0, 0.0, 0.0), size=(32, 24))

@@ -136,6 +136,9 @@ class Recipe:
             raise UsageError(f"subframes {self.subframes} with {none}: nothing is made between frames; leave it out")
         if self.cuts not in CUTS:
             raise UsageError(f"cuts '{self.cuts}': expected one of {', '.join(CUTS)}")
+        kinds = {*self.truth.kinds} if self.truth else set()
+        if "map" in kinds and len(self.mounts) == 1:
+            raise UsageError("truth 'map' is of pixels in other cameras, and there is one; leave it out, or add --rig")
         if self.source.dense:
             if self.depth is not None:
                 raise UsageError(f"depth '{self.depth}' of a scene, which knows its own; leave --depth out")
@@ -144,7 +147,6 @@ class Recipe:
             return
         if self.plane_m is None and self.depth is not None and self.source.describe().get("kind") == "photograph":
             raise UsageError(f"depth '{self.depth}' of a photograph that moves: expected plane:METRES")
-        kinds = {*self.truth.kinds} if self.truth else set()
         if "flow" in kinds:
             raise UsageError("truth 'flow' of a video is known to nobody: expected a scene; leave it out")
         if self.depth is None and kinds & {"depth", "map"}:
