@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -153,6 +154,10 @@ def test_info_on_everything() -> None:
     assert json.loads(vid2ev("info", "clip_events", "--json").stdout) == manifest
     events = json.loads(vid2ev("info", "clip_events/events.h5", "--json").stdout)
     assert (events["events"], events["size"]) == (count, [64, 48])
+    Path("alone").mkdir()
+    shutil.copy("clip_events/events.h5", "alone")
+    said = json.loads(vid2ev("info", "alone", "--json").stdout)  # (what render takes)
+    assert said == events | {"path": "alone"}
     for path, size in (("clip.mp4", "64x48"), ("clip_events/preview.mp4", "x480"), (CLIP, "64x48")):
         assert size in vid2ev("info", path).stdout
     assert json.loads(vid2ev("info", "clip.mp4", "--json").stdout)["size"] == [64, 48]

@@ -40,10 +40,10 @@ def sources_in(video: str) -> list[str]:
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not folder.is_dir() or _holds_pictures(folder) or (folder / "manifest.json").exists():
+    if video == "-" or not folder.is_dir() or holds_pictures(folder) or (folder / "manifest.json").exists():
         return [video]
     children = sorted(folder.iterdir(), key=lambda path: natural(path.name))
-    found = [str(path) for path in children if _is_clip(path) or (path.is_dir() and _holds_pictures(path))]
+    found = [str(path) for path in children if _is_clip(path) or (path.is_dir() and holds_pictures(path))]
     return found or [video]
 
 
@@ -176,7 +176,8 @@ def _is_clip(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in CLIPS and not path.stem.endswith("_timestamps")
 
 
-def _holds_pictures(folder: Path) -> bool:
+def holds_pictures(folder: Path) -> bool:
+    """Whether a folder has pictures in it."""
     from vid2ev.light.recognise import PICTURE_SUFFIXES
 
     return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())

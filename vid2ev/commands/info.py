@@ -28,8 +28,8 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
     from vid2ev.commands import summary
-    from vid2ev.commands.batch import is_list
-    from vid2ev.formats import describe_events, recognise
+    from vid2ev.commands.batch import holds_pictures, is_list
+    from vid2ev.formats import describe_events, holds_events, recognise
 
     path = Path(file)
     if (path / "manifest.json").is_file():
@@ -43,7 +43,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
                 *summary.file_facts(path),
                 *summary.speed_facts(found),
             ]
-    elif (path / "metadata.yaml").is_file() or (path.is_file() and recognise(path)):  # (a folder of ROS 2, a file)
+    elif recognise(path) if path.is_file() else path.is_dir() and holds_events(path) and not holds_pictures(path):
         found = describe_events(path)
         facts = summary.event_facts(found)
     elif is_list(path):

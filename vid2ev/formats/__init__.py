@@ -27,6 +27,7 @@ __all__ = [
     "describe_events",
     "event_cameras",
     "format_named",
+    "holds_events",
     "of_only_camera",
     "open_events",
     "read_events",
@@ -221,10 +222,14 @@ def recognise(path: str | Path) -> Format | None:
     return next((kind for kind in kinds if kind.open and kind.recognises(head, path)), None)
 
 
+def holds_events(folder: Path) -> bool:
+    """Whether a folder has events itself, as that of a recording or of a ROS 2 bag has."""
+    return (folder / "metadata.yaml").exists() or any(folder.glob("events.*"))
+
+
 def event_cameras(folder: Path) -> list[Path]:
     """The folders of the event cameras in a recording of several cameras; none in a folder that has events itself."""
-    itself = (folder / "metadata.yaml").exists() or any(folder.glob("events.*"))
-    return [] if itself else [camera for camera in _cameras(folder) if any(camera.glob("events.*"))]
+    return [] if holds_events(folder) else [camera for camera in _cameras(folder) if any(camera.glob("events.*"))]
 
 
 def of_only_camera(path: str | Path) -> Path:
