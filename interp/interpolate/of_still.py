@@ -55,7 +55,9 @@ class OfStill:
         self.size = pixels.shape[1], pixels.shape[0]
         self.channels, self.bits = (1 if pixels.ndim == 2 else 3), (8 if pixels.dtype == np.uint8 else 16)
         transfer = tagged or "srgb" if options.transfer == "auto" else options.transfer
-        light = torch.from_numpy(PictureReader(transfer, "rgb").light(pixels, primaries))[..., : self.channels]
+        reader = PictureReader(transfer, "rgb")
+        said = reader.remarks_on(pixels)
+        light = torch.from_numpy(reader.light(pixels, primaries))[..., : self.channels]
         self._codes = to_codes(light, "srgb").numpy()
         self._events = table_of(events) if is_mat(events) else Events.concatenate(read_events(events))
         if len(self._events) < 2:
@@ -67,8 +69,7 @@ class OfStill:
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
         ]
-        if options.transfer == "auto":
-            self.remarks += remarks_on_tags(picture)
+        self.remarks += [*said, *(remarks_on_tags(picture) if options.transfer == "auto" else ())]
         if options.transfer == "auto" and is_mat(events):
             self.remarks.append("its codes are taken for sRGB; of raw frames, --transfer linear says what they are")
         if not options.contrast:

@@ -352,6 +352,7 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
         ("events.npz", {}, UsageError, "holds no frames"),
         ("events.npz", {"events": Path("events.npz")}, UsageError, "events of its own"),
         ("still.png", {"events": Path("nothing.npz")}, UsageError, "no such file"),
+        ("still.png", {"events": Path("events.npz"), "transfer": "linear:10bit"}, UsageError, "10 bits of uint8"),
     ],
 )
 def test_what_is_no_take_says_so(
