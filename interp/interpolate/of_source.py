@@ -109,5 +109,7 @@ def _is_grey(about: dict[str, Any]) -> bool:
 
 
 def _by_its_name(said: str) -> str:
-    """What a source says, with the name that its rate has here: --fps is that of the frames to make."""
+    """What a source says, with the options that there are here: --fps is that of the frames to make, and a single
+    picture needs its events."""
+    said = said.replace("let a camera move over it with --motion pan", "its events with --events")
     return re.sub(r"(?<![\w-])--fps\b", "--source-fps", said)
