@@ -479,13 +479,13 @@ def test_codes_and_pictures_of_a_frame_camera_are_read_by_its_curve(tmp_path: Pa
     """Codes of an ADC are linear; those of 8 bits are as `gamma` says, and the light is what it was."""
     for gamma in ("srgb", "2.2"):
         out = tmp_path / gamma
-        convert(CLIP, out, "ideal", [f"cis.gamma={gamma}"], cis="ideal", pictures="raw,png", **OPTIONS)
+        convert(CLIP, out, "ideal", [f"cis.gamma={gamma}"], cis="ideal", pictures="raw,png,mp4", **OPTIONS)
         said = json.loads(CliRunner().invoke(main, ["info", str(out / "cis" / "raw"), "--json"]).stdout)
         assert said["transfer"] == "linear"
         assert "codes     of a sensor's ADC" in CliRunner().invoke(main, ["info", str(out / "cis" / "raw")]).stdout
-    places = [(gamma, kind) for gamma in ("srgb", "2.2") for kind in ("frames", "raw")]
+    places = [(gamma, kind) for gamma in ("srgb", "2.2") for kind in ("frames", "raw", "frames.mp4")]
     lights = [next(open_source(tmp_path / gamma / "cis" / kind).frames()).light for gamma, kind in places]
-    assert np.ptp(lights[0]) > 0.4 and np.array(lights) == pytest.approx(np.array([lights[0]] * 4), abs=0.01)
+    assert np.ptp(lights[0]) > 0.4 and np.array(lights) == pytest.approx(np.array([lights[0]] * 6), abs=0.02)
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -32,6 +32,7 @@ import numpy as np
 
 from interp.interpolate.instants import TooFine
 from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.light.tags import tag_of
 from vid2ev.pictures.film import film_size, join_films, remarks_on_size, write_film
 from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
@@ -236,7 +237,8 @@ class Shelf:
         if stop - first < least:
             return
         aside = self.partial / "piece.mp4"
-        write_film(aside, (_rgb(read_codes(self._path(number))) for number in range(first, stop)), self.rate)
+        pictures = (_rgb(read_codes(self._path(number))) for number in range(first, stop))
+        write_film(aside, pictures, self.rate, tag_of(self.job["transfer"]))
         sync(aside)
         aside.replace(self._pieces / f"{first:06d}-{stop:06d}.mp4")
         sync(self._pieces)

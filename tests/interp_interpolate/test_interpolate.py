@@ -150,7 +150,7 @@ def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
     source = images(tmp_path / "in", frames)
     told = interpolate(source, tmp_path / "film.mp4", multiple=2)
     assert json.loads((tmp_path / "film.json").read_text())["frames"] == told["frames"] == 7
-    film = open_source(tmp_path / "film.mp4", transfer="srgb")
+    film = open_source(tmp_path / "film.mp4")
     seen = [frame.light for frame in film.frames()]
     assert len(seen) == 7 and film.size == SIZE
     truth = [frame.light for frame in open_source(source).frames()]

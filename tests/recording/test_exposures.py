@@ -39,7 +39,7 @@ def exposures(n: int = 7, shape: tuple[int, ...] = (15, 22, 3), seed: int = 0) -
 
 
 def files(folder: Path, kinds: Sequence[str] = ALL) -> ExposureFiles:
-    return ExposureFiles(folder, kinds, SPEC.picture_codes(), SPEC.frame_rate_hz)
+    return ExposureFiles(folder, kinds, SPEC.picture_codes(), SPEC.curve, SPEC.frame_rate_hz)
 
 
 def written(tmp_path: Path, made: Sequence[Exposure], kinds: Sequence[str] = ALL) -> Path:
@@ -98,17 +98,14 @@ def test_timestamps_are_the_first_row_and_the_last(tmp_path: Path) -> None:
 def test_both_folders_open_as_sources(tmp_path: Path) -> None:
     made = exposures(5)
     into = written(tmp_path, made)
-    for name, transfer, full in (("raw", "linear", 65535), ("frames", "auto", None)):
+    for name, transfer, apart in (("raw", f"linear:{SPEC.bits}bit", 0.01), ("frames", "auto", 5)):
         source = open_source(into / name, transfer=transfer, colour="rgb")
         frames = list(source.frames())
         assert source.warnings == [] and [frame.t_ns for frame in frames] == [
             each.start_ns // 1000 * 1000 for each in made
         ]
         for frame, exposure in zip(frames, made, strict=True):
-            if full:
-                assert frame.light * full == pytest.approx(exposure.codes, abs=0.01)
-            else:
-                assert frame.light * 1023 == pytest.approx(exposure.codes, abs=5)
+            assert frame.light * SPEC.top == pytest.approx(exposure.codes, abs=apart)
 
 
 @pytest.mark.parametrize(

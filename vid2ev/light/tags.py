@@ -55,6 +55,11 @@ def transfer_of(tag: int, asked: str, codec: str = "") -> str:
     return asked if asked != "auto" else TRANSFERS.get(tag, "srgb" if codec in PICTURES else "bt709")
 
 
+def tag_of(curve: str) -> int:
+    """The code of a transfer curve; that of BT.709 where it has none."""
+    return next((code for code, name in TRANSFERS.items() if name == curve), 1)
+
+
 def matrix_of(tag: int, width: int, height: int, path: object) -> tuple[float, float] | None:
     """Shares of red and blue in luma; None for Y'CgCo.  Raises DataError for matrices that are neither (ICtCp, ...).
 

@@ -1,5 +1,7 @@
 """Films that a browser plays: H.264, yuv420p, BT.709 in limited range, the index first; the same bytes each time.
 
+The transfer curve is a tag alone: BT.709's, unless the pictures' own is given.
+
 In 4:2:0 four pixels share their colour.  Here that is the mean of theirs, weighted by how far each is from gray:
 
     U = sum w u / sum w,   w = |u| + |v| + 1/100        (V alike; u, v in codes from neutral)
@@ -33,15 +35,16 @@ ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 class Film:
     """A film of pictures of `size` (width, height), at `fps` a second, as a context; raises OSError.
 
-    Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.
+    Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.  `transfer` is the code of
+    the curve of the pictures' codes (H.273).
     """
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction | int):
-        self.rate = Fraction(fps)
+    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction | int, transfer: int = BT709):
+        self.rate, self._transfer = Fraction(fps), transfer
         self.frames = 0
         width, height = size
         self._margin = (0, height % 2), (0, width % 2), (0, 0)
-        self._container, self._stream = open_film(path, film_size(size), self.rate, ENCODER, MUXER)
+        self._container, self._stream = open_film(path, film_size(size), self.rate, ENCODER, MUXER, transfer)
 
     def __enter__(self) -> Self:
         return self
@@ -49,7 +52,7 @@ class Film:
     def add(self, picture: np.ndarray) -> None:
         """The next picture: R'G'B' uint8 [height, width, 3]."""
         coded = planes(np.pad(picture, self._margin, mode="edge"))
-        self._container.mux(self._stream.encode(film_frame(coded, self.frames, self.rate)))
+        self._container.mux(self._stream.encode(film_frame(coded, self.frames, self.rate, self._transfer)))
         self.frames += 1
 
     def __exit__(
@@ -62,15 +65,14 @@ class Film:
             self._container.close()
 
 
-def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int) -> int:
-    """A film of pictures of one size, at least one, R'G'B' uint8 [height, width, 3]; returns how many there are.
-
-    Raises OSError.
+def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int, transfer: int = BT709) -> int:
+    """A film of pictures of one size, at least one, R'G'B' uint8 [height, width, 3], of the transfer curve of a code
+    (H.273); returns how many there are.  Raises OSError.
     """
     coming = iter(pictures)
     first = next(coming)
     height, width = first.shape[:2]
-    with Film(path, (width, height), fps) as film:
+    with Film(path, (width, height), fps, transfer) as film:
         for picture in chain([first], coming):
             film.add(picture)
     return film.frames
@@ -110,7 +112,12 @@ def join_films(path: Path, pieces: Iterable[tuple[Path, int]], rate: Fraction | 
 
 
 def open_film(
-    path: Path, size: tuple[int, int], rate: Fraction, encoder: dict[str, str], muxer: dict[str, str] | None = None
+    path: Path,
+    size: tuple[int, int],
+    rate: Fraction,
+    encoder: dict[str, str],
+    muxer: dict[str, str] | None = None,
+    transfer: int = BT709,
 ) -> tuple[Any, Any]:
     """A container to be written, and its stream; what is encoded does not depend on the machine's cores."""
     container = av.open(str(path), "w", format="mp4", options=muxer or {})
@@ -121,16 +128,18 @@ def open_film(
     context.max_b_frames = 0  # pieces can then be put one after the other as they are
     context.thread_count = 1  # more would make other bits
     context.gop_size = max(1, round(4 * rate))
-    context.colorspace = context.color_primaries = context.color_trc = BT709
+    context.colorspace = context.color_primaries = BT709
+    context.color_trc = transfer
     context.color_range = LIMITED
     return container, stream
 
 
-def film_frame(picture: np.ndarray, number: int, rate: Fraction) -> Any:
+def film_frame(picture: np.ndarray, number: int, rate: Fraction, transfer: int = BT709) -> Any:
     """Planes Y, U, V, one after the other as yuv420p has them, as the frame of a number."""
     frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
     frame.pts, frame.time_base = number, 1 / rate
-    frame.colorspace = frame.color_primaries = frame.color_trc = BT709
+    frame.colorspace = frame.color_primaries = BT709
+    frame.color_trc = transfer
     frame.color_range = LIMITED
     return frame
 

@@ -30,6 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
+from vid2ev.light.tags import tag_of
 from vid2ev.recording.disk import sync, whole_file
 from vid2ev.stream.exposures import Exposure
 from vid2ev.untrusted import first_line, read_lines
@@ -46,16 +47,18 @@ class ExposureFiles:
 
     kinds     some of "raw", "png" and "mp4"
     picture   the code of 8 bits [uint8] of each code (`CisSpec.picture_codes`)
+    curve     the transfer curve of these (`CisSpec.curve`)
     rate_hz   of the film
     count     how many exposures there are
     Raises UsageError for another kind; what the disk cannot take is an OSError.
     """
 
-    def __init__(self, folder: Path, kinds: Sequence[str], picture: np.ndarray, rate_hz: float):
+    def __init__(self, folder: Path, kinds: Sequence[str], picture: np.ndarray, curve: str, rate_hz: float):
         unknown = [kind for kind in kinds if kind not in KINDS]
         if unknown or not kinds:
             raise UsageError(f"pictures as {list(kinds)}: expected some of {', '.join(KINDS)}")
-        self.kinds, self.picture, self.rate = tuple(dict.fromkeys(kinds)), picture, Fraction(str(rate_hz))
+        self.kinds, self.rate = tuple(dict.fromkeys(kinds)), Fraction(str(rate_hz))
+        self.picture, self.curve = picture, curve
         kept = [kind for kind in ("raw", "png") if kind in kinds] or ["raw"]  # (a film is made of either)
         self._folders = {kind: folder / KINDS[kind] for kind in kept}
         self._unsynced: list[Path] = []
@@ -114,7 +117,7 @@ class ExposureFiles:
         if "mp4" in self.kinds and self.count:
             from vid2ev.pictures.film import write_film
 
-            write_film(into / KINDS["mp4"], self._pictures(), self.rate)
+            write_film(into / KINDS["mp4"], self._pictures(), self.rate, tag_of(self.curve))
         return [KINDS[kind] for kind in self.kinds if kind != "mp4" or self.count]
 
     def _pictures(self) -> Iterator[np.ndarray]:

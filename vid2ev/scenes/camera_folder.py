@@ -22,6 +22,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.light.tags import tag_of
 from vid2ev.pictures.film import Film
 from vid2ev.recording.depth_files import write_depth
 from vid2ev.recording.flow_files import write_flow
@@ -126,7 +127,7 @@ class _Preview(Film):
     """A film that shows, PREVIEW_FPS times a second, the first picture that is not earlier."""
 
     def __init__(self, path: Path, size: tuple[int, int]):
-        super().__init__(path, size, PREVIEW_FPS)
+        super().__init__(path, size, PREVIEW_FPS, tag_of("srgb"))
 
     def show(self, light: np.ndarray, t_ns: int) -> None:
         """Show the picture, if it is its turn."""

@@ -54,10 +54,14 @@ class CisSpec(  # the order of the bases, last to first, is the order of the fie
         """The same camera without noise, all rows of which see an instant, at a rate: what a network is to rebuild."""
         return CisSpec(**(self.model_dump() | NOISELESS | INSTANT | {"frame_rate_hz": frame_rate_hz}))
 
+    @property
+    def curve(self) -> str:
+        """The transfer curve of pictures of 8 bits."""
+        return "srgb" if self.gamma == "srgb" else f"gamma:{self.gamma}"
+
     def picture_codes(self) -> np.ndarray:
         """The code of 8 bits [uint8, 2**bits] of each code, by `gamma`."""
-        curve = parse_transfer("srgb" if self.gamma == "srgb" else f"gamma:{self.gamma}")
-        return np.rint(255 * curve.to_signal(np.arange(self.top + 1) / self.top)).astype(np.uint8)
+        return np.rint(255 * parse_transfer(self.curve).to_signal(np.arange(self.top + 1) / self.top)).astype(np.uint8)
 
     def effects(self) -> list[str]:
         """Names of the effects that these parameters switch on, in the order of the path of light."""

@@ -23,8 +23,10 @@ class CisTrack:
         self.cis = cis
         self.last_us = 0
         self._begun = False
-        rate_hz = cis.spec.frame_rate_hz
-        self._files = ExposureFiles(folder.partial / within, outputs.pictures, cis.spec.picture_codes(), rate_hz)
+        spec = cis.spec
+        self._files = ExposureFiles(
+            folder.partial / within, outputs.pictures, spec.picture_codes(), spec.curve, spec.frame_rate_hz
+        )
 
     def begin(self, frame: Frame) -> None:
         """The first frame; after `restore`, the last source frame before the checkpoint, which the sensor has seen."""
