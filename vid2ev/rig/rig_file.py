@@ -103,7 +103,9 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
-        raise UsageError(f"{path}: no such file; `vid2ev init rig.toml` writes a rig file to begin with") from error
+        raise UsageError(
+            f"{path}: no such file; give a calibration file, or a rig file, as `vid2ev init rig.toml` writes one"
+        ) from error
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: not UTF-8 text; give a rig file or a calibration file") from error
     except OSError as error:
