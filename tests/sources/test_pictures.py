@@ -204,6 +204,18 @@ def test_motion_jpeg_goes_by_its_name(tmp_path: Path) -> None:
     assert len(list(open_source(tmp_path / "a.mjpg", fps=10).frames())) == 5
 
 
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_motion_jpeg_with_exif_is_turned_as_its_pictures_are(tmp_path: Path, orientation: int) -> None:
+    """PyAV has no name for what FFmpeg says of EXIF, and for what is new in it."""
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(codes((16, 32))).save(tmp_path / "0.jpg", exif=exif)
+    (tmp_path / "a.mjpg").write_bytes((tmp_path / "0.jpg").read_bytes() * 2)
+    still, *_ = open_source(tmp_path, fps=10).frames()
+    moving, *_ = open_source(tmp_path / "a.mjpg", fps=10, transfer="srgb").frames()
+    assert moving.light == pytest.approx(still.light, abs=0.02)
+
+
 # ---------------------------------------------------------------------------------------------------------- OpenEXR
 
 

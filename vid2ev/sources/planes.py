@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -38,12 +39,22 @@ def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
     The matrix [a b; c d] takes a stored place (x, y) to the place shown (a x + c y, b x + d y); other angles than
     quarter turns are taken for the nearest.  Source: ISO/IEC 14496-12 section 6.2.2 and libavutil/display.h.
     """
-    for data in picture.side_data:
-        if data.type.name == "DISPLAYMATRIX":
-            a, b, _, c, d = np.frombuffer(data, np.int32)[:5].tolist()
-            transposed = abs(b) > abs(a)
-            return (True, c < 0, b < 0) if transposed else (False, a < 0, d < 0)
-    return False, False, False
+    a, b, c, d = _display_matrix(picture)
+    return (True, c < 0, b < 0) if abs(b) > abs(a) else (False, a < 0, d < 0)
+
+
+def _display_matrix(picture: Any) -> tuple[float, float, float, float]:
+    """a, b, c, d.  Beside data of kinds that PyAV has no name for, such as EXIF, it gives the turn alone, no mirror."""
+    try:
+        beside = list(picture.side_data)
+    except ValueError:
+        turn = math.radians(picture.rotation)
+        return math.cos(turn), -math.sin(turn), math.sin(turn), math.cos(turn)
+    matrix = next((data for data in beside if data.type.name == "DISPLAYMATRIX"), None)
+    if matrix is None:
+        return 1, 0, 0, 1
+    a, b, _, c, d = np.frombuffer(matrix, np.int32)[:5].tolist()
+    return a, b, c, d
 
 
 def upright(light: np.ndarray, orientation: tuple[bool, bool, bool]) -> np.ndarray:
