@@ -38,7 +38,7 @@ from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
 from vid2ev.sources.images import FRAMES
-from vid2ev.untrusted import first_line, json_of, read_arrays
+from vid2ev.untrusted import first_line, json_of, read_arrays, read_text
 
 Kind = Literal["mp4", "png", "exr"]
 PIECE = 128  # pictures
@@ -300,12 +300,23 @@ def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:
         if others := [name for name in held - ours if not (name[:-4].isdecimal() and name[-4:] in (".png", ".exr"))]:
             raise UsageError(f"{output} holds other files ({min(others)}); choose another folder with -o")
     begun = (output.with_name(f"{output.name}.partial") / "job.json").exists()
+    beside = manifest_of(output, kind)
+    if kind == "mp4" and beside.exists() and not (overwrite or _is_manifest(beside)):
+        raise UsageError(f"{beside} is to be the film's manifest, and is another file; choose another name with -o")
     if output.exists() and not (overwrite or resume):
         raise UsageError(f"{output} exists; --overwrite replaces it, -o chooses another place")
     if begun and not (overwrite or resume):
         raise UsageError(f"{output} was begun and not finished; --resume continues it, --overwrite starts again")
-    if output.exists() and resume and not overwrite and not begun and not manifest_of(output, kind).exists():
+    if output.exists() and resume and not overwrite and not begun and not beside.exists():
         raise DataError(f"{output} has no manifest to go on by; --overwrite replaces it")
+
+
+def _is_manifest(path: Path) -> bool:
+    """Whether a file says of a film what `Shelf.publish` writes of one."""
+    try:
+        return "film_rate" in json_of(read_text(path))
+    except (OSError, ValueError, TypeError, DataError):
+        return False
 
 
 def _rgb(codes: np.ndarray) -> np.ndarray:

@@ -255,6 +255,19 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_a_file_of_somebody_else_is_not_replaced_by_the_manifest_of_a_film(tmp_path: Path) -> None:
+    source, beside = images(tmp_path / "in", moving(2)), tmp_path / "clip.json"
+    for text in ('{"mine": 1}', "no JSON", "[]"):
+        beside.write_text(text)
+        for resume in (False, True):
+            with pytest.raises(UsageError, match=r"clip\.json is to be the film's manifest, and is another file"):
+                interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest", resume=resume)
+        assert beside.read_text() == text and len(list(tmp_path.iterdir())) == 2
+    interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest", overwrite=True)
+    (tmp_path / "clip.mp4").unlink()
+    interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest")  # (what is left of ours is no obstacle)
+
+
 def test_a_folder_is_called_by_its_source_and_the_multiple_whatever_dots_these_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
