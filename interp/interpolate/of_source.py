@@ -98,13 +98,11 @@ class OfSource:
 def _is_grey(about: dict[str, Any]) -> bool:
     if about.get("kind") == "images":
         from vid2ev.light.picture_files import read_picture
-        from vid2ev.light.recognise import PICTURE_SUFFIXES
+        from vid2ev.light.recognise import pictures_in
 
         path = Path(about["path"])
-        there = path.iterdir() if path.is_dir() else ()
-        pictures = [file for file in there if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != "."]
-        # (the first one in colour ends it)
-        return all(read_picture(file).pixels.ndim == 2 for file in pictures or [path])
+        pictures = pictures_in(path) if path.is_dir() else [path]
+        return all(read_picture(file).pixels.ndim == 2 for file in pictures)  # (the first one in colour ends it)
     return str(about.get("pixel_format", "")).startswith("gray")
 
 

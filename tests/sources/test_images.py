@@ -116,6 +116,7 @@ def test_float_tiff_is_light(tmp_path: Path) -> None:
 def test_other_files_in_the_folder_do_not_matter(tmp_path: Path) -> None:
     write(tmp_path, ["0.png"])
     (tmp_path / "notes.md").write_text("not an image")
+    (tmp_path / "of_others.png").mkdir()
     assert open_source(tmp_path, fps=1).frames_expected == 1
 
 

@@ -178,9 +178,9 @@ def _is_clip(path: Path) -> bool:
 
 def holds_pictures(folder: Path) -> bool:
     """Whether a folder has pictures in it."""
-    from vid2ev.light.recognise import PICTURE_SUFFIXES
+    from vid2ev.light.recognise import pictures_in
 
-    return any(path.suffix.lower() in PICTURE_SUFFIXES for path in folder.iterdir() if path.is_file())
+    return bool(pictures_in(folder))
 
 
 def is_list(path: Path) -> bool:

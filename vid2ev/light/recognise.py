@@ -63,7 +63,7 @@ def head_of(path: Path) -> bytes:
         with open(path, "rb") as file:
             return file.read(HEAD)
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+        raise DataError(f"{path}: cannot be read ({error.strerror}); leave it out, or get another copy") from error
 
 
 def _holds_arrays(path: Path) -> bool:
@@ -72,6 +72,12 @@ def _holds_arrays(path: Path) -> bool:
             return any(name.endswith(".npy") for name in archive.namelist())
     except (OSError, ValueError, RuntimeError, zipfile.BadZipFile):
         return path.suffix.lower() == ".npz"
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """The files of a folder that are named as pictures are and are not hidden, in natural order."""
+    named = [path for path in folder.iterdir() if path.suffix.lower() in PICTURE_SUFFIXES and path.name[0] != "."]
+    return sorted([path for path in named if not path.is_dir()], key=lambda path: natural(path.name))
 
 
 def natural(name: str) -> list[tuple[int, str]]:

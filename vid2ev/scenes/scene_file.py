@@ -132,9 +132,9 @@ def frozen(node: Any) -> Any:
 
 
 def _one_of(folder: Path, u: float, where: str) -> Path:
-    from vid2ev.light.recognise import PICTURE_SUFFIXES
+    from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 
-    found = sorted(file for file in folder.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != ".")
+    found = sorted(pictures_in(folder))
     if not found:
         raise UsageError(f"{where}: no pictures in {folder}; expected {', '.join(PICTURE_SUFFIXES)}")
     return found[int(u * len(found))]

@@ -21,7 +21,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
 from vid2ev.light.pictures import PictureReader, bits_of
 from vid2ev.light.png_tags import remarks_on_tags
-from vid2ev.light.recognise import PICTURE_SUFFIXES, natural
+from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
 from vid2ev.rig.lens_file import lens_in
@@ -180,5 +180,4 @@ def _places(path: Path) -> list[tuple[Path, int]]:
     """Where each image is: a file, and the page in it."""
     if not path.is_dir():
         return [(path, page) for page in range(pages_of(path))]
-    found = [file for file in path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES and file.name[0] != "."]
-    return [(file, 0) for file in sorted(found, key=lambda file: natural(file.name))]
+    return [(file, 0) for file in pictures_in(path)]
