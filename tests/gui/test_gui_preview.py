@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import subprocess
 import sys
 import time
@@ -13,13 +14,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
-from vid2ev.gui.light import Light, LightTable, _part_of_video, smaller
+from vid2ev.gui.light import Light, LightTable, _part_of_video, duration_s, smaller
 from vid2ev.gui.preview import VIEWS, Previewer, Request
 from vid2ev.gui.scene_edit import moved
 from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
@@ -180,6 +182,61 @@ def test_a_preview_shows_the_events_that_the_sensor_sends(previewer: Previewer, 
     assert len(course_chart(answer.course)["series"]) == 7
     assert statistics_rows({"dvs": shown.statistics})[3] == ["events", f"{len(events):,}"]
     assert interval_chart({"dvs": shown.statistics})["series"][0]["name"] == "dvs"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"start": 0.5, "stop": 0.6}, {"slowdown": 4.0, "start": 0.3}, {"crop": "32x24+10+8"}, {"fps": 50.0, "start": 0.5}],
+    ids=lambda options: ",".join(options),
+)
+def test_a_scene_is_seen_by_the_options_of_its_conversion(setup: Setup, options: dict[str, Any]) -> None:
+    for name, value in options.items():
+        setup = setup.with_option(name, value)
+    source = Recipe.of(SMALL, rig=setup.rig, **options).source
+    whole_s = duration_s(setup)
+    assert whole_s == pytest.approx(source.duration_expected_s, abs=0.012)
+    for start_s in (0.0, 9.0):
+        light = LightTable().light(setup, start_s, 0.02)
+        begin_ns, end_ns = light.instants[light.lead].t_ns, light.instants[-1].t_ns
+        first_ns = next(source.frames()).t_ns
+        assert first_ns - 12e6 <= begin_ns <= end_ns <= first_ns + 1e9 * whole_s
+        assert (begin_ns <= first_ns) == (start_s == 0.0) and light.sizes[0] == source.size
+    if "crop" in options:
+        own = LightTable().light(setup, 0.0, 0.02).instants[0].frames[0].light
+        assert own == pytest.approx(next(source.frames()).luminance, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"start": 5.0}, "start 5 s: nothing is left of the scene, which goes from 0 s to 2 s"),
+        ({"fps": 5.0, "start": 0.21, "stop": 0.39}, "fps 5: no picture of the scene from 0.21 s to 0.39 s"),
+        ({"motion": "pan"}, "motion 'pan' is for a photograph"),
+        ({"depth": "plane:2"}, "depth 'plane:2' of a scene, which knows its own"),
+        ({"seed": -3}, "seed -3: expected a whole number"),
+        ({"slowdown": 0.0}, "slowdown 0.0: expected a number"),
+        ({"crop": "32x24", "away": True}, "a rig sees all of a scene: leave --crop"),
+    ],
+)
+def test_options_that_a_scene_cannot_have_are_refused_before_its_conversion(
+    setup: Setup, options: dict[str, Any], why: str
+) -> None:
+    if options.pop("away", False):
+        setup = setup.with_camera_values(0, {"translation_mm": (30.0, 0.0, 0.0)})
+    for name, value in options.items():
+        setup = setup.with_option(name, value)
+    with pytest.raises(UsageError, match=re.escape(why)):
+        LightTable().light(setup, 0.0, 0.02)
+
+
+def test_a_photograph_in_motion_is_previewed(tmp_path: Path) -> None:
+    codes = np.random.default_rng(0).integers(0, 255, (60, 90, 3), np.uint8)
+    cv2.imwrite(str(tmp_path / "photo.png"), np.kron(codes, np.ones((8, 8, 1), np.uint8)))
+    setup = setup_of(str(tmp_path / "photo.png")).with_option("motion", "pan").with_option("size", "320x240")
+    light = LightTable().light(setup, 0.0, 0.02, side=40)
+    whole = next(iter(Recipe.of(setup.source, motion="pan", size="320x240").source.frames())).light
+    eighths = np.asarray(whole).reshape(30, 8, 40, 8).mean((1, 3))
+    assert light.instants[0].frames[0].light == pytest.approx(eighths, abs=1e-5) and len(light.instants) > 2
 
 
 def test_every_view_is_a_picture_and_the_slowest_exposure_is_in_it(previewer: Previewer, setup: Setup) -> None:

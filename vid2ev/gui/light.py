@@ -8,6 +8,7 @@ what lies between its frames is made as for a conversion.  The light is kept as 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -16,24 +17,24 @@ from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.gui.scene_light import Film, finer_than, grid_hz, ticks_of
+from vid2ev.gui.scene_part import ScenePart, scene_part
 from vid2ev.gui.setup import Setup
 from vid2ev.instants import Instant, instants
 from vid2ev.mounts import Loaded, Mount, mounts_of
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import ResolvedRig, Rig
 from vid2ev.scenes.scene import Scene
-from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.limits import check_seed
 from vid2ev.sight import taken_by
-from vid2ev.sources import open_source
-from vid2ev.sources.framing import framing_of
+from vid2ev.sources import OPTIONS, open_source
+from vid2ev.sources.framing import Framed, framing_of
 from vid2ev.sources.source import Source
 
 SIDE = 346  # px
 LONGEST_S = 0.25
 MARGIN = 1.02
-OF_SOURCE = ("crop", "size", "slowdown", "start", "stop", "fps")  # options of the source, which a conversion obeys
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,27 +92,27 @@ class LightTable:
         yield self._light.with_sensors(setup)
 
     def _of_scene(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
-        scene, sensors = setup.settled(), sensors_of(setup)
+        scene, sensors, part = setup.settled(), sensors_of(setup), scene_part(setup)
         world = _world(scene, side)
-        whole = setup.rig.resolved(scene.camera.size, scene.camera.intrinsics)
-        rig = _smaller_rig(whole, world.intrinsics, side)
-        begin_s = min(max(start_s, 0.0), max(scene.scene.duration_s - length_s, 0.0))
-        end_s = min(begin_s + length_s, scene.scene.duration_s)
+        lens = part.lens(scene.camera.intrinsics)
+        whole = setup.rig.resolved(lens.size, lens)
+        shown = lens.scaled_to(smaller(lens.size, side)) if part.framing else world.intrinsics
+        rig = _smaller_rig(whole, shown, side)
+        begin_s, end_s = _span_s(part, start_s, length_s)
         asked = self._film.rate_hz(world, begin_s, end_s, finer_than(world, rig))
-        fps = grid_hz(asked, end_s - begin_s)
+        fps = min(grid_hz(asked, end_s - begin_s), part.fps or math.inf)
         mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
         notes = _notes(mounts, _sizes(whole))
-        if asked > 1.5 * fps:
-            notes.append(f"the scene is rendered {fps} times a second here, where motion and light ask for {asked:.0f}")
-        if changed := [name for name in OF_SOURCE if name in setup.options]:
-            notes.append(f"the whole scene is shown here, without {' and '.join(changed)}")
+        if (asked := part.fps or asked) > 1.5 * fps:
+            notes.append(f"the scene is rendered {fps:g} times a second here, where {asked:.0f} are asked for")
         colour: Any = "rgb" if any(sensor.colour for sensor in sensors) else "luminance"
-        source: Any = SceneSource(world, "scene", fps=fps, colour=colour)
-        recipe = Recipe("scene", source, rig, mounts, upsample="none")
-        ticks = ticks_of(begin_s, end_s, fps)
-        for part in self._film.parts(world, mounts, ticks, fps):
-            lead = _lead(part, begin_s)
-            yield Light(recipe, part, lead, tuple(_sizes(whole)), tuple(notes), len(part) == len(ticks))
+        source = part.source(world, fps, colour, shown.size)
+        recipe = Recipe("scene", source, rig, mounts, setup.options.get("depth"), upsample="none")
+        recipe.check()
+        ticks = [k for k in ticks_of(begin_s, end_s, fps, part.begin_s) if not part.fps or part.has(k / fps)]
+        for seen in self._film.parts(world, mounts, ticks, fps, part.slower):
+            lead = _lead(seen, begin_s / part.slower)
+            yield Light(recipe, seen, lead, tuple(_sizes(whole)), tuple(notes), len(seen) == len(ticks))
 
     def _of_video(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
         recipe, sizes, begin_s = _part_of_video(setup, start_s, length_s, side)
@@ -128,7 +129,7 @@ class LightTable:
 def duration_s(setup: Setup) -> float | None:
     """How long a setup's source lasts, on the recording's clock; None if there is no telling.  Raises UsageError,
     DataError."""
-    return setup.settled().scene.duration_s if setup.is_scene else _opened(setup).duration_expected_s
+    return scene_part(setup).duration_s if setup.is_scene else _opened(setup).duration_expected_s
 
 
 def sensors_of(setup: Setup) -> list[Loaded]:
@@ -167,15 +168,21 @@ def _part_of_video(
     origin_s = _origin_s(setup.source, _opening(setup))
     begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))
     latest_s = slower * (begin_s + length_s + 1.5 * interval_s)
-    stretched = "" if "size" in options and not str(options["size"]).endswith("!") else "!"
+    shaped = "motion" in options or ("size" in options and not str(options["size"]).endswith("!"))
+    own = {"size": options["size"]} if "size" in options else {}
     options |= {
         "start": slower * max(begin_s - 1.5 * interval_s, origin_s),
         "stop": min(latest_s, options.get("stop") or latest_s),
-        "size": f"{width}x{height}{stretched}",
+        "size": f"{width}x{height}{'' if shaped else '!'}",
     }
     if source.size == (width, height) and "size" not in setup.options:
         options.pop("size")
     recipe = Recipe.of(setup.source, rig=rig, **options)
+    if "motion" in options:  # (which is told in pixels of the picture as it is converted)
+        edits = {name: options[name] for name in OPTIONS if name in options and name != "size"} | own
+        colour: Any = "rgb" if any(sensor.colour for sensor in sensors_of(setup)) else "luminance"
+        moving = open_source(setup.source, colour=colour, **edits)
+        recipe = replace(recipe, source=Framed(moving, None, f"{width}x{height}!"))
     return replace(recipe, mounts=_with_sensors(recipe.mounts, setup)), _sizes(whole), begin_s
 
 
@@ -215,8 +222,16 @@ def _interval_s(source: Source) -> float:
     return seconds / (frames - 1) if frames and frames > 1 and seconds else 1 / 30
 
 
+def _span_s(part: ScenePart, start_s: float, length_s: float) -> tuple[float, float]:
+    """What is shown of a part of a scene, on the scene's clock."""
+    latest_s = max(part.duration_s - length_s, 0.0)
+    begin_s = part.scene_s(min(max(start_s, 0.0), latest_s))
+    return begin_s, min(begin_s + part.slower * length_s, part.end_s)
+
+
 def _seed(setup: Setup) -> int:
-    return int(setup.options.get("seed", 0))
+    check_seed(seed := setup.options.get("seed", 0))
+    return seed
 
 
 def _threshold(setup: Setup) -> float:

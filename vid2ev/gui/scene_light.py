@@ -55,26 +55,28 @@ class Film:
         return max(self._rates[knot, finer] for knot in knots[::every])
 
     def parts(
-        self, world: World, mounts: Sequence[Mount], ticks: Sequence[int], fps: int
+        self, world: World, mounts: Sequence[Mount], ticks: Sequence[int], fps: float, slower: float = 1.0
     ) -> Iterator[tuple[Instant, ...]]:
-        """The instants k / fps of the `ticks` k, in the order of time: what there is after `ROUGH_S`, then all."""
+        """The instants k / fps of the `ticks` k, in the order of time: what there is after `ROUGH_S`, then all.  Their
+        times are divided by `slower`."""
         self._turn_to(world)
         began_s, seen, told = time.monotonic(), dict[int, Instant](), False
         for k in ticks:
-            seen[k] = self._instant(world, mounts, round(k * 10**9 / fps))
+            seen[k] = self._instant(world, mounts, round(k * 10**9 / fps), slower)
             late = time.monotonic() - began_s > ROUGH_S
             if late and not told and 3 <= len(seen) < len(ticks) - 1:
                 told = True
                 yield tuple(seen[each] for each in sorted(seen))
         yield tuple(seen[each] for each in sorted(seen))
 
-    def _instant(self, world: World, mounts: Sequence[Mount], t_ns: int) -> Instant:
+    def _instant(self, world: World, mounts: Sequence[Mount], t_ns: int, slower: float) -> Instant:
         views = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in mounts]
         coloured = {view for view, mount in zip(views, mounts, strict=True) if mount.sensor.colour}
         lights = [
             self._light(world, mount, (view, view in coloured, t_ns)) for view, mount in zip(views, mounts, strict=True)
         ]
-        return Instant(arriving(Frame(lights[0], t_ns), lights, mounts, None), t_ns)
+        slowed_ns = round(t_ns / slower)
+        return Instant(arriving(Frame(lights[0], slowed_ns), lights, mounts, None), slowed_ns)
 
     def _light(self, world: World, mount: Mount, key: tuple[Any, bool, int]) -> np.ndarray:
         view, coloured, t_ns = key
@@ -101,11 +103,12 @@ def grid_hz(asked_hz: float, length_s: float) -> int:
     return 2 ** max(0, round(math.log2(wanted)))
 
 
-def ticks_of(begin_s: float, end_s: float, fps: int) -> list[int]:
-    """The instants k / fps of a part: its ends first, those between ever closer, and among them the run-in."""
+def ticks_of(begin_s: float, end_s: float, fps: float, since_s: float = 0.0) -> list[int]:
+    """The instants k / fps of a part: its ends first, those between ever closer, and among them the run-in, of which
+    none is before `since_s`."""
     first, last = math.floor(begin_s * fps + 1e-9), math.ceil(end_s * fps - 1e-9)
     part = [first + k for k in coarse_first(last - first + 1)]
-    earliest = math.ceil(max(begin_s - RUN_IN_S, 0.0) * fps)
+    earliest = math.ceil(max(begin_s - RUN_IN_S, since_s) * fps)
     before = [k for k in range(earliest, first) if k % SPARSER == 0]
     return [*part[:ROUGH], *before, *part[ROUGH:]]
 

@@ -115,11 +115,7 @@ class Slowed(Edit):
 
     def __init__(self, source: Source, slowdown: float | Fraction):
         super().__init__(source)
-        if not math.isfinite(slowdown) or not FASTEST <= slowdown <= SLOWEST:
-            raise UsageError(
-                f"slowdown {slowdown}: expected a number from 1e-6 to 1000, such as 8 for 240 fps that play at 30"
-            )
-        self._slowdown = Fraction(str(slowdown))
+        self._slowdown = Fraction(str(slowdown_of(slowdown)))
 
     @property
     def duration_expected_s(self) -> float | None:
@@ -146,6 +142,15 @@ class Slowed(Edit):
     def slowed_ns(self, t_ns: int) -> int:
         """When what the source has at t_ns comes."""
         return round_ns(Fraction(t_ns, 10**9) / self._slowdown)
+
+
+def slowdown_of(slowdown: float | Fraction) -> float | Fraction:
+    """The same.  Raises UsageError for one that is not from 1e-6 to 1000."""
+    if not math.isfinite(slowdown) or not FASTEST <= slowdown <= SLOWEST:
+        raise UsageError(
+            f"slowdown {slowdown}: expected a number from 1e-6 to 1000, such as 8 for 240 fps that play at 30"
+        )
+    return slowdown
 
 
 def _instant(seconds: float | Fraction | None, name: str) -> Fraction | None:

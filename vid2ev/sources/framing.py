@@ -82,18 +82,11 @@ class Framed(Edit):
     def __init__(self, source: Source, crop: str | None, size: str | Sequence[int] | None):
         super().__init__(source)
         whole = (source.size[0], source.size[1])
-        self._box = crop_box(crop, whole) if crop else Box(Fraction(0), Fraction(0), *map(Fraction, whole))
-        self._size = (int(self._box.width), int(self._box.height))
+        self._box, self._size = _part(whole, crop, size)
         self._taps: tuple[Taps, Taps] | None = None
-        if size is not None:
-            width, height, stretched = parse_size(size, self._size)
-            self._size = (width, height)
-            self._box = self._box if stretched else of_shape(self._box, self._size)
-            if (self._box.width, self._box.height) == self._size:  # (whole pixels stay as they are)
-                self._box = Box(*(Fraction(math.floor(side)) for side in self._box))
-            else:
-                rows = taps_of(whole[1], self._box.y, self._box.height, height)
-                self._taps = rows, taps_of(whole[0], self._box.x, self._box.width, width)
+        if (self._box.width, self._box.height) != self._size:
+            rows = taps_of(whole[1], self._box.y, self._box.height, self._size[1])
+            self._taps = rows, taps_of(whole[0], self._box.x, self._box.width, self._size[0])
 
     @property
     def size(self) -> tuple[int, int]:
@@ -103,8 +96,7 @@ class Framed(Edit):
     @property
     def framing(self) -> Framing:
         """The part of the source's pictures that is taken."""
-        x, y, width, height = map(float, self._box)
-        return Framing((self.source.size[0], self.source.size[1]), (x, y), (width, height), self._size)
+        return _framing((self.source.size[0], self.source.size[1]), self._box, self._size)
 
     def edits(self) -> dict[str, Any]:
         """The part taken [px: x, y, width, height], and the size it is brought to."""
@@ -134,9 +126,32 @@ class Framed(Edit):
         return np.ascontiguousarray(pixels[y : y + height, x : x + width])
 
 
+def framing_for(whole: tuple[int, int], crop: str | None, size: str | Sequence[int] | None) -> Framing:
+    """How pictures of the size `whole` would be framed.  Raises UsageError."""
+    return _framing(whole, *_part(whole, crop, size))
+
+
 def framing_of(source: Source) -> Framing | None:
     """How the pictures of a source are framed; None if they are whole."""
     return source.framing if isinstance(source, Framed) else None
+
+
+def _part(whole: tuple[int, int], crop: str | None, size: str | Sequence[int] | None) -> tuple[Box, tuple[int, int]]:
+    """The part that is taken of pictures, and the size that it is brought to [px]."""
+    box = crop_box(crop, whole) if crop else Box(Fraction(0), Fraction(0), *map(Fraction, whole))
+    own = int(box.width), int(box.height)
+    if size is None:
+        return box, own
+    width, height, stretched = parse_size(size, own)
+    box = box if stretched else of_shape(box, (width, height))
+    if (box.width, box.height) == (width, height):  # (whole pixels stay as they are)
+        box = Box(*(Fraction(math.floor(side)) for side in box))
+    return box, (width, height)
+
+
+def _framing(whole: tuple[int, int], box: Box, size: tuple[int, int]) -> Framing:
+    x, y, width, height = map(float, box)
+    return Framing(whole, (x, y), (width, height), size)
 
 
 def _centres(begin: Fraction, extent: Fraction, outputs: int, length: int) -> tuple[np.ndarray, np.ndarray]:
