@@ -22,13 +22,13 @@ from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
 from vid2ev.gui.light import Light, LightTable, _part_of_video, duration_s, smaller
-from vid2ev.gui.preview import VIEWS, Previewer, Request
+from vid2ev.gui.preview import VIEWS, Answer, Previewer, Request
 from vid2ev.gui.scene_edit import moved
 from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
-from vid2ev.gui.worker import _serve
+from vid2ev.gui.worker import Refused, _serve
 from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
@@ -263,6 +263,16 @@ def test_videos_are_seen_from_where_the_cameras_are(previewer: Previewer) -> Non
     assert straight.cameras[0].statistics is not None and straight.cameras[0].statistics.events > 50
     with pytest.raises(UsageError, match="how far the scene is was not said; add --depth"):
         previewer.answer(Request(setup.with_camera_values(0, {"translation_mm": (30.0, 0.0, 0.0)}), 0.3, 0.02, side=80))
+
+
+def test_a_refusal_is_told_from_a_plan_that_is_not_there(setup: Setup) -> None:
+    session, told = Session(setup), list[tuple[str, bool]]()
+    session.on("status", lambda status: told.append((status, session.refused)))
+    for reply in (Refused(1, "no plan", answered=True), Refused(1, "no such file"), Refused(1, "no such file")):
+        session._take(reply)
+    session._take(Answer(1, (0.0, 0.1), 1.0, (), whole=False))
+    assert told == [("no plan", False), ("no such file", True), ("", False)]
+    session.close()
 
 
 def test_the_cost_of_accuracy_is_drawn_with_its_front() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shlex
 import shutil
 import socket
@@ -22,6 +23,7 @@ from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard
 from vid2ev.gui.loading import loaded
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
+from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
@@ -91,6 +93,41 @@ def test_a_value_that_cannot_be_is_refused_and_one_that_is_the_presets_is_no_cha
     other = setup.with_sensor_values(0, {"threshold_on": 0.2})
     assert other.rig.cameras[0].set == {"threshold_on": 0.2}
     assert other.with_sensor_values(0, {"threshold_on": 0.15}) == setup
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("", "no source is named; enter a video"),
+        ("nothing.mp4", "nothing.mp4: no such file or folder"),
+        ("n" * 400 + ".mp4", "n" * 30 + ".mp4: no such file or folder"),
+        ("-", "- passes once and cannot be looked at here and there; give a file"),
+        ("camera:0", "camera:0 passes once"),
+        ("scene:nope", "scene 'nope' is unknown"),
+        ("events.txt", "events.txt is an event file (rpg) already; `vid2ev render` shows it"),
+    ],
+)
+def test_a_source_that_is_none_is_refused_and_changes_nothing(
+    source: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("events.txt").write_text("# width 8 height 6\n1000 1 2 1\n2000 1 2 0\n")
+    session, heard = Session(setup_of(SMALL)), list[Any]()
+    session.on("setup", heard.append)
+    assert why in str(session.change(lambda: setup_of(source)))
+    assert session.setup == setup_of(SMALL) and not heard
+    session.close()
+
+
+def test_a_name_that_no_disk_takes_is_refused_in_a_sentence() -> None:
+    session = Session(setup_of(SMALL))
+
+    def too_long() -> Setup:
+        (Path("n" * 400)).read_text()
+        raise AssertionError
+
+    assert re.fullmatch(r"n+\.\.\.n+: File name too long; give another name", str(session.change(too_long)))
+    session.close()
 
 
 def test_files_that_are_saved_and_loaded_are_the_setup(tmp_path: Path) -> None:
@@ -185,6 +222,21 @@ def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pyte
     with socket.create_server(("127.0.0.1", 0)) as taken:
         refused = CliRunner().invoke(gui, [SMALL, "--port", str(taken.getsockname()[1])]).exception
     assert isinstance(refused, UsageError) and "give another --port, or 0" in str(refused)
+
+
+def test_what_lacks_an_option_is_served_and_what_cannot_be_read_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("nicegui", reason="the extra gui is not installed")
+    served: list[Setup] = []
+    monkeypatch.setattr("vid2ev.gui.page.serve", lambda setup, *_: served.append(setup))
+    cv2.imwrite(str(tmp_path / "photo.png"), np.full((8, 8, 3), 90, np.uint8))
+    (tmp_path / "torn.mp4").write_bytes(b"nothing that is a video")
+    for name in (tmp_path, tmp_path / "photo.png"):
+        assert CliRunner().invoke(gui, [str(name), "--port", "0"]).exit_code == 0
+    assert [setup.source for setup in served] == [str(tmp_path), str(tmp_path / "photo.png")]
+    refused = CliRunner().invoke(gui, [str(tmp_path / "torn.mp4")]).exception
+    assert isinstance(refused, DataError) and "not a video that can be read" in str(refused) and len(served) == 2
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     SOURCE is a video, a folder of images or a scene (scene:NAME), as for `vid2ev convert`; another can be opened on the
     page.  Needs the extra: pip install 'vid2ev[gui]'.
     """
+    from contextlib import suppress
     from importlib.util import find_spec
 
     from vid2ev.errors import UsageError
@@ -33,7 +34,8 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     from vid2ev.gui.setup import setup_of
 
     setup = setup_of(source, rig)
-    duration_s(setup)  # (what cannot be opened is refused at once)
+    with suppress(UsageError):  # (options that are entered on the page may put that right, such as times of images)
+        duration_s(setup)  # (what cannot be read is refused at once)
     port = free_port(host, port)
     click.echo(f"http://{'localhost' if host in ('127.0.0.1', '0.0.0.0') else host}:{port}  (Ctrl-C ends it)")
     serve(setup, host, port, browser)

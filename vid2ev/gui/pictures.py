@@ -36,7 +36,7 @@ class Pictures:
                 'data-key="time"'
             )
             self._said = ui.label("0.000 s").classes("v-muted").style("min-width: 110px; text-align: right")
-        self._status = ui.label().classes("v-muted v-status")
+        self._status = ui.label().classes("v-muted v-status").props("role=status")
         session.on("answer", self.show)
         session.on("status", self._told)
         self._playing = False
@@ -90,13 +90,26 @@ class Pictures:
             self._said.text = f"{event.value:.3f} s"
 
     def _played(self) -> None:
-        self._playing = not self._playing
-        self._play.props(f"icon={'pause' if self._playing else 'play_arrow'}")
         if self._playing:
-            self._session.look()
+            self._stop()
+            return
+        self._playing = True
+        self._play.props('icon=pause aria-label="pause"')
+        self._session.look()
+
+    def _stop(self) -> None:
+        self._playing = False
+        self._play.props('icon=play_arrow aria-label="play"')
 
     def _told(self, status: str) -> None:
         self._status.text = status
+        if self._session.refused:  # (pictures that are there are those of something else)
+            self._status.classes("v-bad", remove="v-muted")
+            self._grid.classes("v-stale")
+            self._stop()
+        else:
+            self._status.classes("v-muted", remove="v-bad")
+            self._grid.classes(remove="v-stale")
 
 
 def _cross(x: int, y: int) -> str:

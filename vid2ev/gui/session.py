@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import Vid2evError
+from vid2ev.errors import DataError, Vid2evError
 from vid2ev.gui.jobs import Done, Job, Progress
 from vid2ev.gui.preview import Answer, Plans, Request
 from vid2ev.gui.setup import Setup
@@ -36,7 +36,9 @@ class Session:
         self.answer: Answer | None = None
         self.plans: Plans | None = None
         self.status = ""
+        self.refused = False  # what was asked for last, for the reason that the status gives
         self.folder = Path(tempfile.mkdtemp(prefix="vid2ev-gui-"))
+        self._told = ("", False)
         self._worker: Worker | None = None
         self._heard: dict[str, list[Hear]] = {"setup": [], "answer": [], "plans": [], "status": []}
         self._changed_s: float | None = time.monotonic()
@@ -57,8 +59,10 @@ class Session:
         """Take up the setup that `make` makes; if that is refused, why."""
         try:
             setup = make()
-        except (Vid2evError, ValueError, OSError) as error:  # (of the last, names that no disk takes)
+        except (Vid2evError, ValueError) as error:
             return str(error)
+        except OSError as error:  # (a name that no disk takes)
+            return str(DataError(f"{error.filename}: {error.strerror}; give another name"))
         if setup != self.setup:
             self.look(setup=setup)
             self._say("setup", setup)
@@ -116,7 +120,7 @@ class Session:
 
     def _take(self, reply: Answer | Plans | Refused) -> None:
         if isinstance(reply, Answer):
-            self.answer, self._asked_s = reply, 0.0
+            self.answer, self._asked_s, self.refused = reply, 0.0, False
             self._say("answer", reply)
             self._tell("; ".join(reply.notes))
             if reply.whole:
@@ -125,12 +129,12 @@ class Session:
             self.plans = reply
             self._say("plans", reply)
         else:
-            self._asked_s = 0.0
+            self._asked_s, self.refused = 0.0, not reply.answered
             self._tell(reply.why)
 
     def _tell(self, status: str) -> None:
-        if status != self.status:
-            self.status = status
+        if (status, self.refused) != self._told:
+            self.status, self._told = status, (status, self.refused)
             self._say("status", status)
 
     def _say(self, what: str, value: Any) -> None:

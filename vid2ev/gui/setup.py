@@ -9,18 +9,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import UsageError
+from vid2ev.recipe import refuse_recordings
 from vid2ev.rig.camera import Camera, Rig, Source, default_rig
 from vid2ev.rig.rig_file import complaint, read_rig
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
 from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile, load, read_sensor
-from vid2ev.sources import SCENE_PREFIX, is_scene
+from vid2ev.sources import CAMERA_PREFIX, SCENE_PREFIX, STANDARD_INPUT, check_there, is_scene
 from vid2ev.toml_text import toml_value
 
 PRESET = "paper"  # of cameras that name no sensor
@@ -131,11 +133,23 @@ class Setup:
 
 def setup_of(source: str, rig: str | None = None) -> Setup:
     """The setup of a source, with the cameras of a rig file, or those that it has without one, with a frame camera
-    beside the event camera of the default.  Raises UsageError, DataError."""
-    if rig is not None:
-        return Setup(source, read_rig(rig), own_rig=False)
+    beside the event camera of the default.  Raises UsageError, DataError, for a source that is not there, too; that one
+    needs other options is not seen here."""
+    if not source:
+        raise UsageError("no source is named; enter a video, a folder of images, or a scene such as scene:room")
+    if source == STANDARD_INPUT or source.startswith(CAMERA_PREFIX):
+        raise UsageError(f"{source} passes once and cannot be looked at here and there; give a file")
+    check_there(source)
     named = rig_of_scene(source.removeprefix(SCENE_PREFIX)) if is_scene(source) else None
-    return Setup(source, read_rig(named) if named else default_rig(frames=True))
+    if rig is not None:
+        setup = Setup(source, read_rig(rig), own_rig=False)
+    else:
+        setup = Setup(source, read_rig(named) if named else default_rig(frames=True))
+    if setup.is_scene:
+        setup.settled()
+    else:
+        refuse_recordings(Path(source))
+    return setup
 
 
 def texts_of(changes: Mapping[str, Any], prefix: str = "") -> list[str]:

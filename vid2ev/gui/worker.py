@@ -24,10 +24,11 @@ CALM_S = 0.3  # after a preview, before its plan
 
 
 class Refused(NamedTuple):
-    """Why there is no answer, in a sentence."""
+    """Why there is no answer, in a sentence, or no plan of one that came (`answered`)."""
 
     number: int
     why: str
+    answered: bool = False
 
 
 Reply = Answer | Plans | Refused
@@ -124,7 +125,7 @@ class Planner(Thread):
             except Superseded:
                 pass
             except Exception as error:  # (the pictures are there, whatever happens to the plan)
-                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})"))
+                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})", answered=True))
 
 
 def _serve(pipe: Connection, newest: Any) -> None:

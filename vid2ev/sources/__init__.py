@@ -175,8 +175,14 @@ def is_scene(name: str) -> bool:
     return name.startswith(SCENE_PREFIX) or (name.endswith(".toml") and Path(name).is_file())
 
 
+def check_there(name: str) -> None:
+    """Raise UsageError for a source that is a file or a folder, and is not there."""
+    if not name.startswith((SYNTHETIC_PREFIX, SCENE_PREFIX, CAMERA_PREFIX)) and name != STANDARD_INPUT:
+        _existing(Path(name))
+
+
 def _existing(path: Path) -> Path:
-    if not path.exists():
+    if not os.path.exists(path):  # (Path.exists raises OSError for a name that is too long)
         raise UsageError(f"{path}: no such file or folder; give a video, a folder of images or a .npy array")
     return path
 
@@ -189,4 +195,4 @@ def short_name(name: str) -> str:
         if name.startswith(prefix):
             name = name.removeprefix(prefix).partition(",")[0]
     path = Path(os.path.abspath(name))
-    return path.name if path.is_dir() else path.stem
+    return path.name if os.path.isdir(path) else path.stem
