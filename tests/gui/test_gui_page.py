@@ -341,12 +341,24 @@ def test_files_are_loaded_and_the_command_is_copied(browser: Any, address: Any, 
         page.locator(".q-uploader input[type=file]").set_input_files(tmp_path / name)
         page.wait_for_selector(f'.q-notification:has-text("{said}")')
         page.wait_for_selector(".q-uploader", state="detached")  # (while the menu closes it takes no other file)
+    (tmp_path / "rig.toml").write_text(RIG.replace('"ideal"', '"own.toml"', 1))
+    (tmp_path / "own.toml").write_text("[dvs]\nthreshold_on = 0.44\n")
+    page.locator("button", has_text="Load").click()
+    page.locator(".q-uploader input[type=file]").set_input_files(tmp_path / "rig.toml")
+    page.wait_for_selector('.q-notification:has-text("give the path of rig.toml instead")')
+    page.wait_for_selector(".q-uploader", state="detached")
     shown = page.locator('[data-key="dvs.threshold_on"] .v-value input')
     wait_for(lambda: shown.input_value() == "0.33")
     expected = command(page)
     page.locator("button", has_text="Copy").click()
     wait_for(lambda: page.evaluate("navigator.clipboard.readText()") == expected)
-    assert "threshold_on=0.33" in expected and wrong == []
+    assert "threshold_on=0.33" in expected
+    page.locator("button", has_text="Load").click()
+    path = page.locator('input[data-key="path"], [data-key="path"] input').first
+    path.fill(str(tmp_path / "rig.toml"))
+    path.press("Enter")
+    wait_for(lambda: shown.input_value() == "0.44")
+    assert wrong == []
 
 
 def go_to(page: Any, source: str) -> None:
@@ -361,7 +373,7 @@ def go_to(page: Any, source: str) -> None:
 def replace_what_is_there(page: Any) -> None:
     """What other tests have recorded may be replaced."""
     page.locator(".v-right .q-tab", has_text="Record").click()
-    page.locator(".q-toggle", has_text="replace").click()
+    page.locator(".q-toggle", has_text="overwrite").click()
 
 
 def test_each_scene_becomes_a_recording_by_two_clicks(browser: Any, address: Any) -> None:

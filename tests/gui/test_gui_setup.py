@@ -21,7 +21,7 @@ from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard
-from vid2ev.gui.loading import loaded
+from vid2ev.gui.loading import loaded, loaded_from
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
@@ -143,6 +143,34 @@ def test_files_that_are_saved_and_loaded_are_the_setup(tmp_path: Path) -> None:
         loaded(setup, "[dvs", "bad.toml", tmp_path)
 
 
+def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(tmp_path: Path) -> None:
+    rig = '[[camera]]\nname = "own"\nkind = "dvs"\nsensor = "own.toml"\n'
+    scene = '[scene]\nduration_s = 0.1\n[[objects]]\nname = "wall"\nkind = "plane"\ntexture = "wall.png"\n'
+    (tmp_path / "own.toml").write_text("[dvs]\nthreshold_on = 0.44\n")
+    (tmp_path / "rig.toml").write_text(rig)
+    (tmp_path / "scene.toml").write_text(scene)
+    cv2.imwrite(str(tmp_path / "wall.png"), np.full((8, 8, 3), 90, np.uint8))
+    setup, sent = setup_of(SMALL), tmp_path / "sent"
+    assert loaded_from(setup, tmp_path / "rig.toml").spec(0).threshold_on == 0.44
+    assert loaded_from(setup, tmp_path / "own.toml").spec(0).threshold_on == 0.44
+    assert loaded_from(setup, tmp_path / "scene.toml").settled().objects[0].texture == str(tmp_path / "wall.png")
+    sent.mkdir()
+    for text, name, lacking in ((rig, "rig.toml", "own.toml"), (scene, "scene.toml", "wall.png")):
+        with pytest.raises(
+            UsageError, match=f"{lacking}.* a browser sends no other files along: give the path of"
+        ) as why:
+            loaded(setup, text, name, sent)
+        assert str(tmp_path) not in str(why.value) and str(why.value).endswith(f"{name} instead")
+    with pytest.raises(UsageError, match=r"missing.toml: no such file; give a TOML file of"):
+        loaded_from(setup, tmp_path / "missing.toml")
+
+
+@pytest.mark.parametrize("text", ["", "# words\n", "x = 1\n", "[about]\n"])
+def test_what_is_no_sensor_rig_or_scene_is_told_so(text: str, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"none.toml has none of the tables dvs, cis, .*; give a TOML file of a sensor"):
+        loaded(setup_of(SMALL), text, "none.toml", tmp_path)
+
+
 @pytest.mark.parametrize("name", scene_names())
 def test_things_of_each_scene_are_moved_by_as_much_as_was_asked(name: str) -> None:
     scene = read_scene(name).resolved(1)
@@ -211,6 +239,23 @@ def test_a_scene_is_saved_with_its_files_beside_it(tmp_path: Path) -> None:
     write_scene(turned, saved, overwrite=True)  # (whose files are where they are to be)
     codes = [int(cv2.imread(thing.texture)[0, 0, 0]) for thing in read_scene(saved).resolved().objects]
     assert codes == [200, 40]
+
+
+def test_a_scene_of_which_a_file_cannot_be_copied_leaves_nothing(tmp_path: Path) -> None:
+    own, here = tmp_path / "own", tmp_path / "here"
+    own.mkdir()
+    here.mkdir()
+    for name in ("first", "second"):
+        cv2.imwrite(str(own / f"{name}.png"), np.full((8, 8, 3), 90, np.uint8))
+    thing = '[[objects]]\nname = "{0}"\nkind = "plane"\ntexture = "{0}.png"\n'
+    (own / "own.toml").write_text("[scene]\nduration_s = 0.01\n" + thing.format("first") + thing.format("second"))
+    setup = setup_of(f"scene:{own / 'own.toml'}")
+    (own / "second.png").unlink()
+    with pytest.raises(DataError, match=r"scene.toml cannot be written: No such file or directory"):
+        write_scene(setup, here / "scene.toml")
+    assert [*here.iterdir()] == []
+    with pytest.raises(DataError, match="File name too long; choose another place"):
+        write_scene(setup, here / ("n" * 300 + ".toml"))
 
 
 def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,11 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from vid2ev.gui.setup import PRESET, Setup, texts_of
-from vid2ev.recording.disk import writing
+from vid2ev.recording.disk import sync, writing
 from vid2ev.rig.camera import Camera, Rig, default_rig
 from vid2ev.rig.rig_file import check_free, rig_text, write_text
 from vid2ev.scenes.own_files import copy_files, named_from, with_own_files
@@ -105,13 +106,22 @@ def scene_text(setup: Setup) -> str:
 def write_scene(setup: Setup, path: Path, overwrite: bool = False) -> None:
     """Write the file of a scene, and the files that it names beside it, but for those that are there or below already.
 
-    Raises UsageError where a file is in the way, DataError where the disk cannot take them.
+    All of them or none.  Raises UsageError where a file is in the way, DataError where the disk cannot take them.
     """
     tables, files = with_own_files(named_from(setup.settled().tables(), path.parent), _beside(path))
-    for place in (path, *(path.parent / name for name in files)):
-        check_free(place, overwrite)
     with writing(path, "choose another place"):
-        copy_files(files, path.parent)
+        for place in (path, *(path.parent / name for name in files)):
+            check_free(place, overwrite)
+        with TemporaryDirectory(dir=path.parent, prefix=f".{_beside(path)}.") as folder:
+            made = Path(folder)
+            copy_files(files, made)
+            copied = [file for file in made.rglob("*") if file.is_file()]
+            for file in copied:
+                sync(file)
+            for file in copied:
+                place = path.parent / file.relative_to(made)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(place)
     write_text(path, toml_text(tables), overwrite)
 
 

@@ -13,7 +13,7 @@ from vid2ev.conversion import default_directory
 from vid2ev.errors import Vid2evError
 from vid2ev.gui.command import RIG, SCENE, command_of, sensor_text, write_scene
 from vid2ev.gui.jobs import Done, Job, Progress
-from vid2ev.gui.loading import loaded
+from vid2ev.gui.loading import WANTED, loaded, loaded_from
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.tasks import converted
@@ -36,7 +36,7 @@ class Record:
             self._where = (
                 ui.input("Folder", on_change=lambda _: self.show()).props('dense data-key="output"').classes("grow")
             )
-            self._over = ui.switch("replace").props('dense title="replace a recording that is there"')
+            self._over = ui.switch("overwrite").props('dense title="replace a recording that is there"')
             self._go = ui.button("Convert", on_click=self.convert).props("unelevated dense")
             self._stop = ui.button("Cancel", on_click=self._cancelled).props("flat dense")
         self._bar = ui.linear_progress(value=0, show_value=False).props("rounded size=6px").classes("mt-3")
@@ -53,6 +53,8 @@ class Record:
             self._upload = ui.upload(
                 on_upload=self._uploaded, auto_upload=True, label="a sensor, rig or scene file"
             ).props('accept=".toml" flat data-key="load"')
+            self._path = ui.input("or its path, with the files beside it").classes("w-full px-3 pb-2")
+            self._path.props('dense data-key="path"').on("keydown.enter", self._named)
         with ui.button("Save").props("flat dense data-key=save"), ui.menu() as self._saves:
             self._offer()
         session.on("setup", lambda _: self._offer())
@@ -60,16 +62,18 @@ class Record:
 
     def _offer(self) -> None:
         """What can be saved: a file for each camera's sensor, and those of the rig and the scene."""
-        names = [camera.name for camera in self._session.setup.rig.cameras]
+        setup = self._session.setup
+        names = [*(f"sensor of {camera.name}" for camera in setup.rig.cameras), "rig", *["scene"] * setup.is_scene]
         if names == self._offered:
             return
         self._offered = names
         self._saves.clear()
         with self._saves:
-            for number, name in enumerate(names):
-                ui.menu_item(f"sensor of {name}", partial(self._save_sensor, number))
+            for number, camera in enumerate(setup.rig.cameras):
+                ui.menu_item(f"sensor of {camera.name}", partial(self._save_sensor, number))
             ui.menu_item("rig", lambda: self._save(RIG, _write_rig))
-            ui.menu_item("scene", lambda: self._save(SCENE, write_scene))
+            if setup.is_scene:
+                ui.menu_item("scene", lambda: self._save(SCENE, write_scene))
 
     def _save_sensor(self, number: int) -> None:
         self._save(f"{self._name(number)}.toml", partial(_write_sensor, number))
@@ -137,16 +141,24 @@ class Record:
 
     async def _uploaded(self, event: Any) -> None:
         name = event.file.name
-        self._menu.close()
         self._upload.reset()
         try:
-            text = (await event.file.read()).decode()
+            text = (await event.file.read()).decode("utf-8-sig")
         except UnicodeDecodeError:
-            why: str | None = f"{name} is not a text; give a TOML file of a sensor, a rig or a scene"
+            self._loaded(name, f"{name} is not a text; give {WANTED}")
         else:
-            why = self._session.change(lambda: loaded(self._session.setup, text, name, self._session.folder))
-        if why:
-            ui.notify(why, type="negative", multi_line=True, timeout=0, close_button=True)
+            session = self._session
+            self._loaded(name, session.change(lambda: loaded(session.setup, text, name, session.folder)))
+
+    def _named(self) -> None:
+        path = Path(self._path.value.strip())
+        self._loaded(str(path), self._session.change(lambda: loaded_from(self._session.setup, path)))
+
+    def _loaded(self, name: str, why_not: str | None) -> None:
+        """Say that a file is loaded, or why not."""
+        self._menu.close()
+        if why_not:
+            ui.notify(why_not, type="negative", multi_line=True, timeout=0, close_button=True)
         else:
             ui.notify(f"{name} is loaded", position="bottom-right")
 
@@ -154,15 +166,8 @@ class Record:
         return f"{self._session.setup.rig.cameras[camera].name}_sensor"
 
     def _save(self, name: str, write: Callable[[Setup, Path, bool], None]) -> None:
-        """Have `write` save something of the setup at a place, where it may replace a file or not."""
+        """Ask for the place, where a file may be replaced or not, and have `write` save some of the setup there."""
         setup = self._session.setup
-        if name == SCENE and not setup.is_scene:
-            ui.notify("a video has no scene to save", position="bottom-right")
-            return
-        self._ask_where(name, setup, write)
-
-    def _ask_where(self, name: str, setup: Setup, write: Callable[[Setup, Path, bool], None]) -> None:
-        """Ask for the place, then write the file, or say why not."""
 
         def save() -> None:
             try:
@@ -174,8 +179,8 @@ class Record:
             ui.notify(f"{where.value} is written", position="bottom-right")
 
         with ui.dialog(value=True) as dialog, ui.card().classes("v-card"):
-            where = ui.input("File", value=name).classes("w-80")
-            over = ui.switch("replace").props("dense")
+            where = ui.input("File", value=name).classes("w-80").on("keydown.enter", save)
+            over = ui.switch("overwrite").props("dense")
             why = ui.label().classes("v-error")
             with ui.row():
                 ui.button("Save", on_click=save).props("unelevated dense")

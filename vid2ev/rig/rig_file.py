@@ -81,9 +81,10 @@ def rig_text(rig: Rig, folder: Path = Path()) -> str:
 def write_text(path: Path, text: str, overwrite: bool = False) -> None:
     """A text file, as a whole or not at all.  Raises UsageError where one is in the way, DataError where the disk
     cannot take it."""
-    check_free(path, overwrite)
-    with writing(path, "choose another place"), whole_file(path) as file:
-        file.write(text.encode())
+    with writing(path, "choose another place"):
+        check_free(path, overwrite)
+        with whole_file(path) as file:
+            file.write(text.encode())
 
 
 def check_free(path: Path, overwrite: bool) -> None:
