@@ -28,7 +28,7 @@ from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
-from vid2ev.gui.worker import Refused, _serve
+from vid2ev.gui.worker import Refused, Worker, _serve
 from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
@@ -270,9 +270,23 @@ def test_a_refusal_is_told_from_a_plan_that_is_not_there(setup: Setup) -> None:
     session.on("status", lambda status: told.append((status, session.refused)))
     for reply in (Refused(1, "no plan", answered=True), Refused(1, "no such file"), Refused(1, "no such file")):
         session._take(reply)
-    session._take(Answer(1, (0.0, 0.1), 1.0, (), whole=False))
+    session._take(Answer(1, 0.0, (0.0, 0.1), 1.0, (), whole=False))
     assert told == [("no plan", False), ("no such file", True), ("", False)]
     session.close()
+
+
+def test_pictures_come_while_a_slider_moves(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vid2ev.gui.worker.PATIENCE_S", 60.0)
+    worker, seen = Worker(), list[int]()
+    for number in range(1, 2000):
+        moved_on = setup.with_sensor_values(0, {"threshold_on": 0.2 + 1e-4 * number})
+        worker.ask(Request(moved_on, 0.5, 0.005, number=number, side=32))
+        seen += [reply.number for reply in worker.replies() if isinstance(reply, Answer)]
+        if len(seen) > 2:
+            break
+        time.sleep(0.03)
+    worker.close()
+    assert sorted(seen) == seen and 1 < seen[-1] < number < 1999
 
 
 def test_the_cost_of_accuracy_is_drawn_with_its_front() -> None:

@@ -56,7 +56,7 @@ class Pictures:
         self._time.value = self._session.request.start_s
         self._said.text = f"{self._session.request.start_s:.3f} of {lasting_s:.3g} s"
         self._showing = False
-        if self._playing and answer.number == self._session.request.number:
+        if self._playing and answer.start_s == self._session.request.start_s:
             later_s = self._session.request.start_s + self._session.request.length_s
             self._session.look(start_s=0.0 if later_s >= lasting_s else round(later_s, 3))
 

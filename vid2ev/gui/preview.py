@@ -69,10 +69,11 @@ class Shown:
 
 @dataclass(frozen=True)
 class Answer:
-    """A preview; `course` is that of the pixel, `duration_s` how long the whole source lasts.  One that is not `whole`
-    is made of fewer instants than it will be."""
+    """A preview; `start_s` is what was asked for, `course` that of the pixel, `duration_s` how long the whole source
+    lasts.  One that is not `whole` is made of fewer instants than it will be."""
 
     number: int
+    start_s: float
     span_s: tuple[float, float]
     duration_s: float | None
     cameras: tuple[Shown, ...]
@@ -144,6 +145,7 @@ class Previewer:
         ends = light.instants[light.lead].t_ns, light.instants[-1].t_ns
         return Answer(
             request.number,
+            request.start_s,
             (1e-9 * ends[0], 1e-9 * ends[1]),
             duration_s(request.setup),
             tuple(cameras),

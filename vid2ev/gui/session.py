@@ -16,7 +16,7 @@ from vid2ev.gui.setup import Setup
 from vid2ev.gui.warming import Warming
 from vid2ev.gui.worker import Refused, Worker
 
-DEBOUNCE_S = 0.06  # without a change, before a preview is asked for
+GATHER_S = 0.06  # changes, before a preview is asked for
 SLOW_S = 1.5  # after which a page says that it waits
 
 Hear = Callable[[Any], None]
@@ -71,7 +71,7 @@ class Session:
     def look(self, **what: Any) -> None:
         """Ask for another preview: other fields of the request."""
         self.request = replace(self.request, number=self.request.number + 1, **what)
-        self._changed_s = time.monotonic()
+        self._changed_s = self._changed_s or time.monotonic()
 
     @property
     def waiting(self) -> bool:
@@ -81,7 +81,7 @@ class Session:
     def tick(self) -> None:
         """Send what was asked for, hand on what came."""
         now_s = time.monotonic()
-        if self._changed_s is not None and now_s - self._changed_s >= DEBOUNCE_S:
+        if self._changed_s is not None and now_s - self._changed_s >= GATHER_S:
             self._changed_s, self._asked_s = None, now_s
             if self._worker is None or not self._worker.alive:
                 self._worker = Worker()

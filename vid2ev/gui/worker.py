@@ -1,4 +1,5 @@
-"""A process that makes previews for one page: it answers the newest request, and what was asked before is given up.
+"""A process that makes previews for one page: it answers the newest request, and what was asked before is given up, but
+for what is about to be seen: while a slider moves there would be nothing.
 
 It ends with the page, or with the program: its pipe then closes.  What is compiled or rendered there never holds up the
 page.
@@ -21,6 +22,7 @@ from vid2ev.gui.light import Light
 from vid2ev.gui.preview import Answer, Plans, Previewer, Request, plans_of
 
 CALM_S = 0.3  # after a preview, before its plan
+PATIENCE_S = 1.0  # that a preview has for its first picture when something newer is asked for
 
 
 class Refused(NamedTuple):
@@ -50,13 +52,15 @@ class Worker:
         theirs.close()
         self._waiting: Request | None = None
         self._asked = 0
+        self._asked_s = 0.0
+        self._answered = False
         self.busy = False
 
     def ask(self, request: Request) -> None:
         """Ask for a preview, in place of what was asked before."""
         self._waiting = request
-        self._newest.value = request.number
         self._send()
+        self._hurry()
 
     def replies(self) -> Iterator[Reply]:
         """What has come since the last call; Refused if the process has ended."""
@@ -67,7 +71,9 @@ class Worker:
                     self.busy = False
                     self._send()
                 elif reply.number >= self._asked:
+                    self._answered |= isinstance(reply, Answer)
                     yield reply
+            self._hurry()
         except (EOFError, OSError):
             if self.busy:
                 self.busy = False
@@ -90,11 +96,17 @@ class Worker:
     def _send(self) -> None:
         if self._waiting is not None and not self.busy:
             request, self._waiting = self._waiting, None
-            self._asked, self.busy = request.number, True
+            self._asked, self._asked_s, self._answered, self.busy = request.number, time.monotonic(), False, True
+            self._newest.value = request.number
             try:
                 self._pipe.send(request)
             except OSError:
                 return
+
+    def _hurry(self) -> None:
+        """Have what is at work given up for what waits, once it was seen or has had its time."""
+        if self._waiting is not None and (self._answered or time.monotonic() - self._asked_s > PATIENCE_S):
+            self._newest.value = self._waiting.number
 
 
 class Planner(Thread):
