@@ -62,7 +62,7 @@ def course_chart(course: Course | None) -> dict[str, Any]:
         "axisPointer": {"link": [{"xAxisIndex": "all"}]},
         "xAxis": [
             _axis("", gridIndex=0, axisLabel={"show": False}, max=float(t_ms[-1])),
-            _axis("time [ms]", gridIndex=1, max=float(t_ms[-1])),
+            _axis("time [ms]", gridIndex=1, max=float(t_ms[-1]), axisLabel=TEXT | {"showMaxLabel": False}),
         ],
         "yAxis": [_axis("light", True, gridIndex=0, splitNumber=2), _axis("log light [nat]", True, gridIndex=1)],
         "series": series,

@@ -36,7 +36,7 @@ def draw(setup: Setup, warming: Warming) -> Session:
         source = ui.label(setup.source).classes("v-source")
         files = ui.row().classes("gap-2")
         turn = ui.button(icon="contrast", on_click=turn_over)
-        turn.props('flat dense round title="light or dark"')
+        turn.props('flat dense round title="light or dark" aria-label="light or dark"')
     with ui.element("div").classes("v-main"):
         with ui.element("div").classes("v-card v-side"):
             settings = Settings(session)
@@ -76,7 +76,7 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
         session.on("setup", lambda changed: kept.update(setup=changed))
 
     app.add_middleware(Guard, host=host)
-    where: dict[str, Any] = {"host": host, "port": port, "show": show}
+    where: dict[str, Any] = {"host": host, "port": port, "show": show, "language": "en-US"}
     ui.run(title="vid2ev", reload=False, show_welcome_message=False, reconnect_timeout=GONE_S, **where)
 
 

@@ -72,15 +72,24 @@ class Row:
             span = reach(control, [*board.seen(control.key), board.value(control.key)])
             if span:
                 low, high, step = span
-                self._slider = ui.slider(min=low, max=high, step=step, on_change=self._slid).props("dense")
+                self._slider = ui.slider(min=low, max=high, step=step, on_change=self._slid)
+                self._slider.props(f'dense aria-label="{self._called}"')
                 self._slider.classes("v-slider")
             with ui.element("div").classes("v-value" if span else "v-value v-wide"):
                 self._fields = self._drawn()
+                for k, field in enumerate(self._fields):
+                    place = f", {k + 1} of {len(self._fields)}" if len(self._fields) > 1 else ""
+                    field.props(f'aria-label="{self._called}{place}"')
             self._back = ui.button(icon="undo", on_click=self.reset).classes("v-reset")
-            self._back.props('flat dense round size=xs title="reset"')
-            self._error = ui.label().classes("v-error")
+            self._back.props(f'flat dense round size=xs title="reset" aria-label="reset {control.label}"')
+            self._error = ui.label().classes("v-error").props("role=status")
         label.props["title"] = self._help()
         self.show()
+
+    @property
+    def _called(self) -> str:
+        """What one who hears the page is told."""
+        return self.control.label + (f" [{self.control.unit}]" if self.control.unit else "")
 
     def show(self) -> None:
         """Show the value in use; what was entered and refused stays, with its reason."""

@@ -12,6 +12,7 @@ from vid2ev.gui.session import Session
 
 WINDOWS_MS = {"5 ms": 0.005, "10 ms": 0.01, "30 ms": 0.03, "100 ms": 0.1}
 STEP_S = 0.001  # of the line of time
+WIDEST_PX = 720  # is a picture on the page
 
 
 class Pictures:
@@ -20,7 +21,7 @@ class Pictures:
     def __init__(self, session: Session):
         self._session = session
         self._cards: list[tuple[Any, Any, Any]] = []
-        self._showing = False
+        self._showing = self._playing = False
         with ui.element("div").classes("v-line"):
             ui.toggle([*VIEWS], value="polarity", on_change=lambda e: session.look(view=e.value)).props(
                 "dense flat no-caps"
@@ -31,15 +32,15 @@ class Pictures:
             ).props('dense flat no-caps title="how long events are gathered; longer where an exposure takes longer"')
         self._grid = ui.element("div").classes("v-pictures mt-3")
         with ui.element("div").classes("v-line mt-2").style("flex-wrap: nowrap"):
-            self._play = ui.button(icon="play_arrow", on_click=self._played).props("flat round dense").mark("play")
+            self._play = ui.button(on_click=self._played).props("flat round dense").mark("play")
             self._time = ui.slider(min=0, max=1, step=STEP_S, value=0, on_change=self._scrubbed).props(
-                'data-key="time"'
+                'data-key="time" aria-label="time [s]"'
             )
-            self._said = ui.label("0.000 s").classes("v-muted").style("min-width: 110px; text-align: right")
+            self._said = ui.label("0.000 s").classes("v-muted").style("min-width: 130px; text-align: right")
         self._status = ui.label().classes("v-muted v-status").props("role=status")
         session.on("answer", self.show)
         session.on("status", self._told)
-        self._playing = False
+        self._stop()
 
     def show(self, answer: Answer) -> None:
         """Show a preview, and while it plays ask for the next."""
@@ -51,10 +52,9 @@ class Pictures:
         self._marked()
         self._showing = True
         lasting_s = answer.duration_s or answer.span_s[1]
-        self._time.props(f"max={max(lasting_s, STEP_S):.3f}")
         self._time.props["max"] = max(lasting_s, STEP_S)
         self._time.value = self._session.request.start_s
-        self._said.text = f"{self._session.request.start_s:.3f} of {lasting_s:.3g} s"
+        self._said.text = f"{self._session.request.start_s:.3f} of {_lasting(lasting_s)} s"
         self._showing = False
         if self._playing and answer.start_s == self._session.request.start_s:
             later_s = self._session.request.start_s + self._session.request.length_s
@@ -62,6 +62,7 @@ class Pictures:
 
     def _make(self, answer: Answer) -> None:
         self._grid.clear()
+        self._grid.style(f"max-width: {len(answer.cameras) * WIDEST_PX}px")
         self._cards = []
         with self._grid:
             for number, shown in enumerate(answer.cameras):
@@ -70,7 +71,7 @@ class Pictures:
                         ui.label(shown.name).classes("text-sm font-medium")
                         caption = ui.label().classes("v-muted")
                     image = ui.interactive_image(on_mouse=lambda e, k=number: self._clicked(k, e), cross=False)
-                    image.props(f'data-camera="{shown.name}"').classes("mt-1")
+                    image.props(f'data-camera="{shown.name}" role=img aria-label="{shown.name}"').classes("mt-1")
                     self._cards.append((image, caption, shown.kind))
 
     def _clicked(self, camera: int, event: Any) -> None:
@@ -110,6 +111,10 @@ class Pictures:
         else:
             self._status.classes("v-muted", remove="v-bad")
             self._grid.classes(remove="v-stale")
+
+
+def _lasting(seconds: float) -> str:
+    return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:.3g}"
 
 
 def _cross(x: int, y: int) -> str:

@@ -77,7 +77,9 @@ class Settings:
         with ui.element("div").classes("v-line").style("flex-wrap: nowrap"):
             entered = self._entered = ui.input(value=session.setup.source, placeholder="clip.mp4, scene:room,seed=3")
             entered.classes("grow").props("dense")
-            entered.props('data-key="source"').on("keydown.enter", lambda: self._open(entered.value))
+            entered.props('data-key="source" aria-label="source"').on(
+                "keydown.enter", lambda: self._open(entered.value)
+            )
             ui.button("Open", on_click=lambda: self._open(entered.value)).props("flat dense")
         self._why = ui.label().classes("v-error")
         ui.label("Options").classes("v-group")
@@ -119,7 +121,9 @@ class Settings:
             ui.select(
                 presets, value=setup.preset(number),
                 on_change=lambda e: self._session.change(lambda: self._session.setup.with_preset(number, e.value)),
-            ).props(f'dense options-dense title="preset" data-preset="{names[number]}"')  # fmt: skip
+            ).props(
+                f'dense options-dense title="preset" aria-label="preset" data-preset="{names[number]}"'
+            )  # fmt: skip
         ui.label(str(setup.sensor(number).about.get("title", ""))).classes("v-muted mt-1")
         board = SensorBoard(self._session, number)
         panel = Panel(names[number], board.controls, board, grouped=True)
@@ -152,7 +156,7 @@ class Settings:
         names = [thing.name for thing in things_of(setup.settled())]
         self._part = self._part if self._part in names else "scene"
         ui.select(names, value=self._part, on_change=lambda e: self._turn_to(part=e.value)).props(
-            'dense options-dense data-key="part"'
+            'dense options-dense data-key="part" aria-label="part of the scene"'
         ).classes("w-full")
         board = SceneBoard(self._session, self._part)
         panel = Panel(self._part, board.controls, board)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 ACCENT = "#3b72d9"
 ON, OFF = "#e0982f", "#5a8ff0"
-MUTED = "#8a92a0"
+MUTED = "#76808f"
 BAD = "#b3372b"
 
 CSS = """
@@ -27,7 +27,8 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-side { max-height: calc(100vh - 90px); overflow-y: auto; overflow-x: hidden; }
 .v-right { display: flex; flex-direction: column; gap: 16px; min-width: 0; }
 .v-pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)); gap: 16px; }
-.v-camera { min-width: 0; max-width: 560px; }
+.v-camera { min-width: 0; } .v-camera .v-line { flex-wrap: nowrap; }
+.v-camera .v-muted { white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }
 .v-camera img { image-rendering: pixelated; width: 100%; border-radius: 4px; display: block; }
 .v-line { display: flex; align-items: center; gap: 12px; flex-wrap: wrap; width: 100%; }
 .v-group { color: var(--muted); font-size: 11px; text-transform: uppercase; letter-spacing: .8px; margin: 14px 0 2px; }
@@ -65,12 +66,15 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-scroll { overflow-x: auto; width: 100%; } .v-scroll .v-table { min-width: 560px; }
 .q-tab { min-height: 36px; padding: 0 12px; text-transform: none; } .q-tab__label { font-size: 13px; }
 .q-tab-panels { background: transparent !important; } .q-tab-panel { padding: 12px 0 0; }
+.body--dark .text-primary { --q-primary: var(--accent); }
+.q-btn:focus-visible, .q-tab:focus-visible, .q-toggle:focus-visible, .q-slider__track-container:focus-visible {
+  box-shadow: 0 0 0 2px var(--accent); border-radius: 4px; }
 .q-btn { text-transform: none; font-weight: 500; } .q-btn--dense.q-btn--rectangle { padding: 2px 10px; }
 .v-line .q-select { font-size: 13px; } .v-line .q-select .q-field__control { min-height: 30px; height: 30px; }
 @media (max-width: 900px) {
   .v-main { grid-template-columns: minmax(0, 1fr); padding: 12px; gap: 12px; } .v-right { order: -1; }
   .v-side { max-height: none; } .v-top { padding: 8px 12px; gap: 4px; }
   .v-top .q-btn--dense.q-btn--rectangle { padding: 2px 6px; }
-  .v-source { min-width: 40px; margin-left: 8px; } .v-camera { max-width: none; }
+  .v-source { min-width: 40px; margin-left: 8px; }
 }
 """
