@@ -324,6 +324,10 @@ def test_things_lamps_and_cameras_are_moved_in_the_3d_view(browser: Any, address
     page.locator(".v-side .q-tab", has_text="Scene").click()
     page.locator("button", has_text="Whole scene as it was").click()
     there = pytest.approx(before[lamp]["own"], abs=1e-6)
+    page.locator('[data-key="time"]').click()  # (in its middle)
+    wait_for(
+        lambda: place_of_things(page)["cameras.dvs"]["own"] != after["cameras.dvs"]["own"]
+    )  # (it is carried about)
     wait_for(lambda: place_of_things(page).get(lamp, {"own": None})["own"] == there)
     assert page.locator(".v-status").inner_text().count("failed") == 0 and wrong == []
 
@@ -374,6 +378,73 @@ def replace_what_is_there(page: Any) -> None:
     """What other tests have recorded may be replaced."""
     page.locator(".v-right .q-tab", has_text="Record").click()
     page.locator(".q-toggle", has_text="overwrite").click()
+
+
+NAMELESS = re.compile(
+    r"^\s*- ((?:button|slider|spinbutton|textbox|combobox|switch|tab)(?:: .*|:| \[.*|))$", re.MULTILINE
+)
+
+
+@pytest.mark.parametrize("width", [390, 800, 2560])
+def test_each_control_has_a_name_and_a_visible_focus_in_windows_of_any_width(
+    browser: Any, address: Any, width: int
+) -> None:
+    page, wrong = opened(browser, address, color_scheme="dark")
+    page.set_viewport_size({"width": width, "height": 900})
+    page.wait_for_selector('[data-camera="dvs"] img[src^=data]')
+    assert page.evaluate("document.documentElement.lang") == "en-US"
+    for side, tabs in ((".v-side", "Source Camera Scene Sensor"), (".v-right", "Plan World Cost Compare Record Pixel")):
+        for tab in tabs.split():
+            page.locator(f"{side} .q-tab", has_text=tab).click()
+            page.wait_for_selector(f'{side} .q-tab--active:has-text("{tab}")')
+            assert NAMELESS.findall(page.locator("body").aria_snapshot()) == []
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.locator('[data-key="dvs.threshold_on"] .v-value input').focus()
+    page.keyboard.press("Shift+Tab")
+    assert page.evaluate("document.activeElement.matches('.q-slider__track-container')")
+    assert page.evaluate("getComputedStyle(document.activeElement).boxShadow") != "none" and wrong == []
+
+
+def test_a_source_that_cannot_be_seen_fades_the_pictures_of_the_one_before(
+    browser: Any, address: Any, tmp_path: Path
+) -> None:
+    page, wrong = opened(browser, address)
+    page.wait_for_selector('[data-camera="dvs"] img[src^=data]')
+    page.locator(".v-side .q-tab", has_text="Source").click()
+    entry = page.locator('input[data-key="source"], [data-key="source"] input').first
+    for name in ("nothing.mp4", ""):
+        entry.fill(name)
+        entry.press("Enter")
+        page.wait_for_selector(f'.v-side .v-error:has-text("{name}: no such file" )' if name else
+                               '.v-side .v-error:has-text("no source is named")')  # fmt: skip
+        assert page.locator(".v-source").inner_text() == SCENE and page.locator(".v-stale").count() == 0
+    go_to(page, str(tmp_path))  # (a folder without images)
+    page.wait_for_selector('.v-stale [data-camera="dvs"]')
+    assert "no images in this folder" in page.locator(".v-status.v-bad").inner_text()
+    go_to(page, SCENE)
+    page.wait_for_selector(".v-stale", state="detached")
+    assert page.locator(".v-bad").count() == 0 and wrong == []
+
+
+def test_it_plays_while_a_slider_moves(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    page.wait_for_selector('[data-camera="dvs"] img[src^=data]')
+    said = page.locator(".v-right .v-line .v-muted", has_text=re.compile(r"^\d\.\d+ of"))
+    track = page.locator('[data-key="dvs.threshold_on"] .q-slider').bounding_box()
+    page.locator('[aria-label="play"]').click()
+    x, y = track["x"], track["y"] + track["height"] / 2
+    page.mouse.move(x + 20, y)
+    page.mouse.down()
+    seen: set[str] = set()
+    for k in range(2000):
+        page.mouse.move(x + 20 + k % 40, y)
+        page.wait_for_timeout(30)
+        seen.add(said.inner_text())
+        if len(seen) > 3:
+            break
+    page.mouse.up()
+    page.locator('[aria-label="pause"]').click()
+    assert len(seen) > 3 and wrong == []
 
 
 def test_each_scene_becomes_a_recording_by_two_clicks(browser: Any, address: Any) -> None:

@@ -78,6 +78,8 @@ class Results:
             self._course.set_visibility(True)
             self._course.update()
         self._compared()
+        if self._stage is not None:
+            self._stage.follow()
 
     def _show_plans(self, plans: dict[str, Plan]) -> None:
         self._plans.clear()
