@@ -336,8 +336,9 @@ def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(
     whole, broken, wrong = Job(counted, to=5, folder=str(tmp_path)), Job(counted, to=10**5, folder="/"), Job(refused)
     told, end = finish(whole)
     assert end == Done(5) and [said.done for said in told] == [0, 1, 2, 3, 4] and (tmp_path / "done").exists()
-    assert finish(broken, cancel_after=2)[1].why_not == "cancelled"
-    assert finish(wrong)[1].why_not == "value 3: expected 2; give 2"
+    cancelled, refused_at = finish(broken, cancel_after=2)[1], finish(wrong)[1]
+    assert cancelled == Done(why_not="cancelled") and refused_at == Done(why_not="value 3: expected 2; give 2")
+    assert [done.failed for done in (end, cancelled, refused_at)] == [False, False, True]
     monkeypatch.setattr("vid2ev.gui.jobs.GRACE_S", 0.2)
     deaf = Job(unheard)
     assert finish(deaf, cancel_after=0)[1].why_not == "cancelled"

@@ -20,11 +20,12 @@ from vid2ev.commands.gui import gui
 from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
-from vid2ev.gui.guard import Guard
+from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.loading import loaded, loaded_from
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
+from vid2ev.gui.why import why_not
 from vid2ev.outputs import Outputs
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import Camera
@@ -126,7 +127,11 @@ def test_a_name_that_no_disk_takes_is_refused_in_a_sentence() -> None:
         (Path("n" * 400)).read_text()
         raise AssertionError
 
-    assert re.fullmatch(r"n+\.\.\.n+: File name too long; give another name", str(session.change(too_long)))
+    why = r"n+\.\.\.n+: File name too long; give another name"
+    assert re.fullmatch(why, str(session.change(too_long)))
+    with pytest.raises(OSError, match="File name too long") as failed:
+        too_long()
+    assert re.fullmatch(why, why_not(failed.value)) and why_not(KeyError("x")) == "KeyError: 'x'"
     session.close()
 
 
@@ -306,5 +311,10 @@ def test_pages_of_others_are_not_served(host: str, origin: str, status: int) -> 
         sent.append(message)
 
     headers = [(b"host", host.encode()), *([(b"origin", origin.encode())] if origin else [])]
-    asyncio.run(Guard(page, "127.0.0.1")({"type": "http", "headers": headers}, None, send))
-    assert sent[0]["status"] == status
+    for served in ("127.0.0.1", "localhost", "127.0.0.2", "::1"):
+        asyncio.run(Guard(page, served)({"type": "http", "headers": headers}, None, send))
+    assert [message["status"] for message in sent if "status" in message] == 4 * [status]
+
+
+def test_a_page_for_the_network_is_served_under_any_name() -> None:
+    assert not any(is_loopback(host) for host in ("0.0.0.0", "192.168.0.2", "evil.example", "127.0.0.1.evil.example"))

@@ -13,8 +13,9 @@ from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from vid2ev.errors import Vid2evError
+from vid2ev.gui.why import why_not
 
+CANCELLED = "cancelled"
 GRACE_S = 3.0  # until work that does not hear is ended
 
 
@@ -35,6 +36,11 @@ class Done(NamedTuple):
 
     result: Any = None
     why_not: str | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether it did not work; what nobody wanted any more did not fail."""
+        return self.why_not not in (None, CANCELLED)
 
 
 Tell = Callable[[float, float | None, str], None]
@@ -64,7 +70,7 @@ class Job:
                 yield said
         except (EOFError, OSError):
             self.ended = True
-            yield Done(why_not="cancelled" if self._cancelled.is_set() else "the work's process has ended")
+            yield Done(why_not=CANCELLED if self._cancelled.is_set() else "the work's process has ended")
 
     def cancel(self) -> None:
         """Ask the task to end; `news` says when it has, and ends it if it does not hear."""
@@ -99,11 +105,9 @@ def _work(task: Callable[..., Any], pipe: Connection, cancelled: Any, arguments:
     try:
         outcome = Done(task(tell, **arguments))
     except Cancelled:
-        outcome = Done(why_not="cancelled")
-    except Vid2evError as error:
-        outcome = Done(why_not=str(error))
-    except Exception as error:  # what a page shows, whatever it was
-        outcome = Done(why_not=f"{type(error).__name__}: {error}")
+        outcome = Done(why_not=CANCELLED)
+    except Exception as error:
+        outcome = Done(why_not=why_not(error))
     try:
         pipe.send(outcome)
     except OSError:

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from vid2ev.gui.preview import VIEWS, Answer
 from vid2ev.gui.session import Session
+from vid2ev.gui.theme import say
 
 WINDOWS_MS = {"5 ms": 0.005, "10 ms": 0.01, "30 ms": 0.03, "100 ms": 0.1}
 STEP_S = 0.001  # of the line of time
@@ -103,13 +104,11 @@ class Pictures:
         self._play.props('icon=play_arrow aria-label="play"')
 
     def _told(self, status: str) -> None:
-        self._status.text = status
+        say(self._status, status, bad=self._session.refused)
         if self._session.refused:  # (pictures that are there are those of something else)
-            self._status.classes("v-bad", remove="v-muted")
             self._grid.classes("v-stale")
             self._stop()
         else:
-            self._status.classes("v-muted", remove="v-bad")
             self._grid.classes(remove="v-stale")
 
 

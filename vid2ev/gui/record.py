@@ -17,6 +17,7 @@ from vid2ev.gui.loading import WANTED, loaded, loaded_from
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.tasks import converted
+from vid2ev.gui.theme import say
 from vid2ev.rig.rig_file import rig_text, write_text
 
 
@@ -85,7 +86,7 @@ class Record:
             self._source = setup.source
             self._where.value = str(default_directory(setup.source))
         command = command_of(
-            setup, None if self._where.value == str(default_directory(setup.source)) else self._where.value
+            setup, None if self._directory == str(default_directory(setup.source)) else self._directory
         )
         self._command.text = str(command)
         names = " and ".join(command.files)
@@ -94,17 +95,23 @@ class Record:
             f"with {names} beside it: Save writes {'them' if len(command.files) > 1 else 'it'}" if names else ""
         )
 
+    @property
+    def _directory(self) -> str:
+        """Where the recording goes."""
+        return self._where.value.strip() or str(default_directory(self._session.setup.source))
+
     def convert(self) -> None:
         """Begin the conversion."""
         if self._job is not None:
             return
         self._open_tab()
-        self._said.text = "beginning"
+        say(self._said, "beginning")
+        directory = self._directory
         self._bar.value = 0
         self._busy(True)
         self._job = self._session.start(
-            converted, self._heard, self._ended,
-            setup=self._session.setup, directory=self._where.value, overwrite=self._over.value,
+            converted, self._heard, partial(self._ended, Path(directory).absolute()),
+            setup=self._session.setup, directory=directory, overwrite=self._over.value,
         )  # fmt: skip
 
     def _heard(self, said: Progress) -> None:
@@ -112,15 +119,15 @@ class Record:
         self._bar.props(remove="indeterminate") if said.of else self._bar.props("indeterminate")
         self._said.text = said.text
 
-    def _ended(self, done: Done) -> None:
+    def _ended(self, directory: Path, done: Done) -> None:
         self._job = None
         self._busy(False)
         if done.why_not is not None:
-            self._said.text = done.why_not
+            say(self._said, done.why_not, bad=done.failed)
             return
         results = done.result.get("results", {"": done.result})
         parts = [f"{name} {_count(result)}".strip() for name, result in results.items()]
-        self._said.text = f"{Path(self._where.value).absolute()}: {', '.join(parts)}"
+        self._said.text = f"{directory}: {', '.join(parts)}"
         self._bar.value = 1
 
     def _busy(self, busy: bool) -> None:

@@ -14,6 +14,7 @@ from vid2ev.gui.record import Record
 from vid2ev.gui.session import Session
 from vid2ev.gui.stage import Stage
 from vid2ev.gui.tasks import costed, gathered, planned
+from vid2ev.gui.theme import say
 from vid2ev.plan.plan import Plan
 
 TABS = ("Pixel", "Plan", "World", "Cost", "Compare", "Record")
@@ -114,6 +115,7 @@ class Results:
             self._reader = Work(
                 self._session, "Open", gathered, self._gathered, lambda: {"path": path.value}, setup=False
             )
+            path.on("keydown.enter", self._reader.begin)
         self._table = ui.element("div").classes("v-scroll mt-2")
         self._intervals = ui.echart(course_chart(None)).classes("w-full").style("height: 260px")
         self._intervals.set_visibility(False)
@@ -160,9 +162,16 @@ class Work:
     def _clicked(self) -> None:
         if self._job is not None:
             self._job.cancel()
+        else:
+            self.begin()
+
+    def begin(self) -> None:
+        """Begin the work, unless it is going on."""
+        if self._job is not None:
             return
         asked = {"setup": self._session.setup} if self._setup else {}
-        self._button.text, self._said.text = "Cancel", "beginning"
+        self._button.text = "Cancel"
+        say(self._said, "beginning")
         self._job = self._session.start(self._task, self._heard, self._ended, **asked, **self._arguments())
 
     def _heard(self, said: Progress) -> None:
@@ -171,7 +180,7 @@ class Work:
 
     def _ended(self, done: Done) -> None:
         self._job, self._button.text = None, self._label
-        self._said.text = done.why_not or ""
+        say(self._said, done.why_not or "", bad=done.failed)
         if done.why_not is None:
             self._take(done.result)
 

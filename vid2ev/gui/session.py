@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import DataError, Vid2evError
+from vid2ev.errors import Vid2evError
 from vid2ev.gui.jobs import Done, Job, Progress
 from vid2ev.gui.preview import Answer, Plans, Request
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.warming import Warming
+from vid2ev.gui.why import why_not
 from vid2ev.gui.worker import Refused, Worker
 
 GATHER_S = 0.06  # changes, before a preview is asked for
@@ -61,8 +62,8 @@ class Session:
             setup = make()
         except (Vid2evError, ValueError) as error:
             return str(error)
-        except OSError as error:  # (a name that no disk takes)
-            return str(DataError(f"{error.filename}: {error.strerror}; give another name"))
+        except OSError as error:
+            return why_not(error)
         if setup != self.setup:
             self.look(setup=setup)
             self._say("setup", setup)

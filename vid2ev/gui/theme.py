@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 ACCENT = "#3b72d9"
 ON, OFF = "#e0982f", "#5a8ff0"
 MUTED = "#76808f"
@@ -78,3 +80,9 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
   .v-source { min-width: 40px; margin-left: 8px; }
 }
 """
+
+
+def say(label: Any, text: str, bad: bool = False) -> None:
+    """Have a quiet label say something, or that something is wrong."""
+    label.text = text
+    label.classes("v-bad" if bad else "v-muted", remove="v-muted" if bad else "v-bad")

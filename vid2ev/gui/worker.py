@@ -17,9 +17,9 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, NamedTuple
 
-from vid2ev.errors import Vid2evError
 from vid2ev.gui.light import Light
 from vid2ev.gui.preview import Answer, Plans, Previewer, Request, plans_of
+from vid2ev.gui.why import why_not
 
 CALM_S = 0.3  # after a preview, before its plan
 PATIENCE_S = 1.0  # that a preview has for its first picture when something newer is asked for
@@ -137,7 +137,7 @@ class Planner(Thread):
             except Superseded:
                 pass
             except Exception as error:  # (the pictures are there, whatever happens to the plan)
-                self._send(Refused(number, f"no plan ({type(error).__name__}: {error})", answered=True))
+                self._send(Refused(number, f"no plan: {why_not(error)}", answered=True))
 
 
 def _serve(pipe: Connection, newest: Any) -> None:
@@ -171,8 +171,6 @@ def _serve(pipe: Connection, newest: Any) -> None:
             planner.plan(previewer.light(request), number)
         except Superseded:
             pass
-        except Vid2evError as error:
-            send(Refused(number, str(error)))
         except Exception as error:  # a page goes on, whatever happens in its preview
-            send(Refused(number, f"the preview failed ({type(error).__name__}: {error})"))
+            send(Refused(number, why_not(error)))
         send(None)
