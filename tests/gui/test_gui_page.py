@@ -426,6 +426,26 @@ def test_a_source_that_cannot_be_seen_fades_the_pictures_of_the_one_before(
     assert page.locator(".v-bad").count() == 0 and wrong == []
 
 
+def test_the_camera_that_took_a_video_has_controls(browser: Any, address: Any) -> None:
+    page, wrong = opened(browser, address)
+    go_to(page, str(ROOT / "examples" / "demo.mp4"))
+    page.locator(".v-side .q-tab", has_text="Camera").click()
+    page.locator(".v-side .q-btn", has_text="the video's").click()
+    field = page.locator('[data-key="rig.the video\'s.fov_deg"] input')
+    field.fill("50")
+    field.blur()
+    wait_for(lambda: "--rig rig.toml" in command(page))
+    page.locator(".v-side .q-btn-group .q-btn:visible", has_text="cis").click()
+    page.locator(".v-side .q-btn:visible", has_text="Remove").click()
+    page.wait_for_selector('[data-key="rig.dvs.size"]')
+    page.locator(".v-side .q-btn-group .q-btn:visible", has_text="the video's").click()
+    go_to(page, SCENE)  # (which has none)
+    page.locator(".v-side .q-tab", has_text="Scene").click()
+    page.locator('[data-key="scene.duration_s"] input').fill("0.1")
+    wait_for(lambda: "scene.toml" in command(page))
+    assert wrong == [] and "deleted" not in (address[1] / "log").read_text()
+
+
 def test_it_plays_while_a_slider_moves(browser: Any, address: Any) -> None:
     page, wrong = opened(browser, address)
     page.wait_for_selector('[data-camera="dvs"] img[src^=data]')

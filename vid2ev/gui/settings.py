@@ -41,6 +41,8 @@ class Settings:
     def show(self) -> None:
         """Show the setup: draw what is another, else the values in use."""
         setup = self._session.setup
+        self._camera = min(self._camera, len(setup.rig.cameras) - 1)
+        self._place = min(self._place, len(_places(setup)) - 1)
         shape = (
             setup.source,
             [(c.name, c.kind, c.sensor) for c in setup.rig.cameras],
@@ -102,8 +104,6 @@ class Settings:
     def _draw(self) -> None:
         setup = self._session.setup
         self._panels = []
-        self._camera = min(self._camera, len(setup.rig.cameras) - 1)
-        self._place = min(self._place, len(setup.rig.cameras) - 1)
         for name, draw in (("Sensor", self._draw_sensor), ("Camera", self._draw_camera), ("Scene", self._draw_scene)):
             self._places[name].clear()
             with self._places[name]:
@@ -131,8 +131,7 @@ class Settings:
         ui.button("Reset all", on_click=panel.reset).props("flat dense").classes("mt-2")
 
     def _draw_camera(self, setup: Setup) -> None:
-        names = [camera.name for camera in setup.rig.cameras] + ([] if setup.is_scene else [VIDEO])
-        place = min(self._place, len(names) - 1)
+        names, place = _places(setup), self._place
         with ui.element("div").classes("v-line"):
             ui.toggle(names, value=names[place], on_change=lambda e: self._turn_to(place=names.index(e.value))).props(
                 "dense flat no-caps"
@@ -167,6 +166,8 @@ class Settings:
 
     def _scene_back(self) -> None:
         self._session.change(lambda: self._session.setup.with_scene(None))
+        self._drawn = None  # (nor is there anything left of what was refused)
+        self.show()
 
     def _turn_to(self, camera: int | None = None, place: int | None = None, part: str | None = None) -> None:
         self._camera = self._camera if camera is None else camera
@@ -185,7 +186,13 @@ class Settings:
         if len(cameras) < 2:
             raise UsageError("a rig has a camera at least")
         kept = tuple(camera for k, camera in enumerate(cameras) if k != number)
+        self._place = max(number - 1, 0)
         self._session.change(lambda: self._session.setup.with_rig(kept))
+
+
+def _places(setup: Setup) -> list[str]:
+    """The cameras of the rig, and that which took the video."""
+    return [camera.name for camera in setup.rig.cameras] + ([] if setup.is_scene else [VIDEO])
 
 
 def _with_sensors_of(before: Setup, other: Setup) -> Setup:
