@@ -506,7 +506,7 @@ def test_statistics_stand_beside_those_of_a_recording(browser: Any, address: Any
     entry = page.locator('input[data-key="real"], [data-key="real"] input').first
     entry.fill("nothing.txt")
     page.locator("button:visible", has_text="Open").last.click()
-    page.wait_for_selector('.v-right .v-muted:has-text("nothing.txt")')
+    page.wait_for_selector('.v-right .v-bad:has-text("nothing.txt")')
     entry.fill("real.txt")
     page.locator("button:visible", has_text="Open").last.click()
     page.wait_for_selector('.v-right th:has-text("recording")')
