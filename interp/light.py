@@ -17,6 +17,7 @@ from typing import Literal
 import torch
 
 from interp.precision import in_full_precision
+from interp.rows import by_rows
 from vid2ev.light.transfer import SRGB_KNEE, SRGB_OFFSET, SRGB_POWER, SRGB_SLOPE
 from vid2ev.stream.frames import LUMINANCE
 
@@ -27,23 +28,13 @@ Transfer = Literal["srgb", "linear"]
 @in_full_precision
 def to_light(codes: torch.Tensor, transfer: Transfer) -> torch.Tensor:
     """Linear light of codes; 1 is diffuse white."""
-    codes = codes.clamp(min=0)
-    if transfer == "linear":
-        return codes
-    steep = ((codes.clamp(min=SRGB_KNEE) + SRGB_OFFSET) / (1 + SRGB_OFFSET)) ** SRGB_POWER
-    return torch.where(codes <= SRGB_KNEE, codes / SRGB_SLOPE, steep)
+    return codes.clamp(min=0) if transfer == "linear" else by_rows(_srgb_light, codes)
 
 
 @in_full_precision
 def to_codes(light: torch.Tensor, transfer: Transfer) -> torch.Tensor:
     """Codes of linear light."""
-    light = light.clamp(min=0)
-    if transfer == "linear":
-        return light
-    knee = SRGB_KNEE / SRGB_SLOPE
-    # (the power of 0 has no slope: it is not taken where the straight part holds)
-    steep = (1 + SRGB_OFFSET) * light.clamp(min=knee) ** (1 / SRGB_POWER) - SRGB_OFFSET
-    return torch.where(light <= knee, light * SRGB_SLOPE, steep)
+    return light.clamp(min=0) if transfer == "linear" else by_rows(_srgb_codes, light)
 
 
 @in_full_precision
@@ -63,4 +54,20 @@ def luminance(light: torch.Tensor) -> torch.Tensor:
     """Luminance [..., 1, H, W] of light [..., 1 or 3, H, W]."""
     if light.shape[-3] == 1:
         return light
-    return (light * light.new_tensor(LUMINANCE)[:, None, None]).sum(-3, keepdim=True)
+    red, green, blue = (
+        channel * share for channel, share in zip(light.split(1, -3), light.new_tensor(LUMINANCE), strict=True)
+    )
+    return (red + green).add_(blue)
+
+
+def _srgb_light(codes: torch.Tensor) -> torch.Tensor:
+    codes = codes.clamp(min=0)
+    steep = ((codes.clamp(min=SRGB_KNEE) + SRGB_OFFSET) / (1 + SRGB_OFFSET)) ** SRGB_POWER
+    return torch.where(codes <= SRGB_KNEE, codes / SRGB_SLOPE, steep)
+
+
+def _srgb_codes(light: torch.Tensor) -> torch.Tensor:
+    light, knee = light.clamp(min=0), SRGB_KNEE / SRGB_SLOPE
+    # (the power of 0 has no slope: it is not taken where the straight part holds)
+    steep = (1 + SRGB_OFFSET) * light.clamp(min=knee) ** (1 / SRGB_POWER) - SRGB_OFFSET
+    return torch.where(light <= knee, light * SRGB_SLOPE, steep)

@@ -27,7 +27,7 @@ def warp(images: torch.Tensor, flow: torch.Tensor, corner: tuple[int, int] | Non
     """
     here = pixel_places(*flow.shape[-2:], device=flow.device, dtype=flow.dtype)
     places = here + torch.nan_to_num(flow)
-    return sample(images, places) if corner is None else _sample_part(images, places, corner)
+    return sample(images, places) if corner is None else sample_part(images, places, corner)
 
 
 def both_warped(
@@ -52,8 +52,9 @@ def sample(images: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
     return found.unflatten(2, grid.shape[1:3]).transpose(1, 2)
 
 
-def _sample_part(images: torch.Tensor, places: torch.Tensor, corner: tuple[int, int]) -> torch.Tensor:
-    """Pictures at places from a corner on; no more of them is touched than is looked at."""
+@in_full_precision
+def sample_part(images: torch.Tensor, places: torch.Tensor, corner: tuple[int, int] = (0, 0)) -> torch.Tensor:
+    """Pictures, of any type, at places from a corner on; no more of them is touched than is looked at."""
     looked_at, from_there = [], []
     for start, place, side in zip(corner, reversed(places.unbind(-3)), images.shape[-2:], strict=True):
         inside = (place + start).clamp(0, side - 1)
@@ -61,7 +62,7 @@ def _sample_part(images: torch.Tensor, places: torch.Tensor, corner: tuple[int, 
         looked_at.append(slice(first, int(inside.max()) + 2))
         from_there.append(inside - first)
     rows, columns = looked_at
-    return sample(images[..., rows, columns], torch.stack(from_there[::-1], -3))
+    return sample(images[..., rows, columns].to(places.dtype), torch.stack(from_there[::-1], -3))
 
 
 def pixel_places(height: int, width: int, **kind: object) -> torch.Tensor:

@@ -19,12 +19,16 @@ def calibrated(
     """Counts [1, 2, S, h, w] between two frames [C, H, W], ready for methods.
 
     contrast   what an OFF and an ON event stand for [nat]; fitted where nobody knows
-    apart      whether the event camera stands elsewhere: then counts are brought to the pixels of the frames
+    apart      whether the event camera stands elsewhere: then counts are found where pixels of the frames look
     """
     first, last = (frame[None] for frame in frames)
     if contrast is not None:
         known = replace(counts, contrast=counts.contrast.new_tensor([contrast]))
         return registered(first, last, known) if apart else known
-    found = with_fitted_contrast(first, last, over(counts, (first.shape[-2], first.shape[-1])))
+    size = first.shape[-2], first.shape[-1]
+    found = with_fitted_contrast(first, last, over(counts.summed(), size))
     known = replace(counts, contrast=found.contrast)
-    return with_fitted_contrast(first, last, registered(first, last, known)) if apart else known
+    if not apart:
+        return known
+    brought = registered(first, last, known)
+    return replace(brought, contrast=with_fitted_contrast(first, last, over(brought.summed(), size)).contrast)

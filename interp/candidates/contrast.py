@@ -31,7 +31,7 @@ def with_fitted_contrast(
     """The counts with the contrast that fits each pair of frames best; frames as codes [B, C, H, W]."""
     before, after = (torch.log(luminance(to_light(frame, transfer)) + DARK) for frame in (frame_0, frame_1))
     difference = (after - before).squeeze(1)
-    off, on = events.off_on.float().sum(2).unbind(1)
+    off, on = events.summed().off_on.squeeze(2).unbind(1)
     net = on - off
     squares = [
         ((difference**2 * of_sign).sum((1, 2)) + PRIOR_PIXELS * USUAL_NATS**2)

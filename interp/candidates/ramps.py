@@ -20,7 +20,7 @@ decibel for the one, and between 0.5 and 0.7 whichever there is more of, noise o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 
@@ -28,6 +28,7 @@ from interp.candidates.bridge import DARK, DARKEST, EVEN_EVENTS, coloured, highe
 from interp.light import Transfer, luminance, to_codes, to_light
 from interp.precision import in_full_precision
 from interp.representation.event_counts import EventCounts, as_voxels
+from interp.rows import by_rows
 
 FIRST = 0.5  # share of the first event of a pixel
 LEAST = 1e-6  # of an event: less is none
@@ -66,6 +67,12 @@ class Risen:
 @in_full_precision
 def risen(events: EventCounts, times: torch.Tensor) -> Risen:
     """E and N at times [B, N]; all events of a sub-interval are taken to be in its middle."""
+    found = by_rows(lambda off_on: _risen(replace(events, off_on=off_on), times), events.off_on)
+    return Risen(*found.unbind(0))
+
+
+def _risen(events: EventCounts, times: torch.Tensor) -> torch.Tensor:
+    """Of `Risen`, one after the other, [4, B, N, 1, H, W]."""
     off, on = events.off_on.float().unbind(1)
     off_nats, on_nats = events.contrast.float()[..., None, None, None].unbind(1)
     number, change = on + off, on_nats * on - off_nats * off
@@ -81,7 +88,7 @@ def risen(events: EventCounts, times: torch.Tensor) -> Risen:
     numbered = _until(number, seen) + comes
     total, most = change.sum(1, keepdim=True), number.sum(1, keepdim=True)
     more = (most - numbered).clamp(min=0)  # (sums of parts of events are not those of all, to the last bit)
-    return Risen(*(part[:, :, None] for part in (changed, total - changed, numbered, more)))
+    return torch.stack([changed, total - changed, numbered, more])[:, :, :, None]
 
 
 @in_full_precision

@@ -27,7 +27,7 @@ from interp.candidates.bridge import DARK
 from interp.candidates.guided import SMALLEST, averaged, dense_flow
 from interp.light import Transfer, luminance, to_light
 from interp.precision import in_full_precision
-from interp.representation.carried import carried, over, places_over
+from interp.representation.carried import over, places_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.upsample.motion import carried_along, convincing
 
@@ -41,22 +41,18 @@ LEAST_NATS = 0.3  # that these stand for
 def registered(
     frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer = "srgb"
 ) -> EventCounts:
-    """Counts [B, 2, S, h, w] between frames [B, C, H, W], at the pixels of these."""
+    """Counts [B, 2, S, h, w] between frames [B, C, H, W], and where pixels of these look at them."""
     height, width = frame_0.shape[-2:]
     if min(height, width) < SMALLEST:
-        return over(events, (height, width))
-    whole = over(replace(events, off_on=events.off_on.float().sum(2, keepdim=True)), (height, width))
+        return events
+    whole = over(events.summed(), (height, width))
     lights = (luminance(to_light(frame, transfer)).clamp(min=0) for frame in (frame_0, frame_1))
     first, last = (torch.log(averaged(light, whole.footprint) + DARK) for light in lights)
     net = _net(whole)
     moved = [_moved(*pictures) for pictures in zip((last - first)[:, 0], net, strict=True)]
     places = places_over(events, (height, width))
     per_pixel = places.new_tensor([events.off_on.shape[-1] / width, events.off_on.shape[-2] / height])
-    each = [
-        carried(EventCounts(events.off_on[b : b + 1], events.contrast[b : b + 1]), places + per_pixel * flow.to(places))
-        for b, flow in enumerate(moved)
-    ]
-    return EventCounts.stacked(each)
+    return replace(events, places=torch.stack([places + per_pixel * flow.to(places) for flow in moved]))
 
 
 def _net(events: EventCounts) -> torch.Tensor:

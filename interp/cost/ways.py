@@ -20,6 +20,7 @@ import torch
 
 from interp import pretrained
 from interp.methods import METHODS, Gap, Method, open_method
+from interp.methods.gap import Together
 from interp.methods.of_networks import OfEvents, OfFrames, of_weights
 from interp.methods.running import PLAIN, PRECISIONS, Running, compiles
 from interp.methods.tiling import Tiling, parse_tiling
@@ -48,7 +49,7 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
-class Tiled:
+class Tiled(Together):
     """A method that makes frames in tiles."""
 
     method: Method
@@ -61,14 +62,14 @@ class Tiled:
         """See `interp.methods.gap.Method`."""
         return replace(self, method=self.method.begin())
 
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
         height, width = gap.frame_0.shape[-2:]
-        return self.method.between(gap, times, parse_tiling(self.tile, (width, height), self.multiple))
+        return self.method.images(gap, times, parse_tiling(self.tile, (width, height), self.multiple))
 
 
 @dataclass(frozen=True, slots=True)
-class Anew:
+class Anew(Together):
     """A method that is asked for one frame at a time, and does all of its work for each."""
 
     method: Method
@@ -79,9 +80,9 @@ class Anew:
         """See `interp.methods.gap.Method`."""
         return replace(self, method=self.method.begin())
 
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
-        return torch.cat([self.method.between(gap, time, tiling) for time in times.split(1)])
+        return (self.method.between(gap, time, tiling) for time in times.split(1))
 
 
 def ways(networks: Sequence[str | Path], device: str) -> list[Way]:

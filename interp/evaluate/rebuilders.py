@@ -19,6 +19,7 @@ from interp.evaluate.group import Footage, Group
 from interp.evaluate.identity import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
+from interp.methods.tiling import tiling_of
 from interp.own_codes import recoded, shown
 from interp.pretrained import OF_RUN
 from vid2ev.errors import UsageError, nearest
@@ -85,8 +86,10 @@ class OfMethod:
         keys = as_tensor(shown(group.keys, group.curve)).to(self.device)
         gap = Gap(keys[0], keys[1], group.events.to(self.device), group.gap_us)
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
-        made = self.method.between(gap, targets)[self.protocol.picked]
-        return list(self.protocol.coded(recoded(made, group.curve)))
+        height, width = keys.shape[-2:]
+        images = self.method.images(gap, targets, tiling_of(self.method, (width, height)))
+        coded = [code for some in images for code in self.protocol.coded(recoded(some, group.curve))]
+        return [coded[k] for k in self.protocol.picked]
 
 
 def methods_of(

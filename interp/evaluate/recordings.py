@@ -15,6 +15,7 @@ from interp.evaluate.cameras import CamerasOf
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
+from interp.representation.carried import over
 from interp.representation.event_counts import count_events
 from vid2ev.errors import DataError
 
@@ -79,6 +80,8 @@ class Recording:
         number = (first - self._begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
         events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart)
+        if events.places is not None:
+            events = over(events, (keys.shape[1], keys.shape[2]))
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
 
     def _remarks(self) -> list[str]:

@@ -28,7 +28,6 @@ from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts, count_events
 
 FEWEST, MOST = 32, 128  # sub-intervals in which events are counted
-AT_ONCE = 1 << 28  # values of frames that are made at a time, 4 bytes each
 NO_EVENTS = "events that are not known"
 
 
@@ -122,13 +121,13 @@ class Fill:
         instants = [instant for instant in stretch.instants if instant.share or not stretch.first.known]
         if len(instants) < len(stretch.instants):
             yield Filled(stretch.instants[0], True, shot, stretch.first.codes)
-        some = max(1, AT_ONCE // gap.frame_0.numel())
-        groups = [instants[first : first + some] for first in range(0, len(instants), some)]
-        for group in [instants] if method.sequential else groups:  # (what remembers sees gaps without instants)
-            times = torch.tensor([float(instant.share) for instant in group], device=self.device)
-            images = method.between(gap, times, self.tiling).movedim(1, -1).cpu().numpy()
-            for instant, image in zip(group, images, strict=True):
-                yield Filled(instant, False, shot, image)
+        times = torch.tensor([float(instant.share) for instant in instants], device=self.device)
+        coming = iter(instants)
+        for images in method.images(gap, times, self.tiling):
+            pictures = images.movedim(1, -1).cpu().numpy()
+            # (each for itself: all of them are not to be kept with the last one while others are made)
+            yield from (Filled(next(coming), False, shot, np.ascontiguousarray(picture)) for picture in pictures)
+            del images, pictures
 
     def _held(self, stretch: Stretch, shot: int) -> Iterator[Filled]:
         """The nearer key frames."""

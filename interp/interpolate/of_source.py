@@ -83,7 +83,9 @@ class OfSource:
             light = torch.from_numpy(np.nan_to_num(frame.light, nan=0.0))
             codes = to_codes(light if self.channels == 3 else light[..., :1], "srgb").numpy()
             if self._top:
-                codes = np.rint(codes * self._top) / self._top
+                codes *= self._top
+                np.rint(codes, out=codes)
+                codes /= self._top
             yield Key(round(Fraction(frame.t_ns, 1000)), codes)
 
     def _mean_rate(self) -> Fraction:

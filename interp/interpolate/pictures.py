@@ -20,6 +20,7 @@ from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.take import Take
 from interp.light import to_light
 from interp.own_codes import recoded, shown
+from interp.rows import AT_ONCE
 from vid2ev.errors import UsageError
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.light.transfer import parse_transfer
@@ -58,12 +59,19 @@ class Pictures:
         if self.kind == "exr":
             light = to_light(torch.from_numpy(np.ascontiguousarray(codes)), "srgb").numpy()
             return light if light.shape[2] == 3 else np.repeat(light, 3, axis=2)
-        codes = np.clip(codes if codes.shape[2] == 3 else codes[..., 0], 0, 1)
+        codes = codes if codes.shape[2] == 3 else codes[..., 0]
+        picture = np.empty(codes.shape, np.uint8 if self.bits == 8 else np.uint16)
+        rows = max(1, AT_ONCE // max(1, codes[:1].size))
+        for top in range(0, len(codes), rows):
+            picture[top : top + rows] = self._coded(np.clip(codes[top : top + rows], 0, 1))
+        return picture
+
+    def _coded(self, codes: np.ndarray) -> np.ndarray:
+        """Whole codes by the curve, of sRGB codes 0 ... 1."""
         if self._table is not None:
             return self._table[_places(codes)]
-        top = np.float32(2**self.bits - 1)
         signal = recoded(torch.from_numpy(np.ascontiguousarray(codes)), self.curve).numpy()
-        return np.rint(signal * top).astype(np.uint8 if self.bits == 8 else np.uint16)
+        return np.rint(signal * np.float32(2**self.bits - 1))
 
     def of_light(self, light: np.ndarray) -> np.ndarray:
         """The same of light [H, W]."""

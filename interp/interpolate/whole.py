@@ -15,7 +15,7 @@ import torch
 
 from interp import pretrained
 from interp.interpolate.after import After
-from interp.interpolate.choice import FALLBACK, Choice, choice, choice_of_one, device_of
+from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
@@ -26,7 +26,7 @@ from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.methods import open_method
 from interp.methods.running import PLAIN, Running
-from interp.methods.tiling import parse_tiling
+from interp.methods.tiling import tiling_of
 from interp.representation.carried import footprint_of
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import machine, versions
@@ -179,7 +179,7 @@ def prepared(
         coarse = take.event_size is not None and footprint_of(take.size, take.event_size) > 1
         chosen = choice(method, network, has_events, str(source), device, coarse, running)
     after = After(pretrained.path_of(hdr), has_events, device) if hdr else None
-    tiling = parse_tiling(tile, take.size, multiple_of(chosen))
+    tiling = tiling_of(chosen.method, take.size, tile)
     needed = after is not None and after.needs_events
     fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)
     return Ready(take, grid, fill, after, cuts == "hold", chosen.why, chosen.about)
@@ -192,11 +192,6 @@ def grid_of(multiple: Number | None, fps: Number | None) -> Grid:
     if fps is not None:
         return Rate(parse_number(fps, "--fps"))
     return Times(parse_number(MULTIPLE if multiple is None else multiple, "-x"))
-
-
-def multiple_of(chosen: Choice) -> int:
-    """Of what tiles must begin at whole multiples."""
-    return int(getattr(getattr(chosen.method, "network", None), "multiple", 2))
 
 
 def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None) -> None:

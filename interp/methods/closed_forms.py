@@ -6,7 +6,7 @@ frames, and what is carried comes from anywhere in them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Self
@@ -16,7 +16,7 @@ import torch
 from interp.candidates.bridge import highest_of
 from interp.candidates.guided import SEES_PX, flows_to, guided
 from interp.candidates.ramps import in_doubt, ramps, risen
-from interp.methods.gap import Gap
+from interp.methods.gap import Gap, Together
 from interp.methods.tiling import Tile, Tiling, part, undivided
 from interp.representation.carried import footprint_over
 from interp.representation.event_counts import EventCounts
@@ -24,12 +24,12 @@ from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 22  # pixels of images that are made at a time: some 100 bytes each
 ROUNDS = 2  # of guiding, where events are coarse
-Law = Callable[[Gap, torch.Tensor, Tiling], torch.Tensor]
+Law = Callable[[Gap, torch.Tensor, Tiling], Iterator[torch.Tensor]]
 Form = Callable[..., torch.Tensor]  # (frame_0, frame_1, events, times, highest=)
 
 
 @dataclass(frozen=True, slots=True)
-class ClosedForm:
+class ClosedForm(Together):
     """A law that looks at one gap alone."""
 
     name: str
@@ -41,7 +41,7 @@ class ClosedForm:
         """Itself."""
         return self
 
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
         if self.needs_events and gap.events is None:
             raise UsageError(f"method '{self.name}' integrates events, and there are none; choose flow or linear")
@@ -49,29 +49,29 @@ class ClosedForm:
         return self.law(gap, times, tiling or undivided(width, height))
 
 
-def nearest(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+def nearest(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
     """The nearer key frame; halfway the first."""
-    return torch.where(times[:, None, None, None] > 0.5, gap.frame_1, gap.frame_0)
+    return ((gap.frame_1 if time > 0.5 else gap.frame_0)[None] for time in times.tolist())
 
 
-def linear(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+def linear(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
     """A blend of the codes of both."""
-    return gap.frame_0 + times[:, None, None, None] * (gap.frame_1 - gap.frame_0)
+    return ((time * (gap.frame_1 - gap.frame_0)).add_(gap.frame_0)[None] for time in times)
 
 
 def of_events(form: Form) -> Law:
     """Integration of events, pixel by pixel: a form of `interp.candidates`, some images at a time."""
 
-    def law(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+    def law(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
         highest = highest_of(*_frames(gap))
-        return torch.cat([tiling.cells(partial(_in_tile, form, gap, some, highest)) for some in _some(gap, times)])
+        return (tiling.cells(partial(_in_tile, form, gap, some, highest)) for some in _some(gap, times))
 
     return law
 
 
-def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
+def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
     """Ramps in the colours of carried frames, mixed with these as either is in doubt (`candidates.guided`)."""
-    return torch.cat([_guided(gap, some, tiling) for some in _some(gap, times)])
+    return (_guided(gap, some, tiling) for some in _some(gap, times))
 
 
 def _guided(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:

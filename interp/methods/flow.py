@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import chain
+
 import numpy as np
 import torch
 
@@ -15,17 +18,25 @@ from vid2ev.upsample.motion import MotionEstimator
 GAP_NS = 1 << 40  # any, so long that times of 24 bits are whole
 
 
-def flow(gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+def flow(gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
     """A frame for each time that lies between, however they are spaced; at 0 and 1 the key frames themselves."""
     first, last = (Frame(_light(frame), number * GAP_NS) for number, frame in enumerate((gap.frame_0, gap.frame_1)))
-    made = {0: first.light, GAP_NS: last.light}
-    times_ns = [round(time * GAP_NS) for time in times.tolist()]
-    if inner := sorted({t_ns for t_ns in times_ns if 0 < t_ns < GAP_NS}):
+    for light in _carried(first, last, [round(time * GAP_NS) for time in times.tolist()]):
+        channels = torch.from_numpy(light[None] if light.ndim == 2 else np.ascontiguousarray(np.moveaxis(light, -1, 0)))
+        yield to_codes(channels[None], "srgb").to(gap.frame_0)
+
+
+def _carried(first: Frame, last: Frame, times_ns: Sequence[int]) -> Iterator[np.ndarray]:
+    """Light at times between two frames, in order; motion is estimated once."""
+    frames = iter([first, last])
+    if inner := sorted({t_ns for t_ns in times_ns if first.t_ns < t_ns < last.t_ns}):
         motion = MotionEstimator().between(first.luminance, last.luminance)
-        made |= {frame.t_ns: frame.light for frame in carried(first, last, motion, inner)}
-    light = torch.stack([torch.from_numpy(made[t_ns]) for t_ns in times_ns])
-    channels = light[:, None] if light.ndim == 3 else light.permute(0, 3, 1, 2)
-    return to_codes(channels, "srgb").to(gap.frame_0)
+        frames = chain([first], carried(first, last, motion, inner))
+    frame = next(frames)
+    for t_ns in times_ns:
+        while frame.t_ns < t_ns:
+            frame = next(frames)
+        yield frame.light
 
 
 def _light(frame: torch.Tensor) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -47,7 +48,22 @@ class Method(Protocol):
     def begin(self) -> Self:
         """The same for a new sequence, which knows of no gap before."""
 
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
-        """Images [N, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second.
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
+        """Images [n, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second:
+        so many at a time that memory does not grow with N, until all are taken.
         Gaps of a sequence come in their order if the method is `sequential`, those without a time, too.  What takes
         much memory is done tile by tile, if there are tiles.  Raises UsageError without events that it needs."""
+
+    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+        """All of them [N, C, H, W]."""
+
+
+class Together:
+    """All images, of a method that gives some at a time."""
+
+    __slots__ = ()
+
+    def between(self: Method, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+        """See `Method`."""
+        made = [*self.images(gap, times, tiling)]
+        return torch.cat(made) if made else gap.frame_0.new_zeros(0, *gap.frame_0.shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -10,21 +11,24 @@ import torch
 from torch.nn import functional as F
 
 from interp.methods.around_tiles import around_tiles
-from interp.methods.gap import Gap
+from interp.methods.gap import Gap, Together
 from interp.methods.running import PLAIN, Running
 from interp.methods.tiling import Tiling, part
 from interp.networks.around import Around
 from interp.networks.event_fed import EventFed, States
-from interp.networks.frame_fed import FrameFed
+from interp.networks.frame_fed import FrameFed, Pair
+from interp.representation.carried import over
+from interp.representation.event_counts import EventCounts
 from interp.weights import load
 from vid2ev.errors import DataError, UsageError
 
 AT_ONCE_PX = 1 << 21  # pixels of images that a network makes at a time: some 200 bytes each of the smallest networks
+HELD = 1 << 27  # values of images that are put together of tiles at a time, 4 bytes each
 ON_GPU_PX, BYTES_PER_PX = 1 << 24, 1024  # on a GPU, where few at a time leave it waiting; and what large networks take
 
 
 @dataclass(frozen=True, slots=True)
-class OfFrames:
+class OfFrames(Together):
     """A network that takes two frames; the first flow once per gap."""
 
     name: str
@@ -37,39 +41,43 @@ class OfFrames:
         """Itself."""
         return self
 
-    @torch.inference_mode()
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
         gap = gap if self.needs_events else replace(gap, events=None)
-        with self.running.on(gap.frame_0.device):
-            if tiling is None or len(tiling) == 1:
-                images = self._made(gap, times)
-            else:
-                images = self._in_tiles(gap, times, tiling)
-        return _finite(self, images)
+        if tiling is not None and len(tiling) > 1:
+            # (motion to targets is large)
+            some = _at_once(gap) if self.network.spec.guided else max(1, HELD // gap.frame_0.numel())
+            return (self._in_tiles(gap, group, tiling) for group in _evenly(times, some))
+        with torch.inference_mode(), self.running.on(gap.frame_0.device):
+            pair = self._prepared(gap)
+        return (self._at(pair, group) for group in times.split(_at_once(gap)))
 
+    @torch.inference_mode()
     def _in_tiles(self, gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
         """Each tile is a gap for itself: what is done once per gap is done once per tile."""
-        some = _at_once(gap) if self.network.spec.guided else len(times)  # (motion to targets is large)
-        images = []
-        for group in times.split(some):
-            around = around_tiles(self.network, gap, group, tiling)
-            whole = gap.frame_0.new_zeros(len(group), *gap.frame_0.shape)
-            for tile in tiling:
-                made = self._made(part(gap, tile), group, replace(around, corner=(tile.top, tile.left)))
-                whole[(..., *tile.within)] += made * tiling.weights(tile).to(made)
-            images.append(whole)
-        return torch.cat(images)
+        with self.running.on(gap.frame_0.device):
+            around = around_tiles(self.network, gap, times, tiling)
+        whole = gap.frame_0.new_zeros(len(times), *gap.frame_0.shape)
+        for tile in tiling:
+            seen = part(gap, tile)
+            with self.running.on(gap.frame_0.device):
+                pair = self._prepared(seen, replace(around, corner=(tile.top, tile.left)))
+            made = torch.cat([self._at(pair, group) for group in times.split(_at_once(seen))])
+            whole[(..., *tile.within)] += made * tiling.weights(tile).to(made)
+        return whole
 
-    def _made(self, gap: Gap, times: torch.Tensor, around: Around | None = None) -> torch.Tensor:
-        pair = self.network.prepare(gap.frame_0[None], gap.frame_1[None], gap.events, around)
-        images = [self.network.at(pair, some).images[0] for some in times.split(_at_once(gap))]
-        return torch.cat(images).float()
+    def _prepared(self, gap: Gap, around: Around | None = None) -> Pair:
+        return self.network.prepare(gap.frame_0[None], gap.frame_1[None], gap.events, around)
+
+    @torch.inference_mode()
+    def _at(self, pair: Pair, times: torch.Tensor) -> torch.Tensor:
+        with self.running.on(pair.frame_0.device):
+            return _finite(self, self.network.at(pair, times).images[0].float())
 
 
 @dataclass(slots=True)
-class OfEvents:
+class OfEvents(Together):
     """A network that takes events alone, window after window, from each time to the next; its images are grey."""
 
     name: str
@@ -83,19 +91,24 @@ class OfEvents:
         """With no memory."""
         return replace(self, states=())
 
-    @torch.inference_mode()
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
         assert gap.events is not None
+        height, width = gap.frame_0.shape[-2:]
+        events = gap.events if gap.events.places is None else over(gap.events, (height, width))
         edges = torch.cat([times.new_zeros(1), times, times.new_ones(1)])[None]
-        bins: int = self.network.spec.bins  # type: ignore[assignment, union-attr]
-        voxels = gap.events.voxels(edges[:, :-1], edges[:, 1:], bins)
+        for k in range(len(times)):
+            yield self._after(gap, events, edges[:, k : k + 2])
+        self._after(gap, events, edges[:, -2:])
+
+    @torch.inference_mode()
+    def _after(self, gap: Gap, events: EventCounts, window: torch.Tensor) -> torch.Tensor:
+        """The image [1, C, H, W] after the events of a window [1, 2], which are remembered."""
+        voxels = events.voxels(window[:, :1], window[:, 1:], int(self.network.spec.bins))  # type: ignore[arg-type, union-attr]
         with self.running.on(voxels.device):
-            images, self.states = self.network.sequence(voxels, self.states)
-        if not len(times):
-            return gap.frame_0.new_zeros(0, *gap.frame_0.shape)
-        laid = F.interpolate(images[0, :-1].float(), gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
+            image, self.states = self.network(voxels[:, 0], self.states)
+        laid = F.interpolate(image.float(), gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
         return _finite(self, laid.expand(-1, len(gap.frame_0), -1, -1))
 
 
@@ -118,6 +131,11 @@ def _at_once(gap: Gap) -> int:
     if gap.frame_0.is_cuda:
         most = min(ON_GPU_PX, torch.cuda.mem_get_info(gap.frame_0.device)[0] // BYTES_PER_PX)
     return max(1, most // gap.frame_0[0].numel())
+
+
+def _evenly(times: torch.Tensor, some: int) -> tuple[torch.Tensor, ...]:
+    """Groups of at most so many, about as large as each other."""
+    return times.tensor_split(-(-len(times) // some)) if len(times) else ()
 
 
 def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:

@@ -14,6 +14,7 @@ event-based double integral).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -21,7 +22,7 @@ import torch
 
 from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, coloured, ratios_of
 from interp.light import luminance, to_codes, to_light
-from interp.methods.gap import Gap
+from interp.methods.gap import Gap, Together
 from interp.methods.tiling import Tiling
 from interp.precision import in_full_precision
 from interp.representation.carried import over
@@ -32,7 +33,7 @@ WAYS = ("deblur", "integration")
 
 
 @dataclass(frozen=True, slots=True)
-class OneFrame:
+class OneFrame(Together):
     """A method that looks at a gap's first frame alone."""
 
     name: Literal["deblur", "integration"]
@@ -43,30 +44,35 @@ class OneFrame:
         """Itself."""
         return self
 
-    def between(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> torch.Tensor:
+    def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`.  Raises UsageError without events."""
         if gap.events is None:
             raise UsageError(f"method '{self.name}' integrates events, and there are none; give some with --events")
         height, width = gap.frame_0.shape[-2:]
-        return _integrated(gap.frame_0, over(gap.events, (height, width)), times, self.name == "deblur")
+        light, events = to_light(gap.frame_0, "srgb"), over(gap.events, (height, width))
+        logs = _beginning(light, events, self.name == "deblur")
+        highest = max(BRIGHTEST, float(logs.max()))
+        return (_integrated(light, logs, events, time[None], highest)[None] for time in times)
 
 
 @in_full_precision
-def _integrated(frame: torch.Tensor, events: EventCounts, times: torch.Tensor, blurred: bool) -> torch.Tensor:
-    """Codes [N, C, H, W] of a frame [C, H, W] at times [N]."""
-    light = to_light(frame, "srgb")
+def _beginning(light: torch.Tensor, events: EventCounts, blurred: bool) -> torch.Tensor:
+    """Log of light [1, H, W] at the beginning, of that of a frame [C, H, W]."""
     logs = torch.log(luminance(light) + DARK)
-    if blurred:
-        middles = (torch.arange(events.steps, device=times.device) + 0.5) / events.steps
-        start = sum(torch.exp(_risen(events, u[None])) for u in middles) / events.steps
-        logs = logs - torch.log(torch.as_tensor(start))
-    else:
-        logs = logs - _risen(events, times.new_full((1,), 0.5))
-    images = []
-    for t in times:
-        level = (logs + _risen(events, t[None])).clamp(DARKEST, max(BRIGHTEST, float(logs.max())))
-        images.append(to_codes(coloured((torch.exp(level) - DARK).clamp(min=0), ratios_of(light)), "srgb"))
-    return torch.stack(images)
+    if not blurred:
+        return logs - _risen(events, light.new_full((1,), 0.5))
+    middles = (torch.arange(events.steps, device=light.device) + 0.5) / events.steps
+    start = sum(torch.exp(_risen(events, u[None])) for u in middles) / events.steps
+    return logs - torch.log(torch.as_tensor(start))
+
+
+@in_full_precision
+def _integrated(
+    light: torch.Tensor, logs: torch.Tensor, events: EventCounts, time: torch.Tensor, highest: float
+) -> torch.Tensor:
+    """Codes [C, H, W] at a time [1], in the colours of a frame's light, from the logs of light at the beginning."""
+    level = (logs + _risen(events, time)).clamp(DARKEST, highest)
+    return to_codes(coloured((torch.exp(level) - DARK).clamp(min=0), ratios_of(light)), "srgb")
 
 
 def _risen(events: EventCounts, until: torch.Tensor) -> torch.Tensor:

@@ -21,9 +21,8 @@ from math import ceil
 
 import torch
 
-from interp.methods.gap import Gap
-from interp.representation.carried import carried, places_over
-from interp.representation.event_counts import EventCounts
+from interp.methods.gap import Gap, Method
+from interp.representation.carried import over
 from vid2ev.errors import UsageError
 
 WHOLE_PX = 1 << 20
@@ -122,17 +121,17 @@ def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
     return Tiling(across, down)
 
 
+def tiling_of(method: Method, size: tuple[int, int], tile: str = "auto") -> Tiling:
+    """The tiling that a method takes of frames of a size (width, height); see `parse_tiling`."""
+    return parse_tiling(tile, size, int(getattr(getattr(method, "network", None), "multiple", 2)))
+
+
 def part(gap: Gap, tile: Tile) -> Gap:
     """The part of a gap in a tile; events of another resolution are laid over the frames first."""
     frames = [frame[(..., *tile.within)] for frame in (gap.frame_0, gap.frame_1)]
-    events = None if gap.events is None else _events(gap.events, gap.frame_0.shape[-2:], tile)
+    height, width = gap.frame_0.shape[-2:]
+    events = None if gap.events is None else over(gap.events, (height, width), tile.within)
     return replace(gap, frame_0=frames[0], frame_1=frames[1], events=events)
-
-
-def _events(events: EventCounts, size: torch.Size, tile: Tile) -> EventCounts:
-    if events.off_on.shape[-2:] == size:
-        return replace(events, off_on=events.off_on[(..., *tile.within)])
-    return carried(events, places_over(events, (size[0], size[1]))[tile.within])
 
 
 def _parts(length: int, side: int, multiple: int) -> tuple[tuple[int, int], ...]:

@@ -19,33 +19,45 @@ import numpy as np
 import torch
 
 from interp.representation.event_counts import EventCounts
-from interp.warp import sample
+from interp.warp import sample_part
 
 if TYPE_CHECKING:
     from vid2ev.rig.intrinsics import Intrinsics
     from vid2ev.rig.pose import Pose
 
+Part = tuple[slice, slice]
+ALL: Part = slice(None), slice(None)
 
-def carried(counts: EventCounts, places: torch.Tensor) -> EventCounts:
+
+def carried(counts: EventCounts, places: torch.Tensor, within: Part = ALL) -> EventCounts:
     """Counts [B, 2, S, h, w] at places [H, W, 2] px (x, y) of the event camera: [B, 2, S, H, W] float32.
 
     NaN is a place that is not known.
+
+    within   rows and columns of the places: that part alone
     """
     height, width = counts.off_on.shape[-2:]
-    seen = ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
-    across = _pixels_across(places, seen)
+    across = _pixels_across(places, _seen(places, width, height))
     factor, footprint = max(1, round(across)), max(1, round(1 / max(across, 1e-9)))
-    maps = counts.pooled(factor).off_on.float()
+    maps, places = counts.pooled(factor).off_on, places[within]
+    seen = _seen(places, width, height)
     where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
-    found = sample(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float())
-    return replace(counts, off_on=(found * seen).unflatten(1, counts.off_on.shape[1:3]), footprint=footprint)
+    found = sample_part(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float()).mul_(seen)
+    return replace(counts, off_on=found.unflatten(1, counts.off_on.shape[1:3]), footprint=footprint, places=None)
 
 
-def over(counts: EventCounts, size: tuple[int, int]) -> EventCounts:
-    """Counts laid over frames of a size (height, width), edge on edge: for cameras that are not calibrated."""
+def over(counts: EventCounts, size: tuple[int, int], within: Part = ALL) -> EventCounts:
+    """Counts laid over frames of a size (height, width): at the places that they know, or else edge on edge, as for
+    cameras that are not calibrated.
+
+    within   rows and columns of the frames: that part alone
+    """
+    if counts.places is not None:
+        alone = (EventCounts(counts.off_on[b : b + 1], counts.contrast[b : b + 1]) for b in range(len(counts.places)))
+        return EventCounts.stacked([carried(*each, within) for each in zip(alone, counts.places, strict=True)])
     if counts.off_on.shape[-2:] == size:
-        return counts
-    return carried(counts, places_over(counts, size))
+        return counts if within == ALL else replace(counts, off_on=counts.off_on[(..., *within)])
+    return carried(counts, places_over(counts, size), within)
 
 
 def places_over(counts: EventCounts, size: tuple[int, int]) -> torch.Tensor:
@@ -82,7 +94,15 @@ def footprint_of(size: tuple[int, int], event_size: tuple[int, int]) -> int:
 def footprint_over(counts: EventCounts, size: tuple[int, int]) -> int:
     """The footprint that counts have, laid `over` frames of a size (height, width)."""
     height, width = counts.off_on.shape[-2:]
+    if counts.places is not None:
+        where = counts.places[0]
+        return max(1, round(1 / max(_pixels_across(where, _seen(where, width, height)), 1e-9)))
     return counts.footprint if (height, width) == size else footprint_of(size[::-1], (width, height))
+
+
+def _seen(places: torch.Tensor, width: int, height: int) -> torch.Tensor:
+    """Whether places are on a sensor."""
+    return ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
 
 
 def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> float:

@@ -24,6 +24,7 @@ from torch.nn import functional as F
 from interp.precision import in_full_precision
 from interp.representation.bins import bin_weights
 from interp.representation.dead_time import DeadTime
+from interp.rows import by_rows
 from vid2ev.errors import UsageError
 from vid2ev.sensors.limits import is_whole
 
@@ -42,11 +43,14 @@ class EventCounts:
     off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals, with what dead time hid if known
     contrast   [B, 2] nats that an OFF and an ON event stand for
     footprint  pixels across of the frames that a pixel of the event camera looks at, where it has been laid over them
+    places     [B, H, W, 2] px of the event camera (x, y), where pixels of frames look, if that is known and counts
+               have not been carried there yet: for part after part of large frames (`carried.over`)
     """
 
     off_on: torch.Tensor
     contrast: torch.Tensor
     footprint: int = 1
+    places: torch.Tensor | None = None
 
     @property
     def steps(self) -> int:
@@ -93,13 +97,18 @@ class EventCounts:
         counts = F.avg_pool2d(self.off_on.float().flatten(1, 2), factor, ceil_mode=True, count_include_pad=False)
         return replace(self, off_on=counts.unflatten(1, (2, self.steps)))
 
+    def summed(self) -> EventCounts:
+        """All of the time as one sub-interval, in float32."""
+        return replace(self, off_on=by_rows(lambda counts: counts.float().sum(2, keepdim=True), self.off_on))
+
     def reversed(self) -> EventCounts:
         """With time running backwards: the last sub-interval first, ON for OFF."""
         return replace(self, off_on=self.off_on.flip(1, 2), contrast=self.contrast.flip(1))
 
     def to(self, device: torch.device | str) -> EventCounts:
         """The same on a device."""
-        return replace(self, off_on=self.off_on.to(device), contrast=self.contrast.to(device))
+        places = None if self.places is None else self.places.to(device)
+        return replace(self, off_on=self.off_on.to(device), contrast=self.contrast.to(device), places=places)
 
     @staticmethod
     def none(batch: int, size: tuple[int, int], steps: int = 1, contrast: float = USUAL_NATS) -> EventCounts:
@@ -173,5 +182,10 @@ def _in_bins(
     """[B, N, bins, H, W] of counts [B, 2, S, H, W]; worth [B, 2]: what an OFF and an ON event count as."""
     weights = bin_weights(start, stop, bins, off_on.shape[2])
     both = torch.cat([weights * share[:, None, None, None] for share in worth.unbind(1)], -1)
-    found = both.flatten(1, 2) @ off_on.float().flatten(1, 2).flatten(2)
+    return by_rows(lambda counts: _added_up(both, counts), off_on)
+
+
+def _added_up(weights: torch.Tensor, off_on: torch.Tensor) -> torch.Tensor:
+    """Sums [B, N, bins, H, W] of counts [B, 2, S, H, W] by weights [B, N, bins, 2 S]."""
+    found = weights.flatten(1, 2) @ off_on.float().flatten(1, 2).flatten(2)
     return found.unflatten(1, weights.shape[1:3]).unflatten(3, off_on.shape[3:])

@@ -12,7 +12,6 @@ from torch.nn import functional as F
 
 from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
-from interp.methods.flow import flow
 from interp.methods.of_networks import of_weights
 from interp.networks import make, spec_of
 from interp.representation.event_counts import EventCounts
@@ -63,13 +62,14 @@ def test_flow_at_even_times_is_that_of_the_upsampler(steps: int) -> None:
     )
     even = [torch.from_numpy(each.light) for each in make_upsampler("flow", steps).between(before, after)]
     times = torch.from_numpy(np.linspace(0, 1, steps + 1)[1:]).float()
-    made = flow(Gap(*frames, None, 33_333), times)
+    made = open_method("flow").between(Gap(*frames, None, 33_333), times)
     assert torch.equal(made, to_codes(torch.stack(even).permute(0, 3, 1, 2), "srgb"))
 
 
 def test_flow_makes_the_instants_asked_for_and_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
     gap = Gap(*torch.rand(2, 3, 48, 64), None, 33_333)
     times = torch.tensor([0.0, 0.12501, 0.2493, 0.2493, 0.9, 1.0])  # as stamps of a real camera are
+    flow = open_method("flow").between
     alone = torch.cat([flow(gap, time[None]) for time in times])
     made: list[float] = []
     at = Moving.at

@@ -131,14 +131,14 @@ def test_what_remembers_sees_each_event_of_a_shot_once(
     """Those of gaps in which nothing is made, too; after a cut it begins anew."""
     save(tmp_path / "some.safetensors", "firenet", make("firenet"))
     seen: list[tuple[int, bool]] = []
-    between = OfEvents.between
+    images = OfEvents.images
 
-    def counted(self: OfEvents, gap: Gap, *asked: Any) -> torch.Tensor:
+    def counted(self: OfEvents, gap: Gap, *asked: Any) -> Iterator[torch.Tensor]:
         assert gap.events is not None
         seen.append((int(gap.events.off_on.sum()), bool(self.states)))
-        return between(self, gap, *asked)
+        return images(self, gap, *asked)
 
-    monkeypatch.setattr(OfEvents, "between", counted)
+    monkeypatch.setattr(OfEvents, "images", counted)
     source = recording(tmp_path / "in", [*moving(4, seed=1), *moving(3, seed=2)])
     interpolate(source, tmp_path / "out", network=tmp_path / "some.safetensors", **grid)
     assert seen == [(400, False), (400, True), (400, True), (400, False), (400, True)]
