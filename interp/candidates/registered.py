@@ -18,8 +18,6 @@ in three such scenes together 29.77 for 29.86.  Nothing is gained by it for a se
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 
@@ -27,7 +25,7 @@ from interp.candidates.bridge import DARK
 from interp.candidates.guided import SMALLEST, averaged, dense_flow
 from interp.light import Transfer, luminance, to_light
 from interp.precision import in_full_precision
-from interp.representation.carried import over, places_over
+from interp.representation.carried import at_places, over, places_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.upsample.motion import carried_along, convincing
 
@@ -52,7 +50,7 @@ def registered(
     moved = [_moved(*pictures) for pictures in zip((last - first)[:, 0], net, strict=True)]
     places = places_over(events, (height, width))
     per_pixel = places.new_tensor([events.off_on.shape[-1] / width, events.off_on.shape[-2] / height])
-    return replace(events, places=torch.stack([places + per_pixel * flow.to(places) for flow in moved]))
+    return at_places(events, torch.stack([places + per_pixel * flow.to(places) for flow in moved]))
 
 
 def _net(events: EventCounts) -> torch.Tensor:

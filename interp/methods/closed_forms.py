@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Self
 
 import torch
@@ -17,7 +16,7 @@ from interp.candidates.bridge import highest_of
 from interp.candidates.guided import SEES_PX, flows_to, guided
 from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.methods.gap import Gap, Together
-from interp.methods.tiling import Tile, Tiling, part, undivided
+from interp.methods.tiling import Tile, Tiling, part, strips, undivided
 from interp.representation.carried import footprint_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
@@ -63,8 +62,7 @@ def of_events(form: Form) -> Law:
     """Integration of events, pixel by pixel: a form of `interp.candidates`, some images at a time."""
 
     def law(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[torch.Tensor]:
-        highest = highest_of(*_frames(gap))
-        return (tiling.cells(partial(_in_tile, form, gap, some, highest)) for some in _some(gap, times))
+        return (_in_strips(form, gap, some) for some in _some(gap, times))
 
     return law
 
@@ -77,7 +75,7 @@ def guided_by_ramps(gap: Gap, times: torch.Tensor, tiling: Tiling) -> Iterator[t
 def _guided(gap: Gap, times: torch.Tensor, tiling: Tiling) -> torch.Tensor:
     assert gap.events is not None
     frames, footprint = _frames(gap), footprint_over(gap.events, tiling.size)
-    seen = tiling.cells(partial(_in_tile, _ramps_and_doubt, gap, times, highest_of(*frames)))
+    seen = _in_strips(_ramps_and_doubt, gap, times)
     images = pictures = seen[None, :, :-1]
     doubt = seen[None, :, -1:]
     for _ in range(1 if footprint == 1 else ROUNDS):
@@ -102,11 +100,17 @@ def _ramps_and_doubt(
     return torch.cat([pictures, in_doubt(frame_0, frame_1, found, times)], 2)
 
 
-def _in_tile(form: Form, gap: Gap, times: torch.Tensor, highest: torch.Tensor, tile: Tile) -> torch.Tensor:
-    """Images [N, C, h, w] of a form that looks at pixels alone."""
-    seen = part(gap, tile)
-    assert seen.events is not None
-    return form(*_frames(seen), seen.events, times[None], highest=highest)[0]
+def _in_strips(form: Form, gap: Gap, times: torch.Tensor) -> torch.Tensor:
+    """Images [N, C, H, W] of a form that looks at pixels alone: in any tiles the same, so in small ones."""
+    highest = highest_of(*_frames(gap))
+
+    def law(strip: Tile) -> torch.Tensor:
+        seen = part(gap, strip)
+        assert seen.events is not None
+        return form(*_frames(seen), seen.events, times[None], highest=highest)[0]
+
+    height, width = gap.frame_0.shape[-2:]
+    return strips(width, height).cells(law)
 
 
 def _frames(gap: Gap) -> tuple[torch.Tensor, torch.Tensor]:

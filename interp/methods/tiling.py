@@ -29,6 +29,7 @@ WHOLE_PX = 1 << 20
 SIDE = 1024  # px of tiles, unless asked for
 OVERLAP = 128  # px
 LEAST = 64  # px
+STRIP_PX = 1 << 18  # in which all that is made of events between two frames, some thousand bytes each, is small
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +102,12 @@ class Tiling:
 def undivided(width: int, height: int) -> Tiling:
     """The tiling of frames into one tile."""
     return Tiling(((0, width),), ((0, height),))
+
+
+def strips(width: int, height: int) -> Tiling:
+    """The tiling of frames for what looks at single pixels: rows side by side."""
+    rows = max(1, STRIP_PX // width)
+    return Tiling(((0, width),), tuple((top, min(top + rows, height)) for top in range(0, height, rows)))
 
 
 def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 
-from interp.representation.event_counts import EventCounts
+from interp.representation.event_counts import EventCounts, Places
 from interp.warp import sample_part
 
 if TYPE_CHECKING:
@@ -36,14 +36,7 @@ def carried(counts: EventCounts, places: torch.Tensor, within: Part = ALL) -> Ev
 
     within   rows and columns of the places: that part alone
     """
-    height, width = counts.off_on.shape[-2:]
-    across = _pixels_across(places, _seen(places, width, height))
-    factor, footprint = max(1, round(across)), max(1, round(1 / max(across, 1e-9)))
-    maps, places = counts.pooled(factor).off_on, places[within]
-    seen = _seen(places, width, height)
-    where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
-    found = sample_part(maps.flatten(1, 2), where.expand(len(maps), -1, -1, -1).float()).mul_(seen)
-    return replace(counts, off_on=found.unflatten(1, counts.off_on.shape[1:3]), footprint=footprint, places=None)
+    return _carried(counts, places[within], _pixels_across(places, counts.off_on.shape[-2:]))
 
 
 def over(counts: EventCounts, size: tuple[int, int], within: Part = ALL) -> EventCounts:
@@ -53,11 +46,30 @@ def over(counts: EventCounts, size: tuple[int, int], within: Part = ALL) -> Even
     within   rows and columns of the frames: that part alone
     """
     if counts.places is not None:
-        alone = (EventCounts(counts.off_on[b : b + 1], counts.contrast[b : b + 1]) for b in range(len(counts.places)))
-        return EventCounts.stacked([carried(*each, within) for each in zip(alone, counts.places, strict=True)])
+        alone = [replace(counts, off_on=each[None]) for each in counts.off_on]
+        known = zip(alone, counts.places.where, counts.places.across, strict=True)
+        laid = [_carried(one, where[within], across) for one, where, across in known]
+        return replace(laid[0], off_on=torch.cat([each.off_on for each in laid]))
     if counts.off_on.shape[-2:] == size:
         return counts if within == ALL else replace(counts, off_on=counts.off_on[(..., *within)])
     return carried(counts, places_over(counts, size), within)
+
+
+def at_places(counts: EventCounts, where: torch.Tensor) -> EventCounts:
+    """Counts that are to be carried to places [B, H, W, 2] px (x, y) of the event camera."""
+    size = counts.off_on.shape[-2:]
+    return replace(counts, places=Places(where, tuple(_pixels_across(each, size) for each in where)))
+
+
+def _carried(counts: EventCounts, places: torch.Tensor, across: float) -> EventCounts:
+    height, width = counts.off_on.shape[-2:]
+    seen = _seen(places, (height, width))
+    factor = max(1, round(across))
+    maps = counts.pooled(factor).off_on.flatten(1, 2)
+    where = torch.where(seen[..., None], (places + 0.5) / factor - 0.5, 0).permute(2, 0, 1)
+    found = sample_part(maps, where.expand(len(maps), -1, -1, -1).float()).mul_(seen)
+    laid = found.unflatten(1, counts.off_on.shape[1:3])
+    return replace(counts, off_on=laid, footprint=_footprint(across), places=None)
 
 
 def places_over(counts: EventCounts, size: tuple[int, int]) -> torch.Tensor:
@@ -93,19 +105,23 @@ def footprint_of(size: tuple[int, int], event_size: tuple[int, int]) -> int:
 
 def footprint_over(counts: EventCounts, size: tuple[int, int]) -> int:
     """The footprint that counts have, laid `over` frames of a size (height, width)."""
-    height, width = counts.off_on.shape[-2:]
     if counts.places is not None:
-        where = counts.places[0]
-        return max(1, round(1 / max(_pixels_across(where, _seen(where, width, height)), 1e-9)))
+        return _footprint(counts.places.across[0])
+    height, width = counts.off_on.shape[-2:]
     return counts.footprint if (height, width) == size else footprint_of(size[::-1], (width, height))
 
 
-def _seen(places: torch.Tensor, width: int, height: int) -> torch.Tensor:
-    """Whether places are on a sensor."""
-    return ((places > -0.5) & (places < places.new_tensor([width, height]) - 0.5)).all(-1)
+def _footprint(across: float) -> int:
+    return max(1, round(1 / max(across, 1e-9)))
 
 
-def _pixels_across(places: torch.Tensor, seen: torch.Tensor) -> float:
-    """How many pixels of the event camera a pixel of the frame is wide, in the middle of all."""
+def _seen(places: torch.Tensor, size: tuple[int, ...]) -> torch.Tensor:
+    """Which places [H, W, 2] are on a sensor of a size (height, width)."""
+    return ((places > -0.5) & (places < places.new_tensor(size[::-1]) - 0.5)).all(-1)
+
+
+def _pixels_across(places: torch.Tensor, size: tuple[int, ...]) -> float:
+    """How many pixels of an event camera of a size a pixel of the frame is wide, in the middle of all."""
+    seen = _seen(places, size)
     across = (places[:, 1:] - places[:, :-1]).norm(dim=-1)[seen[:, 1:] & seen[:, :-1]]
     return float(across.median()) if len(across) else 1.0

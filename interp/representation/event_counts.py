@@ -37,20 +37,32 @@ LARGEST = 10.0
 
 
 @dataclass(frozen=True, slots=True)
+class Places:
+    """Where pixels of B frames look at an event camera.
+
+    where   [B, H, W, 2] px of the event camera (x, y); NaN is a place that is not known
+    across  how many of its pixels one of the frame is wide, of each of B, in the middle of all
+    """
+
+    where: torch.Tensor
+    across: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class EventCounts:
     """Counts of B pairs of frames.
 
     off_on     [B, 2, S, H, W], of any type: OFF and ON events of the sub-intervals, with what dead time hid if known
     contrast   [B, 2] nats that an OFF and an ON event stand for
     footprint  pixels across of the frames that a pixel of the event camera looks at, where it has been laid over them
-    places     [B, H, W, 2] px of the event camera (x, y), where pixels of frames look, if that is known and counts
-               have not been carried there yet: for part after part of large frames (`carried.over`)
+    places     where pixels of frames look, if that is known and counts have not been carried there yet: for part after
+               part of large frames (`carried.over`)
     """
 
     off_on: torch.Tensor
     contrast: torch.Tensor
     footprint: int = 1
-    places: torch.Tensor | None = None
+    places: Places | None = None
 
     @property
     def steps(self) -> int:
@@ -107,7 +119,7 @@ class EventCounts:
 
     def to(self, device: torch.device | str) -> EventCounts:
         """The same on a device."""
-        places = None if self.places is None else self.places.to(device)
+        places = self.places and replace(self.places, where=self.places.where.to(device))
         return replace(self, off_on=self.off_on.to(device), contrast=self.contrast.to(device), places=places)
 
     @staticmethod
