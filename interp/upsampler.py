@@ -1,7 +1,8 @@
 """`vid2ev convert --upsample net`: light between frames by a network of frames alone.
 
 How many steps an interval takes is decided as for optical flow, by its motion; where nothing moves there are none.
-Codes of the network are sRGB, and light above white goes on, as far as the network lets it.
+Codes of the network are sRGB, and light above white goes on, as far as the network lets it.  Large frames are made in
+tiles, as `vid2ev interpolate` makes them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import torch
 
 from interp import pretrained
 from interp.light import to_codes, to_light
-from interp.methods.of_networks import AT_ONCE_PX, OfFrames, of_weights
+from interp.methods.gap import Gap
+from interp.methods.of_networks import OfFrames, of_weights
+from interp.methods.tiling import tiling_of
 from vid2ev import Frame
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import sha256
@@ -42,7 +45,7 @@ class NetUpsampling:
         method = of_weights(weights, self._upload.device)
         if not isinstance(method, OfFrames) or method.needs_events:
             raise UsageError(f"upsampling 'net:{weights}': the network needs events; give one of frames alone")
-        self._network = method.network
+        self._method = method
         self.subframes, self.max_subframes = subframes, max_subframes
         self._motion = make_upsampler("flow", subframes, max_subframes, threshold)
         self.about = {"weights": weights.name, "sha256": sha256(weights)}
@@ -62,16 +65,13 @@ class NetUpsampling:
 
     def _made(self, a: Frame, b: Frame, times_ns: list[int]) -> Iterator[Frame]:
         shares = self._upload.tensor(np.array([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns], np.float32))
-        with torch.inference_mode():
-            before, after = (_codes(self._upload.light(frame.light)) for frame in (a, b))
-            pair = self._network.prepare(before, after)
-        some = max(1, AT_ONCE_PX // int(np.prod(a.light.shape[:2])))
-        for first in range(0, len(times_ns), some):
-            with torch.inference_mode():
-                images = self._network.at(pair, shares[first : first + some]).images[0]
-            for t_ns, image in zip(times_ns[first : first + some], images, strict=True):
-                light: Any = _light(image, a.light.ndim)
-                yield Frame(light if self._stays else light.numpy(), t_ns, original=False)
+        before, after = (_codes(self._upload.light(frame.light)) for frame in (a, b))
+        gap = Gap(before, after, None, round((b.t_ns - a.t_ns) / 1000))
+        height, width = a.light.shape[:2]
+        made = self._method.images(gap, shares, tiling_of(self._method, (width, height)))
+        for t_ns, image in zip(times_ns, (image for images in made for image in images), strict=True):
+            light: Any = _light(image, a.light.ndim)
+            yield Frame(light if self._stays else light.numpy(), t_ns, original=False)
         yield self._upload.frame(b) if self._stays else b
 
 
@@ -89,10 +89,10 @@ def make(
 
 
 def _codes(light: torch.Tensor) -> torch.Tensor:
-    """sRGB codes [1, C, H, W] of light [H, W] or [H, W, C]."""
+    """sRGB codes [C, H, W] of light [H, W] or [H, W, C]."""
     light = light.nan_to_num(nan=0.0, posinf=1.0)
     planes = light[None] if light.ndim == 2 else light.permute(2, 0, 1)
-    return to_codes(planes[None], "srgb")
+    return to_codes(planes, "srgb")
 
 
 def _light(image: torch.Tensor, dimensions: int) -> torch.Tensor:

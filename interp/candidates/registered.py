@@ -44,13 +44,19 @@ def registered(
     if min(height, width) < SMALLEST:
         return events
     whole = over(events.summed(), (height, width))
-    lights = (luminance(to_light(frame, transfer)).clamp(min=0) for frame in (frame_0, frame_1))
-    first, last = (torch.log(averaged(light, whole.footprint) + DARK) for light in lights)
-    net = _net(whole)
-    moved = [_moved(*pictures) for pictures in zip((last - first)[:, 0], net, strict=True)]
+    moved = [
+        _moved(*pictures) for pictures in zip(_change(frame_0, frame_1, whole, transfer), _net(whole), strict=True)
+    ]
     places = places_over(events, (height, width))
     per_pixel = places.new_tensor([events.off_on.shape[-1] / width, events.off_on.shape[-2] / height])
     return at_places(events, torch.stack([places + per_pixel * flow.to(places) for flow in moved]))
+
+
+def _change(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer) -> torch.Tensor:
+    """d of frames, [B, H, W] nat."""
+    lights = (luminance(to_light(frame, transfer)).clamp(min=0) for frame in (frame_0, frame_1))
+    first, last = (torch.log(averaged(light, events.footprint) + DARK) for light in lights)
+    return (last - first)[:, 0]
 
 
 def _net(events: EventCounts) -> torch.Tensor:

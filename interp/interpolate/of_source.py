@@ -80,13 +80,17 @@ class OfSource:
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""
         for frame in self._source.frames(start):
-            light = torch.from_numpy(np.nan_to_num(frame.light, nan=0.0))
-            codes = to_codes(light if self.channels == 3 else light[..., :1], "srgb").numpy()
-            if self._top:
-                codes *= self._top
-                np.rint(codes, out=codes)
-                codes /= self._top
-            yield Key(round(Fraction(frame.t_ns, 1000)), codes)
+            yield Key(round(Fraction(frame.t_ns, 1000)), self._codes(frame.light))
+
+    def _codes(self, light: np.ndarray) -> np.ndarray:
+        """Of light [H, W, 3], [H, W, channels]."""
+        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0))
+        codes = to_codes(seen if self.channels == 3 else seen[..., :1], "srgb").numpy()
+        if self._top:
+            codes *= self._top
+            np.rint(codes, out=codes)
+            codes /= self._top
+        return codes
 
     def _mean_rate(self) -> Fraction:
         gaps, span_s = self.gaps_expected, self._source.duration_expected_s
