@@ -19,7 +19,9 @@ import torch
 from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
+from interp.methods.tiling import Tile, strips
 from interp.networks.hdr import Hdr, HdrState
+from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
 from vid2ev.errors import UsageError
@@ -59,10 +61,10 @@ class After:
             if frame.key and before and first is not None:
                 yield replace(frame, key=False, codes=first)
                 continue
-            since = self._voxels(work.events, frame.instant.share) if before else None
+            since = self._voxels(work, frame.instant.share) if before else None
             codes, _ = self._processed(frame.codes, since, before)
             yield replace(frame, key=False, codes=codes)
-        self._state, self._rest = state, self._voxels(work.events, 1)
+        self._state, self._rest = state, self._voxels(work, 1)
 
     def memory(self) -> dict[str, np.ndarray]:
         """What it has to remember after a stretch."""
@@ -90,9 +92,15 @@ class After:
         found = found if len(found) == codes.shape[2] else found.mean(0, keepdim=True)
         return found.movedim(0, -1).cpu().numpy(), after
 
-    def _voxels(self, events: EventCounts | None, until: Fraction | int) -> torch.Tensor | None:
-        """The events of a gap, from its key frame on; None where they are not known."""
-        if events is None:
+    def _voxels(self, work: Work, until: Fraction | int) -> torch.Tensor | None:
+        """The events of a gap, from its key frame on, laid over the frames; None where they are not known."""
+        if work.events is None:
             return None
+        height, width = work.first.codes.shape[:2]
         edges = torch.tensor([[0.0], [float(until)]], device=self.device)
-        return events.voxels(edges[:1], edges[1:], self.network.spec.bins)[:, 0]
+
+        def law(strip: Tile, events: EventCounts = work.events) -> torch.Tensor:
+            laid = over(events, (height, width), strip.within)
+            return laid.voxels(edges[:1], edges[1:], self.network.spec.bins)[:, 0]
+
+        return strips(width, height).cells(law)

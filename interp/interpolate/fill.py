@@ -24,7 +24,6 @@ from interp.interpolate.stretches import CUT, UNRELATED, Stretch
 from interp.interpolate.take import Key, Take
 from interp.methods import Gap, Method
 from interp.methods.tiling import Tiling
-from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts, count_events
 
 FEWEST, MOST = 32, 128  # sub-intervals in which events are counted
@@ -59,7 +58,7 @@ class Work:
     first    the key frame that it begins with, whether or not it is one of the frames
     shot     how many cuts there were before that
     remark   why the method was not asked; empty if it was
-    events   what the events of the stretch say, laid over the frames, where anybody asks for them and they are known
+    events   what the events of the stretch say, where anybody asks for them and they are known
     """
 
     frames: Iterator[Filled]
@@ -100,7 +99,7 @@ class Fill:
         if stretch.second is None or stretch.between == CUT or not looked_at:
             return Work(self._held(stretch, shot), stretch.first, shot, remark)
         gap = self._gap(stretch, stretch.second)
-        events = _laid(gap) if self.events else None
+        events = gap.events if self.events else None
         if held:
             return Work(self._held(stretch, shot), stretch.first, shot, remark, events)
         unknown = self.method.needs_events and gap.events is None
@@ -152,12 +151,6 @@ class Fill:
         steps, dead_time = steps_for(self.parts), self.take.dead_time
         counts = count_events(events, size, first.t_us, second.t_us, steps, dead_time=dead_time).to(self.device)
         return calibrated(frames, counts, self.take.contrast, self.take.apart)
-
-
-def _laid(gap: Gap) -> EventCounts | None:
-    """The events of a gap, laid over its frames."""
-    height, width = gap.frame_0.shape[-2:]
-    return None if gap.events is None else over(gap.events, (height, width))
 
 
 def steps_for(parts: int | None) -> int:
