@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
+from small_takes import images, moving
+from torch.utils._python_dispatch import TorchDispatchMode
 
-from interp.methods import METHODS, Gap, open_method
+from interp.candidates.calibrated import calibrated
+from interp.interpolate.whole import frames
+from interp.methods import METHODS, Gap, closed_forms, of_networks, open_method, tiling
 from interp.methods.of_networks import OfFrames
 from interp.methods.tiling import LEAST, Tiling, parse_tiling, part
 from interp.networks import make
-from interp.representation.carried import over
+from interp.representation.carried import at_places, carried, footprint_over, over, places_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.errors import UsageError
 
@@ -68,6 +76,90 @@ def test_what_looks_at_a_pixel_alone_is_the_same_in_tiles(method: str) -> None:
     opened, whole = open_method(method), gap((136, 104))
     tiled = opened.between(whole, TIMES, parse_tiling("96x96", SIZE, 2))
     torch.testing.assert_close(tiled, opened.between(whole, TIMES), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("event_size", [SIZE, (136, 104)])
+@pytest.mark.parametrize("method", ["integration", "bridge", "ramps"])
+def test_strips_are_the_whole_to_the_bit(
+    monkeypatch: pytest.MonkeyPatch, method: str, event_size: tuple[int, int]
+) -> None:
+    whole = gap(event_size)
+    at_once = open_method(method).between(whole, TIMES)
+    monkeypatch.setattr(tiling, "STRIP_PX", 16 * SIZE[0])
+    made = open_method(method).between(whole, TIMES)
+    assert torch.equal(made, at_once) if event_size == SIZE else float((made - at_once).abs().max()) < 1e-6
+
+
+class Largest(TorchDispatchMode):
+    """How many values the largest tensor has that is made meanwhile."""
+
+    values = 0
+
+    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        made = func(*args, **(kwargs or {}))
+        if isinstance(made, torch.Tensor):
+            self.values = max(self.values, made.numel())
+        return made
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("method", ["bridge", "ramps", "guided"])
+def test_coarse_events_never_lie_over_whole_frames(monkeypatch: pytest.MonkeyPatch, method: str, apart: bool) -> None:
+    """All that is made is as large as images and motion to them, however finely time is divided."""
+    monkeypatch.setattr(tiling, "STRIP_PX", 8 * SIZE[0])
+    whole = gap((68, 52))
+    assert whole.events is not None
+    fine = EventCounts(torch.poisson(torch.full((1, 2, 64, 52, 68), 0.01)), whole.events.contrast)
+    with Largest() as largest:
+        events = calibrated((whole.frame_0, whole.frame_1), fine, None, apart)
+        open_method(method).between(replace(whole, events=events), TIMES[:1])
+    assert largest.values <= 8 * SIZE[0] * SIZE[1] < 2 * 64 * SIZE[0] * SIZE[1]
+
+
+@pytest.mark.parametrize("event_size", [SIZE, (136, 104)])
+def test_events_that_belong_elsewhere_go_with_their_tile_too(event_size: tuple[int, int]) -> None:
+    whole = gap(event_size)
+    assert whole.events is not None
+    where = places_over(EventCounts.none(1, event_size[::-1]), SIZE[::-1]) + 9 * torch.rand(*SIZE[::-1], 2) - 5
+    moved = replace(whole, events=at_places(whole.events, where[None]))
+    assert moved.events is not None
+    laid = carried(whole.events, where)
+    assert torch.equal(over(moved.events, SIZE[::-1]).off_on, laid.off_on)
+    assert footprint_over(moved.events, SIZE[::-1]) == laid.footprint
+    for tile in parse_tiling("96x96", SIZE, 32):
+        cut = part(moved, tile)
+        assert cut.events is not None and cut.events.places is None and cut.events.footprint == laid.footprint
+        torch.testing.assert_close(cut.events.off_on, laid.off_on[(..., *tile.within)], atol=1e-4, rtol=0)
+
+
+@pytest.mark.parametrize("name", ["linear", "flow", "bridge", "guided", "rrin_events_light"])
+def test_images_come_some_at_a_time(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setattr(closed_forms, "AT_ONCE_PX", SIZE[0] * SIZE[1])
+    monkeypatch.setattr(of_networks, "HELD", 2 * 3 * SIZE[0] * SIZE[1])
+    network = None if name in METHODS else make(name).eval()
+    method = open_method(name) if network is None else OfFrames(name, network, needs_events=True)
+    divided = parse_tiling("192x160", SIZE, 2 if network is None else network.multiple)
+    some = [*method.images(gap(), TIMES, divided)]
+    assert [len(images) for images in some] == ([1, 1, 1] if network is None else [2, 1])
+
+
+def test_frames_that_are_taken_are_let_go(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """No more than two images are there at a time: one that is made, and the one before."""
+    there: weakref.WeakSet[torch.Tensor] = weakref.WeakSet()
+    most = 0
+
+    def law(gap: Gap, times: torch.Tensor, _: Tiling) -> Iterator[torch.Tensor]:
+        nonlocal most
+        for _each in times:
+            made = gap.frame_0[None].clone()
+            there.add(made)
+            most = max(most, len(there))
+            yield made
+            del made
+
+    monkeypatch.setitem(METHODS, "linear", lambda: closed_forms.ClosedForm("linear", law, needs_events=False))
+    assert len([*frames(images(tmp_path / "in", moving(3)), multiple=8, method="linear")]) == 17
+    assert most == 1
 
 
 def test_a_network_in_tiles_makes_the_same_but_at_their_borders() -> None:
