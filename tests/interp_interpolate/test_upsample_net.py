@@ -11,6 +11,7 @@ import torch
 from small_takes import images, moving
 
 from interp import pretrained
+from interp.methods import of_networks, tiling
 from interp.networks import make
 from interp.weights import save
 from vid2ev import Frame, convert
@@ -98,3 +99,15 @@ def test_without_a_name_the_weights_that_come_with_it_are_taken(monkeypatch: pyt
     monkeypatch.setattr(pretrained, "OF_FRAMES", ())
     with pytest.raises(UsageError, match="net:WEIGHTS, or choose flow"):
         make_upsampler("net")
+
+
+def test_large_frames_are_made_in_tiles(weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = (Frame(np.random.default_rng(k).random((48, 256), np.float32), 33_333_333 * k) for k in (0, 1))
+    whole = list(make_upsampler(f"net:{weights}", 3).between(a, b))
+    parts: list[tiling.Tile] = []
+    monkeypatch.setattr(of_networks, "part", lambda gap, tile: parts.append(tile) or tiling.part(gap, tile))
+    monkeypatch.setattr(tiling, "WHOLE_PX", 1)
+    monkeypatch.setattr(tiling, "SIDE", 128)
+    for one, other in zip(whole, make_upsampler(f"net:{weights}", 3).between(a, b), strict=True):
+        np.testing.assert_allclose(one.light, other.light, atol=1e-5)
+    assert len(parts) > 1 and max(tile.right - tile.left for tile in parts) <= 128
