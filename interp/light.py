@@ -22,19 +22,20 @@ from vid2ev.light.transfer import SRGB_KNEE, SRGB_OFFSET, SRGB_POWER, SRGB_SLOPE
 from vid2ev.stream.frames import LUMINANCE
 
 RATIOS = 1000.0
+PIECES = 4  # of smaller pictures the curves are faster at once
 Transfer = Literal["srgb", "linear"]
 
 
 @in_full_precision
 def to_light(codes: torch.Tensor, transfer: Transfer) -> torch.Tensor:
     """Linear light of codes; 1 is diffuse white."""
-    return codes.clamp(min=0) if transfer == "linear" else by_rows(_srgb_light, codes)
+    return codes.clamp(min=0) if transfer == "linear" else by_rows(_srgb_light, codes, PIECES)
 
 
 @in_full_precision
 def to_codes(light: torch.Tensor, transfer: Transfer) -> torch.Tensor:
     """Codes of linear light."""
-    return light.clamp(min=0) if transfer == "linear" else by_rows(_srgb_codes, light)
+    return light.clamp(min=0) if transfer == "linear" else by_rows(_srgb_codes, light, PIECES)
 
 
 @in_full_precision

@@ -44,7 +44,7 @@ def test_light_codes_and_events_are_those_of_the_whole_to_the_bit(monkeypatch: p
         return [light, to_codes(light, "srgb"), voxels, summed, found.change, found.left, found.number, found.more]
 
     whole = made()
-    monkeypatch.setattr(rows, "AT_ONCE", 16 * 16 * SIZE[1])  # 16 rows of the counts
+    monkeypatch.setattr(rows, "AT_ONCE", 16 * 3 * SIZE[1])  # 16 rows of the codes, and 3 of the counts
     for one, other in zip(whole, made(), strict=True):
         assert torch.equal(one, other)
 
