@@ -29,7 +29,7 @@ WHOLE_PX = 1 << 20
 SIDE = 1024  # px of tiles, unless asked for
 OVERLAP = 128  # px
 LEAST = 64  # px
-STRIP_PX = 1 << 18  # in which all that is made of events between two frames, some thousand bytes each, is small
+STRIP_PX = 1 << 20  # (in smaller ones threads wait for each other)
 
 
 @dataclass(frozen=True, slots=True)
