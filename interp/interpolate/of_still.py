@@ -83,9 +83,9 @@ class OfStill:
     def describe(self) -> dict[str, Any]:
         """What both files are."""
         about = {"kind": "single frame", "path": str(self._picture), "size": list(self.size)}
-        events = {"path": str(self._path), "identity": identity(self._path), "contrast": list(self.contrast)}
-        events_too = events | {"dead_time": stated(self.dead_time)}
-        return about | {"identity": identity(self._picture), "events": events_too}
+        known = {"contrast": list(self.contrast), "dead_time": stated(self.dead_time)}
+        events = {"path": str(self._path), "identity": identity(self._path)} | known
+        return about | {"identity": identity(self._picture), "events": events}
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """The frame, at both ends of its exposure."""

@@ -26,8 +26,7 @@ and +0.6, 800 us +3.9 and +2.5.  None of these gaps, and none of flicker, is wor
 flicker is by 0.4.  The other law gives a sixth of that (for track) or costs up to 1.4 dB.
 
 Source of m for track: a counter whose dead time is not extended by what it misses (G. Knoll, "Radiation detection and
-measurement", 4th ed., chapter 4), for single intervals.  quantised: ours; r by Bayes, as likely
-whatever it is.
+measurement", 4th ed., chapter 4), for single intervals.  quantised: ours; r by Bayes, as likely whatever it is.
 """
 
 from __future__ import annotations
