@@ -62,8 +62,8 @@ def apart(ours: dict[int, Any], theirs: dict[int, Any]) -> tuple[float, float]:
     """Shares of codes, and of events, that differ in clips of the same numbers."""
     pairs = [(ours[number], theirs[number]) for number in theirs]
     codes = np.mean([(one.truth != other.truth).mean() for one, other in pairs])
-    moved = sum(int(np.abs(one.off_on.astype(int) - other.off_on).sum()) for one, other in pairs)
-    return float(codes), moved / max(1, sum(int(other.off_on.sum()) for _, other in pairs))
+    moved = sum(float(np.abs(one.off_on.astype(float) - other.off_on).sum()) for one, other in pairs)
+    return float(codes), moved / max(1, sum(float(other.off_on.sum(dtype=float)) for _, other in pairs))
 
 
 def samples_per_second(settings: Any, side: int) -> float:

@@ -227,7 +227,8 @@ def _clips(folder: Path) -> list[Path]:
 
     draw = np.random.default_rng(0)
     truth, keys = (draw.integers(0, 256, (count, 8, 8, 3), np.uint8) for count in (5, 2))
-    clip = Clip(truth, keys, draw.integers(0, 4, (2, 8, 8, 8), np.uint8), (0.2, 0.2), 33_333, {"scene": "x"})
+    off_on = draw.integers(0, 4, (2, 8, 8, 8)).astype(np.float16)
+    clip = Clip(truth, keys, off_on, (0.2, 0.2), 33_333, {"scene": "x"})
     write_clip(folder / "clip.npy", clip)
     return [folder / "clip.npy"]
 
@@ -236,7 +237,7 @@ def _read_clip(path: Path) -> None:
     from interp.data.clip import read_clip
 
     clip = read_clip(path)
-    sum(int(part.sum()) for part in (clip.truth, clip.keys, clip.off_on))
+    sum(float(part.sum(dtype=float)) for part in (clip.truth, clip.keys, clip.off_on))
     assert clip.multiple >= 1 and clip.coarser >= 1 and clip.about is not None
 
 

@@ -65,15 +65,16 @@ def stilled(clip: Clip, still: np.ndarray, quality: int | None = None) -> Clip:
         for key, own in zip(keys, noise, strict=True):
             key[still] = np.clip(first.astype(np.int16) + own * small[..., None], 0, 255).astype(np.uint8)[still]
     each = clip.coarser
-    off_on *= ~still[each // 2 :: each, each // 2 :: each]
+    np.copyto(off_on, 0, where=still[each // 2 :: each, each // 2 :: each])
     return replace(clip, truth=truth, keys=keys, off_on=off_on)
 
 
 def thinned(clip: Clip, draw: np.random.Generator, share: float) -> Clip:
-    """With a share of the events lost."""
-    off_on = np.array(clip.off_on)
+    """With a share of the events lost, and of what they stand for."""
+    off_on = np.array(clip.off_on, np.float16)
     some = off_on > 0  # (of the others nothing is drawn, but it takes as long)
-    off_on[some] = draw.binomial(off_on[some], 1 - share)
+    most = np.ceil(off_on[some])
+    off_on[some] *= draw.binomial(most.astype(np.int64), 1 - share) / most
     return replace(clip, off_on=off_on)
 
 

@@ -16,6 +16,7 @@ from interp.data.chance import Range, chance, uniform
 from interp.data.sensor_ranges import SensorRanges
 from interp.data.settings import ClipSettings
 from interp.data.shot import AHEAD, Beside, Shot
+from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DvsSpec
 
 BRIGHT_PERCENTILE = 95.0
@@ -60,6 +61,11 @@ class Cameras:
     def size_of_events(self) -> tuple[int, int]:
         """Width and height of the event camera [px]."""
         return self.size[0] // self.beside.coarser, self.size[1] // self.beside.coarser
+
+    @property
+    def dead_time(self) -> DeadTime | None:
+        """Of the event camera's pixels, if there is any."""
+        return DeadTime.of(self.dvs.model_dump())
 
     def t_ns(self, j: int) -> int:
         """When step j is [ns]; times are not negative."""

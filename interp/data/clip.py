@@ -23,7 +23,7 @@ class Clip:
                exposure and noise: sRGB codes uint8, or linear light float16, [K + 1, H, W, 3]
     keys       the two key frames as the frame camera gave them, sRGB codes uint8 [2, H, W, 3]; the instants of the ends
                are the middles of their exposures
-    off_on     OFF and ON events in each of S equal sub-intervals, uint8 [2, S, h, w]
+    off_on     OFF and ON events in each of S equal sub-intervals, with what dead time hid, float16 [2, S, h, w]
     contrast   what an OFF and an ON event stand for, nominally [nat]
     gap_us     from key frame to key frame [us]
     about      where it comes from, and the event camera's place: ready for JSON
@@ -90,8 +90,9 @@ def read_clip(path: Path) -> Clip:
 def _check(clip: Clip) -> None:
     """Raise ValueError for what no clip is."""
     truth, keys, off_on = clip.truth, clip.keys, clip.off_on
-    codes = truth.dtype in (np.uint8, np.float16) and keys.dtype == off_on.dtype == np.uint8
-    if not codes or [truth.ndim, keys.ndim, off_on.ndim] != [4, 4, 4] or 0 in (*truth.shape, *off_on.shape):
+    either = np.uint8, np.float16  # (counts of bytes are of older clips)
+    kinds = truth.dtype in either and off_on.dtype in either and keys.dtype == np.uint8
+    if not kinds or [truth.ndim, keys.ndim, off_on.ndim] != [4, 4, 4] or 0 in (*truth.shape, *off_on.shape):
         raise ValueError(f"{truth.dtype} {list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}")
     alike = keys.shape == (2, *truth.shape[1:]) and truth.shape[3] == 3 and len(truth) > 1 and len(off_on) == 2
     if not alike or off_on.shape[3] > truth.shape[2] or clip.gap_us <= 0 or not isinstance(clip.about, dict):

@@ -1,12 +1,13 @@
 """`made_on_card`: the clips of some numbers, made on a GPU: `made`, but for the last bits of the light.
 
-Light, its two cameras and the counts of events stay on the device; what comes back is the clip.  Clips whose event
-cameras switch on the same effects, and watch as many pictures of one size, are walked together.
+Light and its two cameras stay on the device; what comes back are frames and events, which are counted by threads here.
+Clips whose event cameras switch on the same effects, and watch as many pictures of one size, are walked together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -17,9 +18,9 @@ from interp.data.clip import Clip
 from interp.data.making import looked_at, made, wanted
 from interp.data.settings import ClipSettings
 from interp.data.shot import Shot
-from interp.data.simulate import MOST, Frames, clip_of
+from interp.data.simulate import Frames, clip_of, counts_of
+from vid2ev import Events
 from vid2ev.sensors.batch_on_card import DvsBatchOnCard
-from vid2ev.sensors.card_events import CardSent
 from vid2ev.sensors.cis_on_card import CisOnCard
 from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.devices import Device
@@ -40,29 +41,6 @@ class Seen:
         for j, frame in enumerate(light * float(gain), cameras.first):
             self.frames.add(j, frame)
         self.luminance = luminance[: cameras.steps - cameras.first + 1] * float(gain)
-
-
-class CountsOnCard:
-    """Events of some clips, counted in equal parts of the time from one gap after 0 to two, by polarity."""
-
-    def __init__(self, memory: Any, cameras: list[Cameras], bins: int):
-        (width, height), self._memory, self._bins = cameras[0].size_of_events, memory, bins
-        self._gap_us, self._pixels = memory.put(np.array([one.gap_us for one in cameras])), width * height
-        self._shape = len(cameras), 2, bins, height, width
-        self._sums = memory.zeros(int(np.prod(self._shape)), np.int32)
-
-    def add(self, sent: CardSent) -> None:
-        """Count events."""
-        gap_us = self._gap_us[sent.clip]
-        part = ((sent.t - gap_us) * self._bins - 1) // gap_us  # (as of `count_events`)
-        inside = (part >= 0) & (part < self._bins)
-        place = (((2 * sent.clip + sent.p) * self._bins + part) * self._pixels + sent.pixel)[inside]
-        self._memory.add_at(self._sums, place, self._memory.cast(place * 0 + 1, np.int32))
-
-    def take(self) -> np.ndarray:
-        """OFF and ON events, uint8 [clips, 2, S, h, w]."""
-        counts = self._memory.cast(self._sums.clip(0, MOST), np.uint8)
-        return self._memory.get(counts).reshape(self._shape)  # type: ignore[no-any-return]
 
 
 def made_on_card(
@@ -107,9 +85,13 @@ def _walked(group: list[tuple[int, Seen]], settings: ClipSettings, device: Devic
     times_ns = np.array([[one.t_ns(j) for j in range(one.first, one.steps + 1)] for one in cameras]).T
     specs, seeds = [one.dvs for one in cameras], [one.seed for one in cameras]
     batch = DvsBatchOnCard(specs, cameras[0].size_of_events, seeds, memory=device.memory)
-    counts = CountsOnCard(device.memory, cameras, settings.bins)
+    sent: list[list[Events]] = [[] for _ in group]
     batch.restart(light[0], times_ns[0].tolist())
     for k in range(1, len(light), FRAMES):
-        batch.fill(counts, light[k : k + FRAMES], times_ns[k : k + FRAMES])
-    for (number, one), off_on in zip(group, counts.take(), strict=True):
-        yield number, clip_of(one.cameras, one.frames, off_on, one.about)
+        walked = batch.steps(light[k : k + FRAMES], times_ns[k : k + FRAMES])
+        for clip, events in enumerate(sent):
+            events += walked.of(clip)
+    with ThreadPoolExecutor() as threads:
+        counted = threads.map(partial(counts_of, settings=settings), cameras, sent)
+        for (number, one), off_on in zip(group, counted, strict=True):
+            yield number, clip_of(one.cameras, one.frames, off_on, one.about)

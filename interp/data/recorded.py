@@ -12,6 +12,7 @@ from interp.data.chance import chance
 from interp.data.clip import Clip
 from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
 from interp.data.settings import ClipSettings
+from interp.data.simulate import kept_counts
 from interp.data.tensors import as_tensor
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts, count_events
@@ -71,11 +72,10 @@ def clip_of(
     shifted = placed._replace(x=placed.x - left // coarser, y=placed.y - top // coarser)
     size = width // coarser, height // coarser
     events, _ = shifted.within(size)
-    counted = count_events(events, size, start_us, stop_us, bins)
-    counts = np.minimum(counted.off_on[0].numpy(), 255).astype(np.uint8)
+    counted = count_events(events, size, start_us, stop_us, bins, dead_time=sequence.dead_time)
     contrast = sequence.contrast or _fitted(keys, counted, coarser)
     about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
-    return Clip(truth, keys, counts, contrast, stop_us - start_us, about | {"coarser": coarser})
+    return Clip(truth, keys, kept_counts(counted), contrast, stop_us - start_us, about | {"coarser": coarser})
 
 
 def _fitted(keys: np.ndarray, counted: EventCounts, coarser: int) -> tuple[float, float]:

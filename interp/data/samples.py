@@ -79,8 +79,8 @@ class Samples(Drawn):
     """Samples for frame-fed networks.
 
     frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
-    off_on     [2, S, h, w] OFF and ON events of S sub-intervals, in the geometry of the frames: uint8; float16 if some
-               event cameras stand elsewhere, or of recordings
+    off_on     [2, S, h, w] float16: OFF and ON events of S sub-intervals, with what dead time hid, in the geometry of
+               the frames
     contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
     times      [N] float32, instants from 0 to 1, both left out, in order
     truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it

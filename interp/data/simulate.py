@@ -21,11 +21,11 @@ from interp.data.cameras import Cameras
 from interp.data.clip import Clip
 from interp.data.settings import ClipSettings
 from interp.data.shot import Shot
-from interp.representation.event_counts import count_events
+from interp.representation.event_counts import EventCounts, count_events
 from vid2ev import Cis, CisSpec, Dvs, Events
 from vid2ev.stream.upload import as_array
 
-MOST = 255  # events that are counted in a pixel, sub-interval and polarity
+MOST = 255  # that events of a pixel, sub-interval and polarity count for
 BRIGHTEST = 65504.0  # of float16
 
 
@@ -44,7 +44,7 @@ class Light:
     """The sensors of a clip, fed a picture at a time."""
 
     def __init__(self, cameras: Cameras, settings: ClipSettings):
-        self._cameras, self._bins = cameras, settings.bins
+        self._cameras, self._settings = cameras, settings
         self._frames = Frames(cameras, settings)
         self._dvs = Dvs(cameras.dvs, cameras.size_of_events, cameras.seed)
         self._events: list[Events] = []
@@ -58,10 +58,8 @@ class Light:
 
     def clip(self, about: dict[str, Any]) -> Clip:
         """What the sensors made of it."""
-        size, gap_us = self._cameras.size_of_events, self._cameras.gap_us
-        events = Events.concatenate([*self._events, self._dvs.flush()])
-        counted = count_events(events, size, gap_us, 2 * gap_us, self._bins).off_on[0].numpy()
-        return clip_of(self._cameras, self._frames, np.minimum(counted, MOST).astype(np.uint8), about)
+        off_on = counts_of(self._cameras, [*self._events, self._dvs.flush()], self._settings)
+        return clip_of(self._cameras, self._frames, off_on, about)
 
 
 class Frames:
@@ -86,6 +84,19 @@ class Frames:
             self.truth.append(np.clip(as_array(frame), 0, BRIGHTEST).astype(np.float16))
         else:
             self.truth += [self._codes[each.codes] for each in self._sampler.step(frame, t_ns)]
+
+
+def counts_of(cameras: Cameras, events: list[Events], settings: ClipSettings) -> np.ndarray:
+    """`off_on` of a clip: of the events of its gap, and any before."""
+    start_us, stop_us = cameras.gap_us, 2 * cameras.gap_us
+    together, size = Events.concatenate(events), cameras.size_of_events
+    counted = count_events(together, size, start_us, stop_us, settings.bins, dead_time=cameras.dead_time)
+    return kept_counts(counted)
+
+
+def kept_counts(counted: EventCounts) -> np.ndarray:
+    """`off_on` of a clip: counts of B = 1, up to MOST."""
+    return counted.off_on[0].clamp(max=MOST).half().numpy()
 
 
 def clip_of(cameras: Cameras, frames: Frames, off_on: np.ndarray, about: dict[str, Any]) -> Clip:

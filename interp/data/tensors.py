@@ -15,7 +15,7 @@ Sample = dict[str, torch.Tensor]
 
 def tensors(clip: Clip, settings: ClipSettings) -> Sample:
     """What all samples have of a clip."""
-    counts = torch.from_numpy(np.array(clip.off_on))
+    counts = torch.from_numpy(np.array(clip.off_on, np.float16))
     if settings.rigs > 0 or settings.recordings > 0:  # (recordings, too, may differ in how coarse their events are)
         one = EventCounts(counts[None], torch.ones(1, 2))
         counts = over(one, (clip.truth.shape[1], clip.truth.shape[2])).off_on[0].half()

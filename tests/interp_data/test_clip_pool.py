@@ -159,7 +159,7 @@ def test_samples_have_what_they_say(tmp_path: Path) -> None:
     for index in range(40):
         one = samples[index]
         assert one["frames"].shape == (2, 3, 24, 24) and one["truth"].shape == (3, 3, 24, 24)
-        assert one["off_on"].shape == (2, 32, 24, 24) and one["off_on"].dtype == torch.uint8
+        assert one["off_on"].shape == (2, 32, 24, 24) and one["off_on"].dtype == torch.float16
         assert one["truth"].min() >= 0 and one["truth"].max() <= 1
         times = one["times"] * 8
         assert torch.equal(times, times.round()) and (times.diff() > 0).all() and times[0] >= 1 and times[-1] <= 7

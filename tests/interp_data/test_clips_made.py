@@ -64,7 +64,7 @@ def seen(shot: Drift, dvs: DvsSpec = IDEAL, steps: int = 32) -> Clip:
 
 def nats(clip: Clip) -> np.ndarray:
     """What all events of a clip stand for, [h, w]."""
-    off, on = clip.off_on.astype(np.int64).sum(axis=1)
+    off, on = clip.off_on.sum(axis=1, dtype=np.float64)
     return clip.contrast[1] * on - clip.contrast[0] * off
 
 
@@ -134,6 +134,13 @@ def test_counts_are_all_events_of_the_gap() -> None:
 def test_events_stand_for_the_change_of_log_light() -> None:
     # The level that a pixel holds is within a threshold of its light, at both ends.
     assert np.abs(nats(seen(Drift())) - log_change(Drift())).max() <= 2 * 0.15
+
+
+def test_events_stand_for_what_dead_time_hid_too() -> None:
+    blind = IDEAL.model_copy(update={"refractory_us": 1000.0, "refractory": "track"})
+    change = log_change(Drift())
+    told = (nats(seen(Drift(), blind)) / change)[np.abs(change) > 0.6].mean()
+    assert told == pytest.approx(1, abs=0.15)  # (half of it without)
 
 
 def test_the_mirrored_world_gives_the_mirrored_clip() -> None:

@@ -15,22 +15,16 @@ from hypothesis import strategies as st
 from test_layout_quirks import written
 
 from interp.data.ahead import Ahead
-from interp.data.cameras import Cameras
 from interp.data.clip import read_clip
 from interp.data.layer_kernel import lay
 from interp.data.layer_tensors import Laid, seen
 from interp.data.making import made
-from interp.data.on_card import CountsOnCard, made_on_card
+from interp.data.on_card import made_on_card
 from interp.data.pool import AHEAD, Pool
 from interp.data.samples import Samples, SampleSettings
 from interp.data.sensor_ranges import SENSORS
 from interp.data.settings import ClipSettings
-from interp.data.shot import Beside
-from interp.representation.event_counts import count_events
-from vid2ev import CisSpec, DvsSpec, Events
 from vid2ev.errors import DataError
-from vid2ev.kernels.cuda.memory import Simulated
-from vid2ev.sensors.card_events import CardSent
 from vid2ev.sensors.devices import Device
 
 DEMO = Path(__file__).parents[2] / "examples" / "demo.mp4"
@@ -64,7 +58,7 @@ def test_clips_of_a_card_are_those_of_the_cpu(said: dict[str, object], monkeypat
             assert (one != other).mean() < 2e-3
         assert (ours.contrast, ours.gap_us) == (theirs.contrast, theirs.gap_us)
         assert ours.about == theirs.about | {"gain": pytest.approx(theirs.about["gain"], rel=1e-6)}
-    assert sum(int(clip.off_on.sum()) for clip in got.values()) > 200
+    assert sum(int(clip.off_on.sum(dtype=float)) for clip in got.values()) > 200
 
 
 places = st.tuples(st.floats(-40, 60), st.floats(-40, 60), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
@@ -103,27 +97,6 @@ def test_many_pictures_are_laid_in_parts(monkeypatch: pytest.MonkeyPatch) -> Non
     whole = seen([laid], (6, 5))
     monkeypatch.setattr("interp.data.layer_tensors.AT_A_TIME", 60)
     assert torch.equal(seen([laid], (6, 5)), whole)
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 1), st.integers(0, 200), st.integers(0, 11), st.integers(0, 1)), max_size=60))
-def test_counts_of_a_card_are_those_of_the_host(events):
-    # (edges of sub-intervals and of the gap among them; a gap and its sub-intervals differ from clip to clip)
-    gaps_us, bins, (width, height) = (48, 80), 8, (4, 3)
-    clip, t, pixel, p = np.array(events, np.int64).reshape(-1, 4).T
-    cameras = [
-        Cameras(CisSpec(frame_rate_hz=30), DvsSpec(), 0, None, (4, 3), Beside(), gap_us, 4, 4) for gap_us in gaps_us
-    ]
-    counts = CountsOnCard(Simulated(), cameras, bins)
-    for part in np.array_split(np.arange(len(t)), 3):
-        counts.add(CardSent(clip[part], t[part], pixel[part], p[part]))
-    for k, (gap_us, ours) in enumerate(zip(gaps_us, counts.take(), strict=True)):
-        mine = clip == k
-        order = np.argsort(t[mine], kind="stable")
-        x, y = (pixel[mine] % width)[order].astype(np.uint16), (pixel[mine] // width)[order].astype(np.uint16)
-        host = Events(t[mine][order], x, y, p[mine][order].astype(np.uint8))
-        theirs = count_events(host, (width, height), gap_us, 2 * gap_us, bins).off_on[0].numpy()
-        np.testing.assert_array_equal(ours, theirs)
 
 
 def pool_of_recordings(folder: Path, **window: float) -> Pool:
