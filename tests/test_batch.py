@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,13 @@ def test_a_folder_stands_for_what_is_in_it() -> None:
     assert batch.sources_in("clips/a9.npy") == ["clips/a9.npy"]
     Path("bare").mkdir()
     assert batch.sources_in("bare") == ["bare"]  # (which is refused in words)
+
+
+def test_a_picture_beside_videos_is_none_of_them() -> None:
+    shutil.copy("clips/pictures/0.png", "clips/cover.png")
+    assert "clips/broken.mp4" in batch.sources_in("clips") and "clips/cover.png" not in batch.sources_in("clips")
+    shutil.copy("clips/pictures/0.png", "clips/still.png")
+    assert batch.sources_in("clips") == ["clips"]  # (more pictures than videos: frames, with a preview of them)
 
 
 def test_no_name_does_not_stand_for_the_folder_one_is_in() -> None:

@@ -243,3 +243,14 @@ def test_the_benchmark_of_clips_measures_each_part(monkeypatch: pytest.MonkeyPat
     rows = [line.strip("| ").split(" | ") for line in done.output.splitlines()[2:]]
     assert done.exit_code == 0 and [row[1] for row in rows] == ["paper", "ideal"]
     assert all(float(row[2]) > 0.1 for row in rows)
+
+
+@pytest.mark.long
+def test_scores_of_clips_are_given_for_each_method() -> None:
+    done = CliRunner().invoke(
+        example("score_clips").main, ["--scenes", "1", "--method", "linear", "--method", "nearest", "--multiple", "4"]
+    )
+    header, _, *rows = [line.strip("| ").split(" | ") for line in done.output.splitlines()]
+    assert done.exit_code == 0 and header == ["clips", "linear", "nearest"]
+    assert [row[0] for row in rows] == ["1 scenes, clean", "1 scenes, noisy"]
+    assert all(float(row[1].split(" / ")[0]) > 10 for row in rows)

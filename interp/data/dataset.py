@@ -69,14 +69,14 @@ def write_dataset(
     made_in = directory.with_name(f"{directory.name}.partial")
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
-    scenes = scenes_of(spec)
+    scenes, unusable = scenes_of(spec)
     with writing(directory):
         made_in.mkdir(parents=True, exist_ok=True)
         handle = lock(made_in)
         try:
             _begin(made_in / "job.json", job, directory)
             made = sorted(_all(scenes, made_in, spec, workers, share, report))
-            facts = _facts(job, spec, made)
+            facts = _facts(job, spec, made, unusable)
             _publish(made_in, directory, facts)
         finally:
             os.close(handle)
@@ -161,10 +161,10 @@ def facts_of(folder: Path, multiple: int, scene: Scene) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _facts(job: dict[str, Any], spec: DatasetSpec, made: list[Made]) -> dict[str, Any]:
+def _facts(job: dict[str, Any], spec: DatasetSpec, made: list[Made], unusable: dict[str, str]) -> dict[str, Any]:
     whole, left_out = (
         [each for each in made if not each.failed],
-        {each.name: each.failed for each in made if each.failed},
+        {each.name: each.failed for each in made if each.failed} | unusable,
     )
     if not whole:
         name, reason = next(iter(left_out.items()), ("none", "nothing was asked for"))

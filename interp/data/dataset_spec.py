@@ -10,6 +10,7 @@ Source of the preset `paper`: the paper, Table I and section III.B.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -18,7 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from interp.data.chance import chance, uniform
 from interp.data.sensor_ranges import SENSORS, SensorRanges
-from vid2ev import CisSpec, DvsSpec, UsageError, load_cis, load_sensor, open_source
+from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor, open_source
+from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.sources import begins_s
@@ -75,9 +77,14 @@ class Scene:
     options: dict[str, Any]
 
 
-def scenes_of(spec: DatasetSpec) -> list[Scene]:
-    """All recordings of a data set.  Raises UsageError for videos that are too short, DataError for unreadable ones."""
-    return _of_videos(spec) if spec.videos else [_rendered(spec, k) for k in range(spec.count or DEFAULT[spec.preset])]
+def scenes_of(spec: DatasetSpec) -> tuple[list[Scene], dict[str, str]]:
+    """All recordings of a data set; and the videos of which there are none, each with the reason.
+
+    Raises UsageError, DataError where there is none at all.
+    """
+    if spec.videos:
+        return _of_videos(spec)
+    return [_rendered(spec, k) for k in range(spec.count or DEFAULT[spec.preset])], {}
 
 
 DEFAULT = {"varied": 8, "paper": 180}  # scenes; the second as in Table I
@@ -99,29 +106,39 @@ def _rendered(spec: DatasetSpec, number: int) -> Scene:
     return Scene(f"{name}-{number:05d}", f"scene:{name},seed={seed},size={spec.size[0]}x{spec.size[1]}", options)
 
 
-def _of_videos(spec: DatasetSpec) -> list[Scene]:
+def _of_videos(spec: DatasetSpec) -> tuple[list[Scene], dict[str, str]]:
     """Parts of videos, one after the other; of more than are asked for, as even a choice as can be."""
-    found = []
+    found, refused = list[Scene](), dict[str, Vid2evError]()
     for place, video in enumerate(spec.videos):
-        source = open_source(video)
-        seconds = source.duration_expected_s or 0.0
-        frame_s = seconds / max(source.frames_expected or 1, 1)
-        rig, exposure_s = _rig(spec, place)
-        length_s = ((spec.frames - 1) / spec.cis_fps + exposure_s) * spec.slowdown + EDGES * frame_s
-        if seconds < length_s:
-            slower = f", or a smaller --slowdown than {spec.slowdown:g}" * (spec.slowdown > 1)
-            raise UsageError(
-                f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames; give a longer"
-                f" video{slower}, or leave this one out"
-            )
-        begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
-        for part in range(math.floor(seconds / length_s)):
-            start_s = round(begin_s + part * length_s, 6)
-            options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9), "slowdown": spec.slowdown}
-            name = f"{Path(video).stem}-{place:03d}-{part:05d}"
-            found.append(Scene(name, video, options | {"seed": int(chance(spec.seed, name).integers(1 << 62))}))
+        try:
+            found += _parts(spec, place, video)
+        except (UsageError, DataError) as error:
+            refused[video] = error
+    if not found:
+        raise next(iter(refused.values()))
     wanted = min(spec.count or len(found), len(found))
-    return [found[k * len(found) // wanted] for k in range(wanted)]
+    return [found[k * len(found) // wanted] for k in range(wanted)], {video: str(why) for video, why in refused.items()}
+
+
+def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
+    """Of one video."""
+    source = open_source(video)
+    seconds = source.duration_expected_s or 0.0
+    frame_s = seconds / max(source.frames_expected or 1, 1)
+    rig, exposure_s = _rig(spec, place)
+    length_s = ((spec.frames - 1) / spec.cis_fps + exposure_s) * spec.slowdown + EDGES * frame_s
+    if seconds < length_s:
+        slower = f", or a smaller --slowdown than {spec.slowdown:g}" * (spec.slowdown > 1)
+        raise UsageError(
+            f"{video}: {seconds:.3g} s, expected at least {length_s:.3g} s for {spec.frames} frames; give a longer"
+            f" video{slower}, or leave this one out"
+        )
+    begin_s = begins_s(source)  # (of films cut out of others it is not 0, and start and stop are by their clock)
+    for part in range(math.floor(seconds / length_s)):
+        start_s = round(begin_s + part * length_s, 6)
+        options = {"rig": rig, "start": start_s, "stop": round(start_s + length_s, 9), "slowdown": spec.slowdown}
+        name = f"{Path(video).stem}-{place:03d}-{part:05d}"
+        yield Scene(name, video, options | {"seed": int(chance(spec.seed, name).integers(1 << 62))})
 
 
 def _rig(spec: DatasetSpec, number: int) -> tuple[Rig, float]:

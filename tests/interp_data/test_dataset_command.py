@@ -79,7 +79,7 @@ def test_key_frames_have_their_middles_where_there_is_truth(made: Path) -> None:
 
 def test_the_papers_set_is_that_of_table_i() -> None:
     spec = DatasetSpec(preset="paper")
-    scenes = scenes_of(spec.model_copy(update={"count": 16}))
+    scenes, _ = scenes_of(spec.model_copy(update={"count": 16}))
     assert len({scene.name for scene in scenes}) == 16
     assert (spec.frames - 1) * spec.multiple == 192 and spec.cis_fps * spec.multiple == 960
     for scene in scenes:
@@ -122,6 +122,17 @@ def test_a_film_that_is_too_short_is_refused(film: Path, tmp_path: Path) -> None
     assert not list(tmp_path.iterdir())
 
 
+def test_what_cannot_be_used_of_several_films_is_left_out(film: Path, tmp_path: Path) -> None:
+    short, broken = tmp_path / "short.npz", tmp_path / "broken.mp4"
+    np.savez(short, frames=np.load(film)["frames"][:3], fps=30)
+    broken.write_bytes(b"no film")
+    scenes, unusable = scenes_of(DatasetSpec(videos=(str(short), str(film), str(broken)), frames=2))
+    assert {Path(scene.video).name for scene in scenes} == {film.name}
+    assert list(unusable) == [str(short), str(broken)] and "expected at least" in unusable[str(short)]
+    with pytest.raises(UsageError, match=r"short\.npz: 0\.0667 s, expected at least"):
+        scenes_of(DatasetSpec(videos=(str(short), str(broken)), frames=2))
+
+
 def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene that cannot be made is left out; one that cannot be written is made when there is room again."""
     from interp.data import dataset as module
@@ -148,7 +159,7 @@ def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypa
 def test_other_layouts_hold_the_same(tmp_path: Path, layout: str) -> None:
     spec = DatasetSpec(layout=layout, count=1, size=(32, 24), frames=3)
     write_dataset(tmp_path / "set", spec)
-    scene = scenes_of(spec)[0]
+    (scene, *_), _ = scenes_of(spec)
     assert not any(scene.options["rig"].cameras[0].translation_mm)
     make_scene(scene, tmp_path, "own", 8)
     ours, theirs = open_sequence(tmp_path / scene.name), open_sequence(tmp_path / "set" / scene.name)

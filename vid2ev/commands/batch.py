@@ -22,6 +22,7 @@ CLIPS = {
     ".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".y4m", ".ogv", ".3gp",
     ".mts", ".m2ts", ".gif", ".npy", ".npz",
 }  # fmt: skip
+ARRAYS = {".npy", ".npz"}
 
 LIST = ".txt"
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and is refused as what it is)
@@ -30,20 +31,24 @@ Convert = Callable[[str, Path], dict[str, Any]]
 
 
 def sources_in(video: str) -> list[str]:
-    """The sources that an argument stands for: itself, what a folder without pictures holds (videos, arrays and folders
-    of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line.
+    """The sources that an argument stands for: itself, what a folder holds that is not of pictures (videos, arrays and
+    folders of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line.
 
     Raises UsageError for a list without any, DataError for a list that cannot be read.
     """
-    from vid2ev.light.recognise import natural
+    from vid2ev.light.recognise import natural, pictures_in
 
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not folder.is_dir() or holds_pictures(folder) or (folder / "manifest.json").exists():
+    if video == "-" or not folder.is_dir() or (folder / "manifest.json").exists():
         return [video]
     children = sorted(folder.iterdir(), key=lambda path: natural(path.name))
-    found = [str(path) for path in children if _is_clip(path) or (path.is_dir() and holds_pictures(path))]
+    clips = [path for path in children if _is_clip(path)]
+    films = [path for path in clips if path.suffix.lower() not in ARRAYS]
+    if len(pictures_in(folder)) > len(films):  # (if they are no more, they are covers and stills of these)
+        return [video]
+    found = [str(path) for path in children if path in clips or (path.is_dir() and holds_pictures(path))]
     return found or [video]
 
 
