@@ -76,6 +76,7 @@ CLIENT_FLOORS = {
     "": 0,
     "precision": 0,
     "pretrained": 0,
+    "around": 0,
     "rows": 0,
     "light": 1,
     "own_codes": 2,

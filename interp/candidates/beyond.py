@@ -24,8 +24,8 @@ from __future__ import annotations
 import math
 
 import torch
-from torch.nn import functional as F
 
+from interp.around import mean_around
 from interp.precision import in_full_precision
 
 TOP, BOTTOM = 0.985, 5e-4  # of the range: three standard deviations below its top of the largest noise of the paper's
@@ -50,7 +50,7 @@ def carried(
     bottom, top = _ends(frame, limits)
     above, low = frame >= top, frame <= bottom + (1 - TOP) * (top - bottom)
     # (noise of the sensor lifts single pixels from the bottom of the range)
-    below = (frame <= bottom) | (low & (_around(frame, NOISE_PX) <= bottom + DARK * (top - bottom)))
+    below = (frame <= bottom) | (low & (mean_around(frame, NOISE_PX) <= bottom + DARK * (top - bottom)))
     deep = _usual_below(below)
     if before is None:
         before = torch.where(above, top * math.exp(ABOVE), torch.where(below, bottom * deep.exp(), frame))
@@ -65,12 +65,7 @@ def carried(
 def _usual_below(below: torch.Tensor) -> torch.Tensor:
     """How far below the bottom of the range light is where it is below, usually [nat]."""
     share = below.float().mean((1, 2, 3), keepdim=True)
-    return BELOW + BELOW_SHARE * share + BELOW_AROUND * _around(below.float(), AROUND_PX)
-
-
-def _around(values: torch.Tensor, across_px: int) -> torch.Tensor:
-    """The mean around each pixel."""
-    return F.avg_pool2d(values, across_px, 1, across_px // 2, count_include_pad=False)
+    return BELOW + BELOW_SHARE * share + BELOW_AROUND * mean_around(below.float(), AROUND_PX)
 
 
 def _pulled(nats: torch.Tensor, usual: torch.Tensor | float) -> torch.Tensor:

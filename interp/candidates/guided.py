@@ -43,6 +43,7 @@ import numpy as np
 import torch
 from torch.nn import functional as F
 
+from interp.around import mean_around
 from interp.blend import blend
 from interp.candidates.bridge import coloured, ratios_of
 from interp.light import Transfer, luminance, to_codes, to_light
@@ -200,9 +201,7 @@ def dense_flow() -> Any:
 
 def _around(maps: torch.Tensor, across_px: int, footprint: int) -> torch.Tensor:
     """Means over squares around each pixel of [B, N, K, H, W], of so many pixels of the event camera."""
-    across = across_px * footprint // 2 * 2 + 1
-    means = F.avg_pool2d(maps.flatten(0, 1), across, 1, across // 2, count_include_pad=False)
-    return means.unflatten(0, maps.shape[:2])
+    return mean_around(maps.flatten(0, 1), across_px * footprint // 2 * 2 + 1).unflatten(0, maps.shape[:2])
 
 
 def _shown(pictures: torch.Tensor, transfer: Transfer) -> torch.Tensor:

@@ -10,6 +10,7 @@ import torch
 from pairs import counts
 from torch.nn import functional as F
 
+from interp.around import mean_around
 from interp.candidates.bridge import DARK
 from interp.candidates.guided import (
     GAMMA,
@@ -215,3 +216,10 @@ def test_the_combined_system_starts_from_what_is_guided() -> None:
         torch.testing.assert_close(made.images[0], wanted, atol=1e-6, rtol=0)
     still = make("rrin_slomo_events", flow="dis")(first, second, times, seen)
     assert not torch.allclose(still.images[0], wanted, atol=1e-2)
+
+
+@pytest.mark.parametrize("across", [1, 5, 51])
+def test_means_around_are_of_the_squares(across: int) -> None:
+    maps = torch.rand(2, 3, 40, 70, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    whole = F.avg_pool2d(maps, across, 1, across // 2, count_include_pad=False)
+    torch.testing.assert_close(mean_around(maps, across), whole, rtol=1e-12, atol=0)
