@@ -114,6 +114,17 @@ def test_light_is_made_again_only_where_something_changed_that_decides_it(setup:
     assert turned.frames[1].light is later.instants[0].frames[1].light
 
 
+def test_a_file_that_is_written_again_is_another_light(tmp_path: Path) -> None:
+    film, table = tmp_path / "film.npz", LightTable()
+    np.savez(film, frames=np.full((9, 20, 30), 0.2, np.float32), fps=30)
+    setup = setup_of(str(film))
+    first = table.light(setup, 0.0, 0.02)
+    np.savez(film, frames=np.full((30, 20, 30), 0.7, np.float32), fps=30)
+    again = table.light(setup, 0.0, 0.02)
+    levels = [float(light.instants[0].frames[0].light.mean()) for light in (first, again)]
+    assert levels == pytest.approx([0.2, 0.7]) and duration_s(setup) == pytest.approx(1.0, rel=0.05)
+
+
 def at(light: Light, t_ns: int) -> Instant:
     return next(instant for instant in light.instants if instant.t_ns == t_ns)
 

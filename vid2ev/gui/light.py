@@ -9,6 +9,7 @@ what lies between its frames is made as for a conversion.  The light is kept as 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -165,7 +166,7 @@ def _part_of_video(
     whole = setup.rig.around(taken_by(source)).resolved(source.size, framing=framing)
     shown = _smaller_rig(whole, whole.source.scaled_to((width, height)), side)
     rig = shown.settled(framing and framing._replace(size=(width, height)))
-    origin_s = _origin_s(setup.source, _opening(setup))
+    origin_s = _origin_s(*_opening(setup))
     begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))
     latest_s = slower * (begin_s + length_s + 1.5 * interval_s)
     shaped = "motion" in options or ("size" in options and not str(options["size"]).endswith("!"))
@@ -245,30 +246,49 @@ def _without_sensors(setup: Setup) -> Any:
     """What of a setup decides the light, comparable."""
     bare = tuple(camera.model_copy(update={"sensor": None, "set": {}}) for camera in setup.rig.cameras)
     scene = setup.settled() if setup.is_scene else None
-    return setup.source, Rig(source=setup.rig.source, cameras=bare), scene, tuple(setup.options.items())
+    return (
+        setup.source,
+        _stamp(setup.source),
+        Rig(source=setup.rig.source, cameras=bare),
+        scene,
+        tuple(setup.options.items()),
+    )
 
 
 def _opened(setup: Setup) -> Source:
-    source = _source(setup.source, _opening(setup))
+    source = _source(*_opening(setup))
     if not source.rewindable:
         raise UsageError(f"{setup.source} passes once and cannot be looked at here and there; give a file")
     return source
 
 
-def _opening(setup: Setup) -> tuple[tuple[str, Any], ...]:
+def _opening(setup: Setup) -> tuple[str, tuple[int, ...], tuple[tuple[str, Any], ...]]:
     known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
-    return tuple((name, setup.options[name]) for name in known if name in setup.options)
+    return (
+        setup.source,
+        _stamp(setup.source),
+        tuple((name, setup.options[name]) for name in known if name in setup.options),
+    )
+
+
+def _stamp(source: str) -> tuple[int, ...]:
+    """What becomes another when a file is written again; nothing for what is no file."""
+    try:
+        found = os.stat(source)
+    except (OSError, ValueError):
+        return ()
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 @lru_cache(maxsize=4)
-def _source(path: str, options: tuple[tuple[str, Any], ...]) -> Source:
+def _source(path: str, stamp: tuple[int, ...], options: tuple[tuple[str, Any], ...]) -> Source:
     return open_source(path, **dict(options))
 
 
 @lru_cache(maxsize=4)
-def _origin_s(path: str, options: tuple[tuple[str, Any], ...]) -> float:
+def _origin_s(path: str, stamp: tuple[int, ...], options: tuple[tuple[str, Any], ...]) -> float:
     """When the first frame is [s]."""
-    return 1e-9 * next(frame.t_ns for frame in _source(path, options).frames())
+    return 1e-9 * next(frame.t_ns for frame in _source(path, stamp, options).frames())
 
 
 @lru_cache(maxsize=2)
