@@ -34,7 +34,7 @@ from interp.interpolate.instants import TooFine
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.light.tags import tag_of
 from vid2ev.pictures.film import film_size, join_films, remarks_on_size, write_film
-from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
+from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
 from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
 from vid2ev.sources.images import FRAMES
@@ -83,7 +83,7 @@ class Shelf:
     def __enter__(self) -> Self:
         check_free(self.output, self.kind, self.overwrite, self.resume)
         try:
-            with self.writing():
+            with self.writing(), undisturbed():
                 self.partial.mkdir(parents=True, exist_ok=True)
                 self._lock = lock(self.partial)
                 self._begin()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.columns import EventColumns, column_files
-from vid2ev.recording.disk import lock, unlock
+from vid2ev.recording.disk import lock, unlock, whole
 from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
@@ -211,6 +212,24 @@ def test_a_lock_that_was_removed_since_it_was_opened_is_none(tmp_path: Path, mon
         lock(tmp_path / "out")
     os.close(held[0])
     os.close(lock(tmp_path / "out"))
+
+
+def test_who_is_asked_to_end_while_it_begins_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl", reason="no file locks on this system")
+    flock = fcntl.flock
+
+    def asked(handle: int, flags: int) -> None:
+        flock(handle, flags)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(fcntl, "flock", asked)
+    with pytest.raises(KeyboardInterrupt), whole(tmp_path / "film.mp4") as made:
+        made.touch()
+    with pytest.raises(KeyboardInterrupt), Folder(tmp_path / "out", JOB):
+        pass
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)  # (it is heard again)
 
 
 def test_of_a_lock_nothing_is_left_and_that_of_others_stays(tmp_path: Path) -> None:

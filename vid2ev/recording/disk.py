@@ -5,7 +5,9 @@ from __future__ import annotations
 import ctypes
 import os
 import shutil
+import signal
 import sys
+import threading
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -23,6 +25,9 @@ except ImportError:  # not on Windows
     fcntl = None  # type: ignore[assignment]
 
 
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
 def lock(folder: Path) -> int:
     """Lock a folder until the handle returned is closed or the process ends; raises UsageError if another holds it."""
     handle = os.open(folder / "lock", os.O_CREAT | os.O_RDWR)
@@ -38,6 +43,26 @@ def lock(folder: Path) -> int:
     os.close(handle)  # (who held it has removed it since it was opened, and others may hold a new one)
     folder.mkdir(parents=True, exist_ok=True)
     return lock(folder)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Signals that ask the program to end wait until this is done: who clears up knows what was taken within."""
+    if threading.current_thread() is not threading.main_thread():  # (others hear none)
+        yield
+        return
+    before, asked = {number: signal.getsignal(number) for number in ENDING}, list[int]()
+    try:
+        for number, handler in before.items():
+            if callable(handler):
+                signal.signal(number, lambda number, _: asked.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            if callable(handler):
+                signal.signal(number, handler)
+    for number in asked[:1]:
+        signal.raise_signal(number)
 
 
 def unlock(folder: Path, handle: int) -> None:
@@ -85,8 +110,9 @@ def whole(path: Path) -> Iterator[Path]:
     made, replaced = aside / path.name, aside / "replaced"
     handle = None
     try:
-        aside.mkdir(parents=True, exist_ok=True)
-        handle = lock(aside)
+        with undisturbed():
+            aside.mkdir(parents=True, exist_ok=True)
+            handle = lock(aside)
         _remove(made)
         yield made
         for file in [*made.rglob("*"), made]:

@@ -29,7 +29,7 @@ from typing import Any, Self
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.recording.disk import lock, put_in_place, sync, whole_file, writing
+from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.stream.eager import EagerFile
 from vid2ev.untrusted import possible, read_arrays
@@ -76,8 +76,9 @@ class Folder:
         check_free(self.directory, self.overwrite, self.resume)
         try:
             with self.writing():
-                self.partial.mkdir(parents=True, exist_ok=True)
-                self._lock = lock(self.partial)
+                with undisturbed():
+                    self.partial.mkdir(parents=True, exist_ok=True)
+                    self._lock = lock(self.partial)
                 self._begin()
         except BaseException as error:
             self.__exit__(type(error), error, error.__traceback__)
