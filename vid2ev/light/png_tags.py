@@ -14,6 +14,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import UsageError
+from vid2ev.light.icc import is_srgb, profile_name
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
 from vid2ev.light.recognise import PNG, head_of
 from vid2ev.light.tags import TRANSFERS, UNSPECIFIED
@@ -36,17 +37,20 @@ def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
 
 
 def remarks_on_tags(path: Path) -> list[str]:
-    """That a file is a PNG which says of its codes what is not taken up, if it is."""
+    """That a PNG says of its codes what is not taken up, or another picture by a profile."""
     if not head_of(path).startswith(PNG):
-        return []
+        return _unread(path, profile_name(path))
     chunks = _chunks(path)
     if len(code := chunks.get(b"cICP", b"")) == 4:
         curve, full_range = code[1], code[3]
         unknown = f"{path}: transfer curve {curve} of H.273 is not known; its codes are taken for sRGB, {REMEDY}"
         limited = f"{path}: codes of limited range by its tag cICP are taken for those of full range; write it anew so"
         return [unknown] * (curve not in (*TRANSFERS, UNSPECIFIED)) + [limited] * (not full_range)
-    name = chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1")
-    if "srgb" in name.lower():
+    return _unread(path, chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1"))
+
+
+def _unread(path: Path, name: str | None) -> list[str]:
+    if name is None or is_srgb(name):
         return []
     return [f"{path}: its ICC profile {name!r} is not read; its codes are taken for sRGB, {REMEDY}"]
 

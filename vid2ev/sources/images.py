@@ -81,7 +81,7 @@ class Images:
         curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path)
         self._tagged = transfer == "auto" and curve is None, tagged
         if transfer == "auto":
-            self.warnings += [] if curve else remarks_on_tags(self._places[0][0])
+            self.warnings += [] if curve or first.dtype.kind == "f" else remarks_on_tags(self._places[0][0])
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
         self._reader = PictureReader(transfer, colour, bits)

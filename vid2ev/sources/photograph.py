@@ -67,7 +67,7 @@ class Photograph:
         self._motion = parse_motion(motion)
         pixels, primaries, tagged = read_picture(self.path)
         if transfer == "auto":
-            self.warnings += remarks_on_tags(self.path)
+            self.warnings += [] if pixels.dtype.kind == "f" else remarks_on_tags(self.path)
             transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
         self._reader, self._crop = PictureReader(transfer, colour), crop
         self.warnings += self._reader.remarks_on(pixels)

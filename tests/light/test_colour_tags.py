@@ -1,16 +1,22 @@
-"""Colour tags of PNG, in files put together by hand."""
+"""Colour tags of PNG, and profiles of others, in files put together by hand."""
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vid2ev import open_source
 from vid2ev.errors import DataError
+from vid2ev.light.icc import profile_name
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.primaries import primaries_of
 from vid2ev.light.transfer import parse_transfer
@@ -115,3 +121,58 @@ def test_pictures_of_one_folder_are_coded_alike(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"2\.png: codes of linear by its tags, expected srgb like those of the first"):
         list(open_source(tmp_path, fps=10).frames())
     assert len(list(open_source(tmp_path, fps=10, transfer="srgb").frames())) == 3
+
+
+def profile(name: str, text: str) -> bytes:
+    """An ICC profile that is no more than its name, in a text as of before 2010 or as since."""
+    if text == "desc":
+        tag = b"desc" + bytes(4) + struct.pack(">I", len(name) + 1) + name.encode() + b"\0"
+    else:
+        tag = (
+            b"mluc"
+            + bytes(4)
+            + struct.pack(">II2s2sII", 1, 12, b"en", b"US", 2 * len(name), 28)
+            + name.encode("utf-16-be")
+        )
+    return bytes(128) + struct.pack(">I4sII", 1, b"desc", 144, len(tag)) + tag
+
+
+def jpeg(path: Path, pixels: np.ndarray, held: bytes) -> Path:
+    coded = cv2.imencode(".jpg", pixels)[1].tobytes()
+    part = b"ICC_PROFILE\0\1\1" + held
+    path.write_bytes(coded[:2] + b"\xff\xe2" + struct.pack(">H", len(part) + 2) + part + coded[2:])
+    return path
+
+
+def tiff(path: Path, pixels: np.ndarray, held: bytes) -> Path:
+    """Grey, little endian, without compression."""
+    height, width = pixels.shape[:2]
+    entries = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1), (273, 4, 1, 8),
+               (278, 4, 1, height), (279, 4, 1, height * width), (34675, 7, len(held), 8 + height * width)]  # fmt: skip
+    body = pixels[..., 0].tobytes() + held
+    table = struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *each) for each in entries) + bytes(4)
+    path.write_bytes(b"II*\0" + struct.pack("<I", 8 + len(body)) + body + table)
+    return path
+
+
+@pytest.mark.parametrize("write", [jpeg, tiff])
+@pytest.mark.parametrize("text", ["desc", "mluc"])
+@pytest.mark.parametrize(("name", "said"), [("Display P3", True), ("sRGB IEC61966-2.1", False), ("c2", False)])
+def test_a_profile_that_is_not_read_is_named(
+    tmp_path: Path, write: Callable[..., Path], text: str, name: str, said: bool
+) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (40, 40, 3), np.uint8)
+    write(tmp_path / f"one.{write.__name__}", pixels, profile(name, text))
+    warnings = open_source(tmp_path, fps=10).warnings
+    assert len(warnings) == said and ("its ICC profile 'Display P3' is not read" in "".join(warnings)) == said
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=200), st.sampled_from(["desc", "mluc"]), st.integers(0, 180))
+def test_damaged_profiles_are_names_or_nothing(noise: bytes, text: str, at: int) -> None:
+    held = bytearray(profile("Display P3", text))
+    held[at : at + len(noise)] = noise
+    with TemporaryDirectory() as folder:
+        for write in (jpeg, tiff):
+            name = profile_name(write(Path(folder) / "one", np.zeros((16, 16, 3), np.uint8), bytes(held)))
+            assert name is None or (len(name) <= 60 and name.isprintable())
