@@ -69,7 +69,7 @@ def write_clip(path: Path, clip: Clip) -> None:
 
 
 def read_clip(path: Path) -> Clip:
-    """A clip whose arrays stay in its file until they are looked at.
+    """A clip whose arrays stay in its file.
 
     Raises FileNotFoundError where there is none, DataError for a file that is no clip.
     """
@@ -97,5 +97,7 @@ def _check(clip: Clip) -> None:
     alike = keys.shape == (2, *truth.shape[1:]) and truth.shape[3] == 3 and len(truth) > 1 and len(off_on) == 2
     if not alike or off_on.shape[3] > truth.shape[2] or clip.gap_us <= 0 or not isinstance(clip.about, dict):
         raise ValueError(f"{list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}, {clip.gap_us} us")
+    if not all(np.isfinite(each).all() for each in (truth, off_on)):
+        raise ValueError("values that are no numbers")
     if len(clip.contrast) != 2 or not all(0 < value < 100 for value in clip.contrast):
         raise ValueError(f"contrasts {clip.contrast}")
