@@ -11,13 +11,13 @@ SSIM, means over all rebuilt frames; and by how much a method is above the first
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 import torch
+from torch.utils.data import default_collate
 
 from interp import pretrained
 from interp.data.clip import Clip
@@ -26,8 +26,7 @@ from interp.data.settings import ClipSettings
 from interp.data.tensors import as_tensor, tensors
 from interp.data.validation import validation_clips
 from interp.methods import METHODS, open_method
-from interp.methods.gap import Gap
-from interp.representation.event_counts import EventCounts
+from interp.train.frame_fed import gap_of
 from interp.train.scores import Scores, scores
 
 TRIED = ("bridge", "flow", "guided", "rrin_events_guided-tiny")
@@ -71,12 +70,9 @@ def _clips(
 @torch.no_grad()
 def _scored(method: Any, clip: Clip) -> list[Scores]:
     """Of the frames that a method rebuilds."""
-    sample = tensors(clip, ClipSettings())
-    events = EventCounts(sample["off_on"][None], sample["contrast"][None])
-    first, last = sample["frames"]
-    times = torch.arange(1, clip.multiple).float() / clip.multiple
-    made = method.between(Gap(first, last, events, 0), times)
-    return scores(made, as_tensor(clip.truth[1:-1]), first, last)
+    gap = gap_of(default_collate([tensors(clip, ClipSettings())]))
+    made = method.between(gap, torch.arange(1, clip.multiple).float() / clip.multiple)
+    return scores(made, as_tensor(clip.truth[1:-1]), gap.frame_0, gap.frame_1)
 
 
 def _cell(found: list[dict[str, list[Scores]]], name: str, first: str) -> str:
@@ -86,4 +82,4 @@ def _cell(found: list[dict[str, list[Scores]]], name: str, first: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

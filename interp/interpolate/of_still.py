@@ -24,9 +24,8 @@ from interp.representation.dead_time import stated
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.picture_files import read_picture
+from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
-from vid2ev.light.png_tags import remarks_on_tags
 from vid2ev.recording.manifest import identity
 
 MAT = b"MATLAB 5.0 MAT-file"
@@ -69,7 +68,7 @@ class OfStill:
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
         ]
-        self.remarks += [*said, *(remarks_on_tags(picture) if options.transfer == "auto" else ())]
+        self.remarks += [*said, *(remarks_on_tags(picture, pixels) if options.transfer == "auto" else ())]
         if options.transfer == "auto" and is_mat(events):
             self.remarks.append("its codes are taken for sRGB; of raw frames, --transfer linear says what they are")
         if not options.contrast:

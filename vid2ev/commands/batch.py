@@ -43,13 +43,13 @@ def sources_in(video: str) -> list[str]:
         return [source for line in _listed(folder) for source in sources_in(line)]
     if video == "-" or not folder.is_dir() or (folder / "manifest.json").exists():
         return [video]
-    children = sorted(folder.iterdir(), key=lambda path: natural(path.name))
-    clips = [path for path in children if _is_clip(path)]
-    films = [path for path in clips if path.suffix.lower() not in ARRAYS]
-    if len(pictures_in(folder)) > len(films):  # (if they are no more, they are covers and stills of these)
+    clips = [path for path in folder.iterdir() if _is_clip(path)]
+    films = sum(path.suffix.lower() not in ARRAYS for path in clips)
+    if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
         return [video]
-    found = [str(path) for path in children if path in clips or (path.is_dir() and holds_pictures(path))]
-    return found or [video]
+    folders = [path for path in folder.iterdir() if path.is_dir() and holds_pictures(path)]
+    found = sorted(clips + folders, key=lambda path: natural(path.name))
+    return [str(path) for path in found] or [video]
 
 
 def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
@@ -178,7 +178,7 @@ def _events(made: dict[str, Any]) -> int | None:
 
 
 def _is_clip(path: Path) -> bool:
-    return path.is_file() and path.suffix.lower() in CLIPS and not path.stem.endswith("_timestamps")
+    return path.suffix.lower() in CLIPS and path.is_file() and not path.stem.endswith("_timestamps")
 
 
 def holds_pictures(folder: Path) -> bool:

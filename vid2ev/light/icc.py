@@ -1,4 +1,4 @@
-"""The name of the ICC profile that a JPEG or a TIFF holds; no more of it is read.
+"""The name of the ICC profile that a JPEG or a TIFF holds; no more of it is read, and that is said.
 
 Sources: ICC.1:2022, sections 7.2 and 7.3 (header, table of tags), 10.13 (texts) and B.3, B.4 (where it is in TIFF and
 JPEG); ICC.1:2001-04, 6.5.17 (texts before 2010).
@@ -17,6 +17,7 @@ LONGEST = 60  # characters
 PROFILE = 34675  # the tag of a TIFF
 IN_JPEG = b"ICC_PROFILE\0"
 SMALL_SRGB = {"c2", "c2ci", "uRGB"}  # that large sites give pictures, to save bytes
+REMEDY = "unless --transfer says another curve"
 
 
 def profile_name(path: Path) -> str | None:
@@ -27,9 +28,11 @@ def profile_name(path: Path) -> str | None:
     return _name(profile) if profile else None
 
 
-def is_srgb(name: str) -> bool:
-    """Whether a profile is sRGB, by its name."""
-    return "srgb" in name.lower() or name in SMALL_SRGB
+def remarks_on_profile(path: Path, name: str | None) -> list[str]:
+    """That the profile of a file is none of sRGB, if it has one that is not, by its name."""
+    if name is None or "srgb" in name.lower() or name in SMALL_SRGB:
+        return []
+    return [f"{path}: its ICC profile {name!r} is not read; its codes are taken for sRGB, {REMEDY}"]
 
 
 def _of_jpeg(file: BinaryIO) -> bytes:

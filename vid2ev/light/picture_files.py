@@ -18,8 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.light.icc import profile_name, remarks_on_profile
 from vid2ev.light.pictures import TYPES
-from vid2ev.light.png_tags import png_tags
+from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr
@@ -54,6 +55,13 @@ def read_picture(path: Path, page: int = 0) -> Picture:
     pixels = _read(path, page)[0]
     transfer, primaries = png_tags(path) if head.startswith(PNG) else (None, None)
     return _checked(Picture(pixels, primaries, transfer), path)
+
+
+def remarks_on_tags(path: Path, pixels: np.ndarray) -> list[str]:
+    """That a file says of its codes what is not taken up; of light, which has no codes, nothing is said."""
+    if pixels.dtype.kind == "f":
+        return []
+    return remarks_on_png(path) if head_of(path).startswith(PNG) else remarks_on_profile(path, profile_name(path))
 
 
 class PageReader:

@@ -14,16 +14,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import UsageError
-from vid2ev.light.icc import is_srgb, profile_name
+from vid2ev.light.icc import REMEDY, remarks_on_profile
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
-from vid2ev.light.recognise import PNG, head_of
 from vid2ev.light.tags import TRANSFERS, UNSPECIFIED
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.untrusted import png_chunks
 
 LARGEST = 64  # bytes of a tag that is read
 USUAL_GAMMA = 45455  # hundred thousandths
-REMEDY = "unless --transfer says another curve"
 
 
 def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
@@ -36,23 +34,15 @@ def png_tags(path: Path) -> tuple[str | None, Primaries | None]:
     return _curve(chunks.get(b"gAMA", b"")), _primaries(chunks.get(b"cHRM", b""))
 
 
-def remarks_on_tags(path: Path) -> list[str]:
-    """That a PNG says of its codes what is not taken up, or another picture by a profile."""
-    if not head_of(path).startswith(PNG):
-        return _unread(path, profile_name(path))
+def remarks_on_png(path: Path) -> list[str]:
+    """That a PNG says of its codes what is not taken up."""
     chunks = _chunks(path)
     if len(code := chunks.get(b"cICP", b"")) == 4:
         curve, full_range = code[1], code[3]
         unknown = f"{path}: transfer curve {curve} of H.273 is not known; its codes are taken for sRGB, {REMEDY}"
         limited = f"{path}: codes of limited range by its tag cICP are taken for those of full range; write it anew so"
         return [unknown] * (curve not in (*TRANSFERS, UNSPECIFIED)) + [limited] * (not full_range)
-    return _unread(path, chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1"))
-
-
-def _unread(path: Path, name: str | None) -> list[str]:
-    if name is None or is_srgb(name):
-        return []
-    return [f"{path}: its ICC profile {name!r} is not read; its codes are taken for sRGB, {REMEDY}"]
+    return remarks_on_profile(path, chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1"))
 
 
 def _chunks(path: Path) -> dict[bytes, bytes]:

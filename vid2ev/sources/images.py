@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture
+from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader, bits_of
-from vid2ev.light.png_tags import remarks_on_tags
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
@@ -81,7 +80,7 @@ class Images:
         curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path)
         self._tagged = transfer == "auto" and curve is None, tagged
         if transfer == "auto":
-            self.warnings += [] if curve or first.dtype.kind == "f" else remarks_on_tags(self._places[0][0])
+            self.warnings += [] if curve else remarks_on_tags(self._places[0][0], first)
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
         self._reader = PictureReader(transfer, colour, bits)

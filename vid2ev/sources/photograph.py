@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.light.picture_files import read_picture
+from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
-from vid2ev.light.png_tags import remarks_on_tags
 from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.spline import seen
 from vid2ev.sources.framing import crop_box, parse_size
@@ -67,7 +66,7 @@ class Photograph:
         self._motion = parse_motion(motion)
         pixels, primaries, tagged = read_picture(self.path)
         if transfer == "auto":
-            self.warnings += [] if pixels.dtype.kind == "f" else remarks_on_tags(self.path)
+            self.warnings += remarks_on_tags(self.path, pixels)
             transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
         self._reader, self._crop = PictureReader(transfer, colour), crop
         self.warnings += self._reader.remarks_on(pixels)
