@@ -3,7 +3,9 @@
 What the network remembers goes from key frame to key frame, with all events between them; frames in between are seen
 from the key frame before, with the events since.  So key frames do not depend on how many are made between them, which
 no sensor took: where a key frame is clipped, these are near the top of its range, and would be believed there.
-Weights for frames alone are told of the frame before processing.  All starts afresh after a cut, on whole frames.
+Weights for frames alone are told of the frame before processing.  All starts afresh after a cut.
+
+Large frames are gone through in parts, with all around them that the network sees.
 """
 
 from __future__ import annotations
@@ -15,12 +17,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch.nn import functional as F
 
+from interp.blocks.recurrent import State
 from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
-from interp.methods.tiling import Tile, strips
-from interp.networks.hdr import Hdr, HdrState
+from interp.methods.tiling import Tile, parse_tiling, strips
+from interp.networks.hdr import AROUND, DEEPEST, MULTIPLE, Hdr, HdrState
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
@@ -32,14 +36,15 @@ class After:
     """Post-processing with the weights of a file.
 
     events   whether there are any
+    tile     the parts of large frames: see `interp.methods.tiling.parse_tiling`
     Raises UsageError for weights of another network, and for such as need events without them.
     """
 
-    def __init__(self, path: Path, events: bool, device: torch.device | str):
+    def __init__(self, path: Path, events: bool, device: torch.device | str, tile: str = "auto"):
         network = load(path).to(device)
         if not isinstance(network, Hdr):
             raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
-        self.network, self.device = network, device
+        self.network, self.device, self.tile = network, device, tile
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
@@ -87,10 +92,27 @@ class After:
         light = to_light(planes, "srgb")[None].to(self.device)
         window = light.new_zeros(1, self.network.spec.bins, *light.shape[2:]) if since is None else since
         second = window if self.needs_events else light
-        made, after = self.network(light.expand(-1, self.network.spec.colours, -1, -1), second, state)
+        of_colours = light.expand(-1, self.network.spec.colours, -1, -1)
+        made, after = self.network(of_colours, second, state, residue=self.residue)
         found = to_codes(made.clamp(min=0), "srgb")[0]
         found = found if len(found) == codes.shape[2] else found.mean(0, keepdim=True)
         return found.movedim(0, -1).cpu().numpy(), after
+
+    def residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
+        """`Hdr.residue`, part by part."""
+        height, width = path_a.shape[-2:]
+        colours = self.network.spec.colours
+
+        def law(tile: Tile) -> torch.Tensor:
+            rows, columns = (slice(each.start // DEEPEST, each.stop // DEEPEST) for each in tile.within)
+            seen = tuple(state[..., rows, columns] for state in cell)
+            made, after = self.network.residue(path_a[(..., *tile.within)], path_b[(..., *tile.within)], seen)
+            # (states lie side by side with pixels, so that both are laid into the whole at once)
+            return torch.cat([made, F.pixel_shuffle(torch.cat(after, 1), DEEPEST)], 1)
+
+        made = parse_tiling(self.tile, (width, height), MULTIPLE).cells(law, AROUND)
+        h, c = F.pixel_unshuffle(made[:, colours:], DEEPEST).chunk(2, 1)
+        return made[:, :colours], (h, c)
 
     def _voxels(self, work: Work, until: Fraction | int) -> torch.Tensor | None:
         """The events of a gap, from its key frame on, laid over the frames; None where they are not known."""

@@ -19,6 +19,7 @@ events in path B, Radomski et al., section III.A.4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,6 +39,8 @@ SLOPE = 0.2
 BLOCKS = 5
 WITHIN = 0.1
 MULTIPLE = 8  # sides of 8 at least, so that reflected borders fit
+DEEPEST = 4  # pixels across one of the LSTM's
+AROUND = 64  # px that a pixel of the residue sees around it: 56, on whole multiples
 
 
 class HdrSpec(NetworkSpec):
@@ -54,6 +57,9 @@ class HdrSpec(NetworkSpec):
         description="what is corrected: the frame, with what lies beyond its range carried on by events where there"
         " are any; or as it is, the paper's; no parameters",
     )
+
+
+Residue = Callable[[torch.Tensor, torch.Tensor, State], tuple[torch.Tensor, State]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +97,13 @@ class Hdr(nn.Module):
         second: torch.Tensor,
         state: HdrState | None = None,
         limits: torch.Tensor | None = None,
+        residue: Residue | None = None,
     ) -> tuple[torch.Tensor, HdrState]:
         """The picture O_t [B, C, H, W], light, for a frame P_t [B, C, H, W], and the state after it.
 
         second   events [B, bins, H, W], or the frame before processing [B, C, H, W]
         limits   [B, 2] light of the frame's lowest and highest code; 0 and 1 unless given
+        residue  what is asked in place of `residue`, such as that in parts of large frames
         """
         height, width = frame.shape[-2:]
         edges = (0, -width % MULTIPLE, 0, -height % MULTIPLE)
@@ -109,14 +117,18 @@ class Hdr(nn.Module):
         ratios = to_ratios(whole)
         before = state or HdrState(ratios.detach(), beside.detach(), (), whole.detach())
         path_b = beside if with_events else torch.cat([beside, before.second], 1)
-        residue, cell = self._residue(torch.cat([ratios, before.output], 1), path_b, before.cell)
-        output = ratios + share * residue
+        found, cell = (residue or self.residue)(torch.cat([ratios, before.output], 1), path_b, before.cell)
+        output = ratios + share * found
         (kept,) = detached((cell,))
         assert kept is not None
         after = HdrState(output.detach(), beside.detach(), kept, whole.detach())
         return from_ratios(output)[..., :height, :width], after
 
-    def _residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
+    def residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
+        """What comes out [B, C, H, W] for both paths [B, ..., H, W], and the state of the LSTM.
+
+        Pixels see `AROUND` others around them, so parts of whole multiples of `DEEPEST` may be made one by one.
+        """
         first = _leaky(self.into_a(path_a))
         second = _leaky(self.down_a(first))
         beside = _leaky(self.down_b(_leaky(self.into_b(path_b))))

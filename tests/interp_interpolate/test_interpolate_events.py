@@ -195,9 +195,9 @@ def test_hdr_is_told_at_key_frames_of_all_events_between_them(
 
     monkeypatch.setattr(After, "frames", noted)
 
-    def heard(network: Hdr, frame: torch.Tensor, second: torch.Tensor, state: Any = None) -> Any:
+    def heard(network: Hdr, frame: torch.Tensor, second: torch.Tensor, state: Any, residue: Any) -> Any:
         told.append(second.double().sum((0, 1)))
-        return forward(network, frame, second, state)
+        return forward(network, frame, second, state, residue=residue)
 
     monkeypatch.setattr(Hdr, "forward", heard)
     save(tmp_path / "hdr.safetensors", "hdr", make("hdr"))

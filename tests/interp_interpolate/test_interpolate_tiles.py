@@ -14,6 +14,7 @@ from small_takes import images, moving
 from torch.utils._python_dispatch import TorchDispatchMode
 
 from interp.candidates.calibrated import calibrated
+from interp.interpolate.after import After
 from interp.interpolate.whole import frames
 from interp.methods import METHODS, Gap, closed_forms, of_networks, open_method, tiling
 from interp.methods.of_networks import OfFrames
@@ -21,6 +22,7 @@ from interp.methods.tiling import LEAST, Tiling, parse_tiling, part
 from interp.networks import make
 from interp.representation.carried import at_places, carried, footprint_over, over, places_over
 from interp.representation.event_counts import EventCounts
+from interp.weights import save
 from vid2ev.errors import UsageError
 
 SIZE = (272, 208)  # width, height
@@ -181,6 +183,23 @@ def test_a_network_in_tiles_makes_the_same_but_at_their_borders() -> None:
     assert float(away.float().mean()) > 0.1
     torch.testing.assert_close(tiled[..., away], at_once[..., away], atol=1e-5, rtol=0)
     assert float((tiled - at_once).abs().max()) < 1 / 255
+
+
+@pytest.mark.parametrize("size", [SIZE, (269, 203)])
+def test_hdr_in_tiles_is_that_of_the_whole_also_when_it_remembers(tmp_path: Path, size: tuple[int, int]) -> None:
+    network = make("hdr")
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    tiled, whole = (After(tmp_path / "hdr.safetensors", True, "cpu", tile) for tile in ("96x80", "none"))
+    tiled_state, state = None, None
+    for _ in range(3):
+        frame, events = 1.2 * torch.rand(1, 3, *size[::-1]), torch.randn(1, 5, *size[::-1])
+        with torch.inference_mode():
+            in_tiles, tiled_state = tiled.network(frame, events, tiled_state, residue=tiled.residue)
+            picture, state = whole.network(frame, events, state)
+        assert float((picture - frame).abs().max()) > 0.05
+        torch.testing.assert_close(in_tiles, picture, atol=1e-5, rtol=1e-4)
+        torch.testing.assert_close(tiled_state.cell, state.cell, atol=1e-5, rtol=1e-4)
 
 
 @pytest.mark.parametrize("event_size", [SIZE, (136, 104)])
