@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch.nn import functional as F
 
 from interp.blocks.recurrent import State
 from interp.interpolate.fill import Filled, Work
@@ -100,19 +99,16 @@ class After:
 
     def residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
         """`Hdr.residue`, part by part."""
-        height, width = path_a.shape[-2:]
-        colours = self.network.spec.colours
 
-        def law(tile: Tile) -> torch.Tensor:
+        def law(tile: Tile) -> tuple[torch.Tensor, ...]:
             rows, columns = (slice(each.start // DEEPEST, each.stop // DEEPEST) for each in tile.within)
             seen = tuple(state[..., rows, columns] for state in cell)
             made, after = self.network.residue(path_a[(..., *tile.within)], path_b[(..., *tile.within)], seen)
-            # (states lie side by side with pixels, so that both are laid into the whole at once)
-            return torch.cat([made, F.pixel_shuffle(torch.cat(after, 1), DEEPEST)], 1)
+            return made, *after
 
-        made = parse_tiling(self.tile, (width, height), MULTIPLE).cells(law, AROUND)
-        h, c = F.pixel_unshuffle(made[:, colours:], DEEPEST).chunk(2, 1)
-        return made[:, :colours], (h, c)
+        height, width = path_a.shape[-2:]
+        made, *after = parse_tiling(self.tile, (width, height), MULTIPLE).all_cells(law, AROUND)
+        return made, tuple(after)
 
     def _voxels(self, work: Work, until: Fraction | int) -> torch.Tensor | None:
         """The events of a gap, from its key frame on, laid over the frames; None where they are not known."""

@@ -14,7 +14,7 @@ Frames of up to `WHOLE_PX` pixels are not divided unless asked for, larger ones 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -75,7 +75,15 @@ class Tiling:
 
     def cells(self, law: Callable[[Tile], torch.Tensor], halo_px: int = 0) -> torch.Tensor:
         """What `law` makes of tiles [..., h, w], side by side [..., H, W]; of each the halo is cut away."""
-        (height, width), whole = self.size, None
+        (whole,) = self.all_cells(lambda tile: (law(tile),), halo_px)
+        return whole
+
+    def all_cells(self, law: Callable[[Tile], Sequence[torch.Tensor]], halo_px: int = 0) -> tuple[torch.Tensor, ...]:
+        """The same of all that `law` makes of a tile, [..., h / k, w / k] with a k of its own each.
+
+        The halo, half of overlaps, and where tiles begin and end, are whole multiples of each k.
+        """
+        (height, width), wholes = self.size, list[torch.Tensor]()
         for top, bottom in _side_by_side(self.down):
             for left, right in _side_by_side(self.across):
                 wide = Tile(
@@ -84,12 +92,14 @@ class Tiling:
                     min(right + halo_px, width),
                     min(bottom + halo_px, height),
                 )
-                made = law(wide)
-                whole = made.new_empty(*made.shape[:-2], height, width) if whole is None else whole
-                rows, columns = slice(top - wide.top, bottom - wide.top), slice(left - wide.left, right - wide.left)
-                whole[..., top:bottom, left:right] = made[..., rows, columns]
-        assert whole is not None
-        return whole
+                for n, made in enumerate(law(wide)):
+                    k = (wide.bottom - wide.top) // made.shape[-2]
+                    if n == len(wholes):
+                        wholes.append(made.new_empty(*made.shape[:-2], height // k, width // k))
+                    inner = made[..., (top - wide.top) // k :, (left - wide.left) // k :]
+                    rows, columns = slice(top // k, bottom // k), slice(left // k, right // k)
+                    wholes[n][..., rows, columns] = inner[..., : (bottom - top) // k, : (right - left) // k]
+        return tuple(wholes)
 
     def describe(self) -> str:
         """For people, and for JSON."""

@@ -37,6 +37,7 @@ class E2vid(EventFed):
     """E2VID; `step` gives images between 0 and 1."""
 
     multiple = 1 << LEVELS
+    around = 96
 
     def __init__(self, spec: E2vidSpec):
         super().__init__()

@@ -38,6 +38,7 @@ class FireNet(EventFed):
     """FireNet."""
 
     multiple = 1
+    around = 9
 
     def __init__(self, spec: FireNetSpec):
         super().__init__()

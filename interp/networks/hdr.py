@@ -40,7 +40,7 @@ BLOCKS = 5
 WITHIN = 0.1
 MULTIPLE = 8  # sides of 8 at least, so that reflected borders fit
 DEEPEST = 4  # pixels across one of the LSTM's
-AROUND = 64  # px that a pixel of the residue sees around it: 56, on whole multiples
+AROUND = 64  # px that a pixel of the residue sees around it: 59, on whole multiples
 
 
 class HdrSpec(NetworkSpec):

@@ -8,7 +8,7 @@ import torch
 from interp.blocks.recurrent import CELL_LIMIT, ConvGru, ConvLstm
 from interp.light import to_ratios
 from interp.networks import make
-from interp.networks.hdr import HdrState
+from interp.networks.hdr import AROUND, HdrState
 
 LONG = 500
 SIDE = 8
@@ -135,3 +135,31 @@ def test_any_size_of_frames_and_events(size: tuple[int, int]) -> None:
         assert make("hdr", second=second)(torch.rand(2, 3, *size), beside)[0].shape == (2, 3, *size)
     flow = make("flow", bins=3)(*torch.rand(2, 2, 3, *size))
     assert flow.shape == (2, 4, *size)
+
+
+def seen_around(of: torch.Tensor, where: int, seen: list[torch.Tensor]) -> int:
+    """How many pixels around (where, where) of an image a pixel of it depends on."""
+    farthest = 0
+    for gradient in torch.autograd.grad(of[0, 0, where, where], seen, retain_graph=True):
+        k = of.shape[-2] // gradient.shape[-2]
+        rows, columns = torch.nonzero(gradient.abs().sum((0, 1)), as_tuple=True)
+        for places in (rows, columns):
+            farthest = max(farthest, where - k * int(places.min()), k * (int(places.max()) + 1) - 1 - where)
+    return farthest
+
+
+@pytest.mark.parametrize("name", ["e2vid", "firenet", "hdr"])
+def test_a_pixel_sees_as_far_as_is_said_of_networks_that_are_run_in_parts(name: str) -> None:
+    """Any of what the network gets and remembers; pixels of all phases, as levels are coarser."""
+    network, side = make(name).eval(), 272
+    voxels, frames = torch.rand(1, 5, side, side).requires_grad_(), torch.rand(1, 6, side, side).requires_grad_()
+    if name == "hdr":
+        torch.nn.init.normal_(network.out.weight)
+        cell = [torch.rand_like(each).requires_grad_() for each in network.residue(frames, voxels, ())[1]]
+        image, seen, around = network.residue(frames, voxels, tuple(cell))[0], [voxels, frames, *cell], AROUND
+    else:
+        states = [[torch.rand_like(each).requires_grad_() for each in state] for state in network.step(voxels, ())[1]]
+        image, around = network.step(voxels, tuple(map(tuple, states)))[0], network.around
+        seen = [voxels, *(each for state in states for each in state)]
+    far = max(seen_around(image, side // 2 + phase, seen) for phase in range(8))
+    assert around - 8 < far <= around

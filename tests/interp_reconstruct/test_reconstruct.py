@@ -70,6 +70,28 @@ def test_a_pixel_is_the_log_of_its_light_high_pass_filtered() -> None:
         np.testing.assert_allclose(others, GREY, rtol=1e-6)
 
 
+@pytest.mark.parametrize("size", [(272, 208), (269, 203)])
+@pytest.mark.parametrize("name", ["firenet", "e2vid"])
+def test_pictures_in_tiles_are_those_of_the_whole_also_when_they_remember(
+    tmp_path: Path, name: str, size: tuple[int, int]
+) -> None:
+    save(tmp_path / "net.safetensors", name, make(name))
+    ways = [OfNetwork(tmp_path / "net.safetensors", size, (0.2, 0.3), tile=tile) for tile in ("128x64", "none")]
+    draw, pictures = np.random.default_rng(0), []
+    for k in range(3):
+        t = np.sort(draw.integers(10_000 * k, 10_000 * (k + 1), 50_000)).astype(np.int64)
+        x, y = (draw.integers(0, side, len(t)).astype(np.uint16) for side in size)
+        events, pictures = Events(t, x, y, draw.integers(0, 2, len(t)).astype(np.uint8)), []
+        for way in ways:
+            way.add(events, 10_000 * k, 10_000 * (k + 1))
+            pictures.append(way.picture(10_000 * (k + 1)))
+        np.testing.assert_allclose(*pictures, atol=1e-6)
+    assert pictures[0].std() > 1e-4
+    for part, whole in zip(*(way.memory().values() for way in ways), strict=True):
+        if whole.dtype.kind == "f":
+            np.testing.assert_allclose(part, whole, atol=1e-6)
+
+
 @pytest.mark.parametrize("begin_us", [-(10**12), -2_000_000, 10**12])
 def test_pictures_do_not_depend_on_what_the_clock_says(begin_us: int) -> None:
     some, pictures = drawn(us=100_000), []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from test_any_world import TEXTURES, point, turn, worlds
 from vid2ev.kernels.cuda.memory import Simulated
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.scenes import on_card
 from vid2ev.scenes.flow import flow
 from vid2ev.scenes.reel_on_card import ReelOnCard
 from vid2ev.scenes.render import render
@@ -33,21 +35,24 @@ FISH_EYE = Intrinsics(
     size=(14, 14), focal_px=(4, 4), centre_px=(6.5, 6.5), model="equidistant", distortion=(0.02, 0, 0, 0)
 )
 
-KERNELS = 4  # that make pictures
-
 
 class Counting(Simulated):
-    """A simulated card that counts what is put on it [bytes], and the kernels that it runs."""
+    """A simulated card that counts what is put on it [bytes], and how often each kernel runs."""
 
     def __init__(self) -> None:
-        self.put_bytes, self.launches = 0, 0
+        self.put_bytes, self.launches = 0, Counter[int]()
+
+    @property
+    def paintings(self) -> int:
+        """How often the kernel ran with which a painting begins."""
+        return next(iter(self.launches.values()))
 
     def put(self, array):
         self.put_bytes += np.asarray(array).nbytes
         return super().put(array)
 
     def launch(self, kernel, threads, *arguments):
-        self.launches += 1
+        self.launches[id(kernel)] += 1
         super().launch(kernel, threads, *arguments)
 
 
@@ -135,9 +140,17 @@ def test_pictures_painted_together_are_those_painted_alone():
     snapshot, memory = everything(), Counting()
     poses = [Pose.of((0, 4 * k, 0), (0.2 * k, 0, 0)) for k in range(3)]
     ours = list(reel_of(CAMERA, memory=memory).render((snapshot, pose) for pose in poses))
-    assert memory.launches == KERNELS
+    assert memory.paintings == 1
     for one, pose in zip(ours, poses, strict=True):
         assert_same(one, render(snapshot, CAMERA, pose))
+
+
+def test_few_pixels_at_a_time_are_measured_as_all(monkeypatch):
+    memory, at_once = Counting(), 4
+    monkeypatch.setattr(on_card, "MEASURED", at_once * (2 * 9 + 2 * 12 + 3 * 4))  # (with fine cells, less than one)
+    (ours,) = reel_of(CAMERA, memory=memory).render(iter([(everything(), IDENTITY)]))
+    assert_same(ours, render(everything(), CAMERA, IDENTITY))
+    assert max(memory.launches.values()) > 10
 
 
 def test_worlds_that_cannot_go_together_are_painted_one_after_the_other():
@@ -156,7 +169,7 @@ def test_worlds_that_cannot_go_together_are_painted_one_after_the_other():
     ours = list(reel_of(CAMERA, memory=memory).render((snapshot, IDENTITY) for snapshot in others))
     for one, snapshot in zip(ours, others, strict=True):
         assert_same(one, render(snapshot, CAMERA, IDENTITY))
-    assert memory.launches == KERNELS * 7
+    assert memory.paintings == 7
 
 
 def test_what_does_not_move_is_uploaded_once():

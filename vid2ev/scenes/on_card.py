@@ -5,7 +5,8 @@ On a card, what is not rounded alike everywhere (angles, powers) may differ in t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -16,13 +17,14 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import bent_tensor, pixel_grid
 from vid2ev.scenes.flow import Flow, flow_to
 from vid2ev.scenes.lens import rays_of_pixels
-from vid2ev.scenes.rays.cuda.easel import STILL, Carried, Easel, Listed
+from vid2ev.scenes.rays.cuda.easel import STILL, Carried, Easel, Listed, Measured
 from vid2ev.scenes.rays.layout import World
 from vid2ev.scenes.rays.tiles import TILE
 from vid2ev.scenes.render import Picture, cells_of, tiles_of
 
 AT_A_TIME = 16  # pictures
 PIXELS = 1 << 24  # of all that are painted together, half a gigabyte: of large ones, fewer
+MEASURED = 1 << 26  # numbers of pixels that are measured together, half a gigabyte
 LISTS = 1 << 25  # numbers of things in the lists of all tiles, a quarter of a gigabyte: of many things, fewer pictures
 CARD, BUILT_ANEW = {"vid2ev.scenes.rays.compiler": "vid2ev.scenes.rays.cuda.device_compiler"}, ("vid2ev.scenes.rays",)
 SIMULATED = {"vid2ev.kernels.cuda.machine": "vid2ev.kernels.cuda.simulated_machine"}
@@ -68,7 +70,7 @@ class PainterOnCard:
 
     def __init__(self, memory: Any, intrinsics: Intrinsics, samples: int):
         self._memory, self._intrinsics, self._size, self._samples = memory, intrinsics, intrinsics.size, samples
-        self._kernels = _kernels(memory.name, cells_of(samples))
+        self._kernels = _kernels(memory.name)
         self._worlds, self._rays = WorldsOnCard(memory), memory.put(rays_of_pixels(intrinsics))
 
     def at_a_time(self, things: int) -> int:
@@ -89,8 +91,27 @@ class PainterOnCard:
         self._memory.launch(kernels.trace, pixels, there, easel, listed)
         if self._samples > 1:
             self._memory.launch(kernels.mixing, pixels, there, easel, listed)
-            self._memory.launch(kernels.smooth, count * self._size[0] * self._size[1], there, easel, listed)
+            mixed, (usual, fine) = listed.mixed[: self._count(listed.total, 0)], cells_of(self._samples)
+            for finer in self._smooth(mixed, usual, usual == fine, there, easel, listed):
+                for _ in self._smooth(finer, fine, True, there, easel, listed):
+                    pass
         return [Picture(easel.light[k], easel.depth[k, 1:-1, 1:-1], easel.thing[k]) for k in range(count)]
+
+    def _smooth(
+        self, pixels: Any, cells: int, finest: bool, there: World, easel: Easel, listed: Listed
+    ) -> Iterator[Any]:
+        """Smooth pixels in which things meet, some at a time; gives those of them that are to be cut finer."""
+        corners, sides, kernels = (cells + 1) ** 2, 2 * cells * (cells + 1), self._kernels
+        at_once = max(1, MEASURED // (2 * corners + 2 * sides + 3 * cells**2))
+        for first in range(0, len(pixels), at_once):
+            measured = self._measured(easel, listed, pixels[first : first + at_once], cells, finest)
+            n, given = len(measured.pixels), (there, measured)
+            self._memory.launch(kernels.corner, n * corners, *given)
+            self._memory.launch(kernels.part, n, *given)
+            self._memory.launch(kernels.change, self._count(measured.totals, 0), *given)
+            self._memory.launch(kernels.middle, self._count(measured.totals, 1), *given)
+            self._memory.launch(kernels.mix, n, *given)
+            yield measured.finer[: 0 if finest else self._count(measured.totals, 2)]
 
     def flow(self, picture: Picture, then: World, motions: np.ndarray) -> Flow:
         """Where the points of one of these pictures are in a world at another instant, after `flow.motions_between`.
@@ -119,6 +140,19 @@ class PainterOnCard:
         easel.details.reshape(-1)[self._memory.put(np.concatenate(rows))] = 1
         return easel
 
+    def _measured(self, easel: Easel, listed: Listed, pixels: Any, cells: int, finest: bool) -> Measured:
+        zeros, n, sides, f64, i64 = self._memory.zeros, len(pixels), 2 * cells * (cells + 1), np.float64, np.int64
+        corners = n, cells + 1, cells + 1
+        return Measured(
+            easel.rays, easel.light, easel.details, listed.things, listed.counts, pixels, int(finest),
+            zeros(corners, i64), zeros((n, cells + 1, cells), f64), zeros((n, cells, cells + 1), f64),
+            zeros((n, cells, cells, 2), f64), zeros(corners, f64), zeros(n, f64) + math.inf, zeros(n, i64),
+            zeros(n * (sides + cells**2), i64), zeros(n, i64), zeros(3, i64),
+        )  # fmt: skip
+
+    def _count(self, totals: Any, place: int) -> int:
+        return int(self._memory.get(totals)[place])
+
     def _lists(self, count: int, things: int) -> Listed:
         (width, height), (down, across), zeros = self._size, tiles_of(self._size), self._memory.zeros
         return Listed(
@@ -128,7 +162,7 @@ class PainterOnCard:
 
 
 @cache
-def _kernels(kind: str, cells: tuple[int, int]) -> Any:
+def _kernels(kind: str) -> Any:
     """The kernels of a kind of memory; a simulated GPU calls the laws as they are compiled for a CPU."""
     build = Build(SIMULATED, ()) if kind == "simulated" else Build(CARD, BUILT_ANEW)
-    return build.module("vid2ev.scenes.rays.cuda.kernels").kernels_of(cells)
+    return build.module("vid2ev.scenes.rays.cuda.kernels").all_kernels()

@@ -21,21 +21,58 @@ PULL = 1e-4  # towards the mean of p, where the lines do not meet
 
 
 @law
-def share_cell(world, rays, i, j, x, y, size, found, count, scratch):
-    """Add a cell to the parts of its pixel."""
-    a, b = scratch.corners[j, i], scratch.corners[j, i + 1]
-    c, d = scratch.corners[j + 1, i + 1], scratch.corners[j + 1, i]
-    x1, y1 = x + size, y + size
-    top, bottom = x + size * scratch.across[j, i], x + size * scratch.across[j + 1, i]
-    left, right = y + size * scratch.down[j, i], y + size * scratch.down[j, i + 1]
-    middle = x + 0.5 * size, y + 0.5 * size
-    if a != b or b != c or c != d:
-        keys, changes = (a, b, c, d), ((top, y), (x1, right), (bottom, y1), (x, left))
-        middle = middle_of(world, rays, keys, changes, size, middle, count, scratch)
-    found = share_side(scratch, a, b, (x, y), (x1, y), (top, y), middle, found)
-    found = share_side(scratch, b, c, (x1, y), (x1, y1), (x1, right), middle, found)
-    found = share_side(scratch, c, d, (x1, y1), (x, y1), (bottom, y1), middle, found)
-    return share_side(scratch, d, a, (x, y1), (x, y), (x, left), middle, found)
+def corners_of(j, i, scratch):
+    """The keys at the corners of a cell, around it from the left upper one."""
+    corners = scratch.corners
+    return corners[j, i], corners[j, i + 1], corners[j + 1, i + 1], corners[j + 1, i]
+
+
+@law
+def changes_of(j, i, x, y, size, scratch):
+    """Where the key changes on the sides of a cell that begins at (x, y): the upper, right, lower and left one."""
+    return (
+        (x + size * scratch.across[j, i], y),
+        (x + size, y + size * scratch.down[j, i + 1]),
+        (x + size * scratch.across[j + 1, i], y + size),
+        (x, y + size * scratch.down[j, i]),
+    )
+
+
+@law
+def is_shared(cells, cell, scratch):
+    """Whether the corners of a cell have different keys."""
+    a, b, c, d = corners_of(cell // cells, cell % cells, scratch)
+    return a != b or b != c or c != d
+
+
+@law
+def find_middle(world, rays, left, top, cells, cell, count, scratch):
+    """Where the parts of a cell that is shared meet."""
+    j, i, size = cell // cells, cell % cells, 1.0 / cells
+    x, y = left + i * size, top + j * size
+    keys, changes = corners_of(j, i, scratch), changes_of(j, i, x, y, size, scratch)
+    middle = middle_of(world, rays, keys, changes, size, (x + 0.5 * size, y + 0.5 * size), count, scratch)
+    scratch.middles[j, i, 0], scratch.middles[j, i, 1] = middle
+
+
+@law
+def share_cells(left, top, cells, scratch):
+    """Fill `keys` and `parts` with what is in the cells of a pixel; how many."""
+    found, size = 0, 1.0 / cells
+    for cell in range(cells * cells):
+        j, i = cell // cells, cell % cells
+        x, y = left + i * size, top + j * size
+        x1, y1 = x + size, y + size
+        middle = x + 0.5 * size, y + 0.5 * size
+        if is_shared(cells, cell, scratch):
+            middle = scratch.middles[j, i, 0], scratch.middles[j, i, 1]
+        a, b, c, d = corners_of(j, i, scratch)
+        upper, right, lower, left_side = changes_of(j, i, x, y, size, scratch)
+        found = share_side(scratch, a, b, (x, y), (x1, y), upper, middle, found)
+        found = share_side(scratch, b, c, (x1, y), (x1, y1), right, middle, found)
+        found = share_side(scratch, c, d, (x1, y1), (x, y1), lower, middle, found)
+        found = share_side(scratch, d, a, (x, y1), (x, y), left_side, middle, found)
+    return found
 
 
 @law

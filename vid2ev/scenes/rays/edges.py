@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from vid2ev.scenes.rays.cells import share_cell
+from vid2ev.scenes.rays.cells import find_middle, is_shared, share_cells
 from vid2ev.scenes.rays.compiler import law
 from vid2ev.scenes.rays.layout import BEHIND, JUMP, MESH, NOTHING, PART, THING
 from vid2ev.scenes.rays.meet import key_of, meet, meet_thing, row, turned
@@ -23,41 +23,35 @@ from vid2ev.scenes.rays.scratch import AREA, AT_X, AT_Y, X, Y
 @law
 def measure(world, rays, column, line, cells, count, scratch):
     """Fill `keys` and `parts` with what is in a pixel; how many."""
-    scratch.odd[0] = 0
-    left, top, size = column - 0.5, line - 0.5, 1.0 / cells
-    look_at_corners(world, rays, left, top, cells, count, scratch)
-    # A side belongs to two cells; its change is found once.
-    for j in range(cells + 1):
-        for i in range(cells + 1):
-            x, y = left + i * size, top + j * size
-            for way in range(2):
-                di, dj = 1 - way, way
-                if i + di > cells or j + dj > cells:
-                    continue
-                key, next_key = scratch.corners[j, i], scratch.corners[j + dj, i + di]
-                if key != next_key:
-                    share = change_between(
-                        world, rays, x, y, x + di * size, y + dj * size, key, next_key, count, scratch
-                    )
-                    if way == 0:
-                        scratch.across[j, i] = share
-                    else:
-                        scratch.down[j, i] = share
-    found = 0
-    for j in range(cells):
-        for i in range(cells):
-            found = share_cell(world, rays, i, j, left + i * size, top + j * size, size, found, count, scratch)
-    return found
+    scratch.odd[0], scratch.split[0] = 0, math.inf
+    left, top = column - 0.5, line - 0.5
+    for corner in range((cells + 1) * (cells + 1)):
+        look_at_corner(world, rays, left, top, cells, corner, count, scratch)
+    part_meshes(world, rays, left, top, cells, scratch)
+    for side in range(sides_of(cells)):
+        if is_changing(cells, side, scratch):
+            find_change(world, rays, left, top, cells, side, count, scratch)
+    for cell in range(cells * cells):
+        if is_shared(cells, cell, scratch):
+            find_middle(world, rays, left, top, cells, cell, count, scratch)
+    return share_cells(left, top, cells, scratch)
 
 
 @law
-def look_at_corners(world, rays, left, top, cells, count, scratch):
-    """Fill `corners`, and set the depth at which a mesh hides itself."""
-    scratch.split[0], hides = math.inf, False
+def look_at_corner(world, rays, left, top, cells, corner, count, scratch):
+    """The key and the depth at a corner of cells."""
+    j, i = corner // (cells + 1), corner % (cells + 1)
+    key, depth = key_at(world, rays, left + i / cells, top + j / cells, count, scratch)
+    scratch.corners[j, i], scratch.depths[j, i] = key, depth
+
+
+@law
+def part_meshes(world, rays, left, top, cells, scratch):
+    """Set the depth at which a mesh hides itself, and mark the corners behind it."""
+    hides = False
     for j in range(cells + 1):
         for i in range(cells + 1):
-            key, depth = key_at(world, rays, left + i / cells, top + j / cells, count, scratch)
-            scratch.corners[j, i], scratch.depths[j, i] = key, depth
+            key = scratch.corners[j, i]
             hides = hides or (key >= 0 and world.kind[key // THING] == MESH)
     if not hides:
         return
@@ -67,6 +61,44 @@ def look_at_corners(world, rays, left, top, cells, count, scratch):
             key = scratch.corners[j, i]
             if key >= 0 and world.kind[key // THING] == MESH and scratch.depths[j, i] > scratch.split[0]:
                 scratch.corners[j, i] = key + BEHIND
+
+
+@law
+def sides_of(cells):
+    """How many sides as many cells across and down have; one that belongs to two cells is one."""
+    return 2 * cells * (cells + 1)
+
+
+@law
+def ends_of(cells, side):
+    """(j, i, dj, di): the corner at which a side begins, and the way to the next."""
+    if side < cells * (cells + 1):
+        return side // cells, side % cells, 0, 1
+    rest = side - cells * (cells + 1)
+    return rest // (cells + 1), rest % (cells + 1), 1, 0
+
+
+@law
+def is_changing(cells, side, scratch):
+    """Whether the ends of a side have different keys."""
+    j, i, dj, di = ends_of(cells, side)
+    return scratch.corners[j, i] != scratch.corners[j + dj, i + di]
+
+
+@law
+def find_change(world, rays, left, top, cells, side, count, scratch):
+    """Where along a side the key changes."""
+    j, i, dj, di = ends_of(cells, side)
+    size = 1.0 / cells
+    x, y = left + i * size, top + j * size
+    share = change_between(
+        world, rays, x, y, x + di * size, y + dj * size, scratch.corners[j, i], scratch.corners[j + dj, i + di],
+        count, scratch,
+    )  # fmt: skip
+    if di > 0:
+        scratch.across[j, i] = share
+    else:
+        scratch.down[j, i] = share
 
 
 @law

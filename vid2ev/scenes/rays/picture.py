@@ -39,13 +39,19 @@ def is_mixed(world, rays, line, column, details, depth, keys):
 
 @law
 def smooth(world, rays, line, column, cells, details, count, light, scratch):
-    """The light of a pixel in which things meet; `cells` is into how many it is cut: usually, and at `details`."""
-    across, down = steps(rays, line, column)
+    """The light of a pixel in which things meet; `cells` is into how many it is cut: usually, and at details."""
     cut, found = cells[1] if details[line, column] else cells[0], -1
     while found < 0:  # (once or twice: what is called in one place is compiled once)
         found = measure(world, rays, column - 1, line - 1, cut, count, scratch)
         if scratch.odd[0] and cut < cells[1]:
             cut, found = cells[1], -1
+    mix(world, rays, line, column, found, count, light, scratch)
+
+
+@law
+def mix(world, rays, line, column, found, count, light, scratch):
+    """The light of a pixel that has been measured, of which as many parts were found."""
+    across, down = steps(rays, line, column)
     r, g, b = light_of_parts(world, rays, found, across, down, count, scratch)
     light[line - 1, column - 1, 0] = r
     light[line - 1, column - 1, 1] = g

@@ -20,7 +20,8 @@ class Scratch(NamedTuple):
     corners: np.ndarray  # int64 [cells + 1, cells + 1]: keys at the corners of cells
     across: np.ndarray  # float64 [cells + 1, cells]: where the key changes along horizontal sides, 0 ... 1
     down: np.ndarray  # float64 [cells, cells + 1]: along vertical sides
-    depths: np.ndarray  # float64 [cells + 1, cells + 1]: depths there
+    middles: np.ndarray  # float64 [cells, cells, 2]: where the parts of a cell meet [px]
+    depths: np.ndarray  # float64 [cells + 1, cells + 1]: depths at the corners
     split: np.ndarray  # float64 [1]: the depth at which a mesh hides itself in the pixel, infinite if it does not
     odd: np.ndarray  # int64 [1]: whether more is in the pixel than its cells tell apart
     keys: np.ndarray  # int64 [KEYS]: what is in the pixel
@@ -35,6 +36,7 @@ def scratch_for(things: int, cells: int) -> Scratch:
         np.empty((cells + 1, cells + 1), np.int64),
         np.empty((cells + 1, cells), np.float64),
         np.empty((cells, cells + 1), np.float64),
+        np.empty((cells, cells, 2), np.float64),
         np.empty((cells + 1, cells + 1), np.float64),
         np.full(1, np.inf),
         np.zeros(1, np.int64),

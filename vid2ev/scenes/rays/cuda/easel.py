@@ -35,6 +35,32 @@ class Listed(NamedTuple):
     total: np.ndarray  # int64 [1]: how many
 
 
+class Measured(NamedTuple):
+    """Pixels in which things meet, n that are cut into as many cells each, and what is found out about them.
+
+    All that their kernels take but the worlds: some drivers take 4096 bytes and no more.
+    """
+
+    rays: np.ndarray  # as of `Easel`
+    light: np.ndarray
+    details: np.ndarray
+    things: np.ndarray  # as of `Listed`
+    counts: np.ndarray
+    pixels: np.ndarray  # int64 [n], as of `Listed.mixed`
+    finest: int  # whether what these cells do not tell apart is left at that
+    corners: np.ndarray  # int64 [n, cells + 1, cells + 1], as of `Scratch`, as are those that follow
+    across: np.ndarray  # float64 [n, cells + 1, cells]
+    down: np.ndarray  # float64 [n, cells, cells + 1]
+    middles: np.ndarray  # float64 [n, cells, cells, 2]
+    depths: np.ndarray  # float64 [n, cells + 1, cells + 1]
+    split: np.ndarray  # float64 [n], infinite at first
+    odd: np.ndarray  # int64 [n]
+    changes: np.ndarray  # int64 [n x (sides + cells)]: sides along which keys change, and, behind room for all sides,
+    # cells that are shared; those of the first pixel are numbered first
+    finer: np.ndarray  # int64 [n]: pixels that are to be cut finer
+    totals: np.ndarray  # int64 [3]: how many sides, shared cells, and pixels to be cut finer there are
+
+
 class Carried(NamedTuple):
     """Where the points of a picture are at another instant: see `walk.carry_all`."""
 

@@ -1,4 +1,8 @@
-"""The kernels: list what tiles may see, trace the centres of all pixels, list those that are mixed, smooth these."""
+"""The kernels: list what tiles may see, trace the centres of all pixels, list those that are mixed, measure these.
+
+To measure, each thread has one thing to look for, a corner, a change of key along a side, the middle of a cell: where
+a thread had a pixel, those that run together waited for the one with most in it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,18 @@ import numpy as np
 from numba import cuda
 
 from vid2ev.kernels.cuda.machine import jit
-from vid2ev.scenes.rays.cuda.threads import carry_at, is_mixed_at, list_at, smooth_listed, trace_at
+from vid2ev.scenes.rays.cuda.threads import (
+    carry_at,
+    change_at,
+    corner_at,
+    is_mixed_at,
+    list_at,
+    list_changes,
+    middle_at,
+    mix_at,
+    part_at,
+    trace_at,
+)
 from vid2ev.scenes.rays.layout import STACK
 from vid2ev.scenes.rays.scratch import KEYS
 
@@ -16,19 +31,21 @@ f64, i64 = np.float64, np.int64
 
 
 class Kernels(NamedTuple):
-    """Each takes `worlds`, `easel` and `listed`."""
+    """The first three take `worlds`, `easel` and `listed`, those that measure `worlds` and `measured`."""
 
     listing: Any  # a thread for each tile
-    trace: Any  # for each pixel, tile by tile, as are those that follow
+    trace: Any  # for each pixel, tile by tile
     mixing: Any
-    smooth: Any
+    corner: Any  # for each corner of the cells of each pixel that is measured
+    part: Any  # for each pixel
+    change: Any  # for each side
+    middle: Any  # for each cell
+    mix: Any  # for each pixel
     carry: Any  # takes the world of the second instant, and `Carried`; for each pixel, row by row
 
 
-def kernels_of(cells: tuple[int, int]) -> Kernels:
-    """The kernels for pixels that are cut into so many cells each way: usually, and at details."""
-    n = cells[1]
-    square, wide, high, rows = (n + 1, n + 1), (n + 1, n), (n, n + 1), (KEYS, 5)
+def all_kernels() -> Kernels:
+    """The kernels."""
 
     @jit
     def listing_kernel(worlds, easel, listed):
@@ -58,20 +75,42 @@ def kernels_of(cells: tuple[int, int]) -> Kernels:
             listed.mixed[start[0] + place] = cuda.grid(1)
 
     @jit
-    def smooth_kernel(worlds, easel, listed):
-        thread = cuda.grid(1)
-        stack, keys = cuda.local.array(STACK, i64), cuda.local.array(KEYS, i64)
-        corners, depths = cuda.local.array(square, i64), cuda.local.array(square, f64)
-        across, down = cuda.local.array(wide, f64), cuda.local.array(high, f64)
-        split, odd, parts = cuda.local.array(1, f64), cuda.local.array(1, i64), cuda.local.array(rows, f64)
-        if thread < listed.total[0]:
-            smooth_listed(
-                thread, worlds, easel, listed, cells, stack, corners, across, down, depths, split, odd, keys, parts
-            )
+    def corner_kernel(worlds, measured):
+        stack = cuda.local.array(STACK, i64)
+        corner_at(cuda.grid(1), worlds, measured, stack)
+
+    @jit
+    def part_kernel(worlds, measured):
+        p, stack = cuda.grid(1), cuda.local.array(1, i64)
+        if p < measured.pixels.size:
+            sides, shared = part_at(p, worlds, measured, stack)
+            first_side = cuda.atomic.add(measured.totals, 0, sides)
+            first_shared = cuda.atomic.add(measured.totals, 1, shared)
+            list_changes(p, measured, stack, first_side, first_shared)
+
+    @jit
+    def change_kernel(worlds, measured):
+        stack = cuda.local.array(STACK, i64)
+        change_at(cuda.grid(1), worlds, measured, stack)
+
+    @jit
+    def middle_kernel(worlds, measured):
+        stack = cuda.local.array(STACK, i64)
+        middle_at(cuda.grid(1), worlds, measured, stack)
+
+    @jit
+    def mix_kernel(worlds, measured):
+        p, stack = cuda.grid(1), cuda.local.array(STACK, i64)
+        keys, parts = cuda.local.array(KEYS, i64), cuda.local.array((KEYS, 5), f64)
+        if p < measured.pixels.size and not mix_at(p, worlds, measured, stack, keys, parts):
+            measured.finer[cuda.atomic.add(measured.totals, 2, 1)] = measured.pixels[p]
 
     @jit
     def carry_kernel(worlds, carried):
         stack = cuda.local.array(STACK, i64)
         carry_at(cuda.grid(1), worlds, carried, stack)
 
-    return Kernels(listing_kernel, trace_kernel, mixing_kernel, smooth_kernel, carry_kernel)
+    return Kernels(
+        listing_kernel, trace_kernel, mixing_kernel, corner_kernel, part_kernel, change_kernel, middle_kernel,
+        mix_kernel, carry_kernel,
+    )  # fmt: skip

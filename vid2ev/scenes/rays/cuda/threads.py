@@ -5,9 +5,11 @@ Threads go tile by tile, 256 pixels each, so that those that run together look a
 
 from __future__ import annotations
 
+from vid2ev.scenes.rays.cells import find_middle, is_shared, share_cells
 from vid2ev.scenes.rays.compiler import law, walk
 from vid2ev.scenes.rays.cuda.easel import world_of
-from vid2ev.scenes.rays.picture import carry_pixel, is_mixed, smooth, trace
+from vid2ev.scenes.rays.edges import find_change, is_changing, look_at_corner, part_meshes, sides_of
+from vid2ev.scenes.rays.picture import carry_pixel, is_mixed, mix, trace
 from vid2ev.scenes.rays.scratch import Scratch
 from vid2ev.scenes.rays.tiles import TILE, things_in_tile
 
@@ -48,16 +50,86 @@ def is_mixed_at(thread, worlds, easel, listed):
 
 
 @walk
-def smooth_listed(
-    thread, worlds, easel, listed, cells, stack, corners, across, down, depths, split, odd, keys, parts
-):  # fmt: skip
-    """The light of a pixel that is listed."""
-    k, tile, line, column = pixel_of(listed.mixed[thread], easel.rays, listed.counts)
-    scratch = Scratch(stack, listed.things[k, tile], corners, across, down, depths, split, odd, keys, parts)
-    smooth(
-        world_of(worlds, k), easel.rays, line, column, cells, easel.details[k], listed.counts[k, tile], easel.light[k],
-        scratch,
-    )  # fmt: skip
+def corner_at(thread, worlds, measured, stack):
+    """A corner of a cell of a pixel."""
+    cells = measured.corners.shape[1] - 1
+    p, corner = thread // ((cells + 1) * (cells + 1)), thread % ((cells + 1) * (cells + 1))
+    if p < measured.pixels.size:
+        k, tile, left, top = place_of(p, measured)
+        look_at_corner(
+            world_of(worlds, k), measured.rays, left, top, cells, corner, measured.counts[k, tile],
+            scratch_of(measured, p, measured.things[k, tile], stack),
+        )  # fmt: skip
+
+
+@walk
+def part_at(p, worlds, measured, stack):
+    """What follows from all corners of a pixel: along how many sides keys change, and how many cells are shared."""
+    cells = measured.corners.shape[1] - 1
+    k, tile, left, top = place_of(p, measured)
+    scratch = scratch_of(measured, p, measured.things[k, tile], stack)
+    part_meshes(world_of(worlds, k), measured.rays, left, top, cells, scratch)
+    sides, shared = 0, 0
+    for side in range(sides_of(cells)):
+        sides += is_changing(cells, side, scratch)
+    for cell in range(cells * cells):
+        shared += is_shared(cells, cell, scratch)
+    return sides, shared
+
+
+@walk
+def list_changes(p, measured, stack, first_side, first_shared):
+    """List these, from places on that are free."""
+    cells = measured.corners.shape[1] - 1
+    scratch = scratch_of(measured, p, measured.things[0, 0], stack)
+    for side in range(sides_of(cells)):
+        if is_changing(cells, side, scratch):
+            measured.changes[first_side] = p * sides_of(cells) + side
+            first_side += 1
+    first_shared += measured.pixels.size * sides_of(cells)
+    for cell in range(cells * cells):
+        if is_shared(cells, cell, scratch):
+            measured.changes[first_shared] = p * cells * cells + cell
+            first_shared += 1
+
+
+@walk
+def change_at(thread, worlds, measured, stack):
+    """A side along which the key changes."""
+    cells = measured.corners.shape[1] - 1
+    if thread < measured.totals[0]:
+        p, side = measured.changes[thread] // sides_of(cells), measured.changes[thread] % sides_of(cells)
+        k, tile, left, top = place_of(p, measured)
+        find_change(
+            world_of(worlds, k), measured.rays, left, top, cells, side, measured.counts[k, tile],
+            scratch_of(measured, p, measured.things[k, tile], stack),
+        )  # fmt: skip
+
+
+@walk
+def middle_at(thread, worlds, measured, stack):
+    """A cell that is shared."""
+    cells = measured.corners.shape[1] - 1
+    if thread < measured.totals[1]:
+        number = measured.changes[measured.pixels.size * sides_of(cells) + thread]
+        p, cell = number // (cells * cells), number % (cells * cells)
+        k, tile, left, top = place_of(p, measured)
+        find_middle(
+            world_of(worlds, k), measured.rays, left, top, cells, cell, measured.counts[k, tile],
+            scratch_of(measured, p, measured.things[k, tile], stack),
+        )  # fmt: skip
+
+
+@walk
+def mix_at(p, worlds, measured, stack, keys, parts):
+    """The light of a pixel; returns False where it is to be cut finer."""
+    k, tile, line, column = pixel_of(measured.pixels[p], measured.rays, measured.counts)
+    if not measured.finest and (measured.odd[p] != 0 or measured.details[k, line, column] != 0):
+        return False
+    scratch = with_parts(measured, p, measured.things[k, tile], stack, keys, parts)
+    found = share_cells(column - 1.5, line - 1.5, measured.corners.shape[1] - 1, scratch)
+    mix(world_of(worlds, k), measured.rays, line, column, found, measured.counts[k, tile], measured.light[k], scratch)
+    return True
 
 
 @walk
@@ -69,6 +141,28 @@ def carry_at(thread, worlds, carried, stack):
             world_of(worlds, 0), line, column, carried.rays, carried.depth, carried.thing, carried.motions,
             carried.plane, carried.seen, stack,
         )  # fmt: skip
+
+
+@law
+def place_of(p, measured):
+    """(picture, tile, left, top) of pixel p of those that are measured, as of `edges.measure`."""
+    k, tile, line, column = pixel_of(measured.pixels[p], measured.rays, measured.counts)
+    return k, tile, column - 1.5, line - 1.5
+
+
+@law
+def scratch_of(measured, p, things, stack):
+    """What the laws of pixels work in until their parts are told, of pixel p of those that are measured."""
+    return with_parts(measured, p, things, stack, stack, measured.middles[p, 0])
+
+
+@law
+def with_parts(measured, p, things, stack, keys, parts):
+    """The same, with parts."""
+    return Scratch(
+        stack, things, measured.corners[p], measured.across[p], measured.down[p], measured.middles[p],
+        measured.depths[p], measured.split[p : p + 1], measured.odd[p : p + 1], keys, parts,
+    )  # fmt: skip
 
 
 @law
