@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -365,13 +365,25 @@ def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.Monkey
         vid2ev("convert", CLIP)
 
 
-def test_a_full_memory_of_a_gpu_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object, **__: object) -> None:
-        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.\nGPU 0 has ...")
+def no_room() -> None:
+    np.empty(1 << 60, np.uint8)
 
-    monkeypatch.setattr(Recipe, "of", full)
+
+def no_room_for_a_tensor() -> None:
+    torch.empty(1 << 60, dtype=torch.uint8)
+
+
+def no_room_on_a_gpu() -> None:
+    raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.\nGPU 0 has ...")
+
+
+@pytest.mark.parametrize(("fills", "said"), [
+    (no_room, "the memory"), (no_room_for_a_tensor, "the memory"), (no_room_on_a_gpu, "the GPU's memory"),
+])  # fmt: skip
+def test_a_full_memory_is_one_sentence(monkeypatch: pytest.MonkeyPatch, fills: Callable[[], None], said: str) -> None:
+    monkeypatch.setattr(Recipe, "of", lambda *_, **__: fills())
     result = vid2ev("convert", CLIP)
-    assert result.exit_code == 1 and result.stderr.startswith("error: the GPU's memory is full; take smaller")
+    assert result.exit_code == 1 and result.stderr.startswith(f"error: {said} is full; take smaller")
     assert result.stderr.count("\n") == 1
 
 
@@ -415,12 +427,15 @@ def test_a_full_disk_is_one_sentence_and_the_old_recording_stays(limit: int) -> 
 
 
 @posix
-def test_control_c_ends_it_with_130_and_leaves_nothing() -> None:
-    endless = CLIP.replace("0.2", "1000")
-    child = started("convert", endless, "-o", "out", *QUICK, stderr=subprocess.PIPE)
+@pytest.mark.parametrize("asks", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_who_asks_a_conversion_to_end_is_told_and_finds_nothing(asks: signal.Signals) -> None:
+    endless, heard = CLIP.replace("0.2", "1000"), ""
+    if asks != signal.SIGINT:
+        heard = f"import signal; signal.signal({int(asks)}, signal.SIG_DFL)"  # (who runs the tests may hear nothing)
+    child = started("convert", endless, "-o", "out", *QUICK, before=heard, stderr=subprocess.PIPE)
     while not Path("out.partial/t").exists() and child.poll() is None:
         time.sleep(0.05)
-    child.send_signal(signal.SIGINT)
+    child.send_signal(asks)
     _, error = child.communicate()
     assert (child.returncode, error.count("\n"), error[:11]) == (130, 1, "interrupted"), error
     assert left() == set()

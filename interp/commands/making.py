@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from vid2ev.commands import INTERRUPTED
+from vid2ev.commands import INTERRUPTED, tidy
 from vid2ev.errors import DataError, UsageError
 
 
@@ -28,14 +28,15 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
 
 @contextmanager
 def kept(path: Path) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed."""
+    """What goes wrong within, or asks to end, says so if it can be resumed."""
 
     def remedy() -> str:
         done = path.with_name(f"{path.name}.partial") / "done.jsonl"
         return "; what is done is kept, the same command with --resume goes on" if done.exists() else ""
 
     try:
-        yield
+        with tidy():
+            yield
     except DataError as error:
         raise DataError(f"{error}{remedy()}") from error
     except KeyboardInterrupt:

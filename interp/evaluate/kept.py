@@ -124,9 +124,11 @@ class Kept(KeptRows):
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         nothing = kind is not None and self._begins and not any((self.folder / KEPT).rglob("*.jsonl"))
-        if nothing:
-            shutil.rmtree(self.folder / KEPT, ignore_errors=True)
-            (self.folder / JOB).unlink(missing_ok=True)
+        for each in self.folder.iterdir() if nothing else ():
+            if each.is_dir():
+                shutil.rmtree(each, ignore_errors=True)
+            elif each.name != "lock":
+                each.unlink(missing_ok=True)
         unlock(self.folder, self._handle)
         if nothing and self._makes_folder:
             with suppress(OSError):  # (somebody else has begun there meanwhile)

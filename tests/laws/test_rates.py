@@ -276,6 +276,36 @@ def test_photoreceptor_noise_makes_events_at_rices_rate(hz, pixels, seconds, ord
     assert len(sent) / (2 * (up + down)) == pytest.approx(1, abs=0.05)
 
 
+def followed(
+    tau1_us: float, tau2_us: float, sigma: float, theta: float, step_us: float, steps: int, pixels: int
+) -> float:
+    """Events/s of a pixel at rest whose noise is followed step by step."""
+    rng, spread = np.random.default_rng(0), sigma * math.sqrt((tau1_us + tau2_us) / tau1_us)
+    keep1, keep2, warm = math.exp(-step_us / tau1_us), math.exp(-step_us / tau2_us), int(8 * tau2_us / step_us)
+    first, second = spread * rng.standard_normal(pixels), np.zeros(pixels)
+    memory, sent = np.zeros(pixels), 0
+    for k in range(warm + steps):
+        after = keep1 * first + spread * math.sqrt(1 - keep1**2) * rng.standard_normal(pixels)
+        second = keep2 * second + (1 - keep2) * 0.5 * (first + after)
+        first = after
+        if k >= warm:
+            rungs = np.trunc((second - memory) / theta)
+            sent += int(np.abs(rungs).sum())
+            memory += theta * rungs
+    return sent / (pixels * steps * step_us * 1e-6)
+
+
+@pytest.mark.parametrize(("tau2_us", "step_us", "steps"), [(300, 5, 15_000), (30, 0.5, 60_000)])
+@pytest.mark.parametrize("every_ns", [100_000, 1_000_000, 10_000_000])
+def test_noise_that_frames_are_too_few_for_sends_as_much_as_the_noise_itself(every_ns, tau2_us, step_us, steps):
+    """3 sigma: Rice's rate is 8 % above it where the poles are alike, 25 % where one is ten times as fast."""
+    sigma, seconds, shape = 0.2 / 3, 0.3, (64, 64)
+    spec = clean(threshold_on=0.2, threshold_off=0.2, photoreceptor_noise=sigma, photoreceptor_tau_us=300,
+                 follower_tau_us=tau2_us)  # fmt: skip
+    sent = len(at_rest(spec, 0.5, seconds, every_ns, shape)) / (shape[0] * shape[1] * seconds)
+    assert sent == pytest.approx(followed(300, tau2_us, sigma, 0.2, step_us, steps, 2000), rel=0.06)
+
+
 def test_rates_add_up_with_everything_on():
     """Leak, shot and hot events together, at both samplings: each keeps its rate."""
     totals = []

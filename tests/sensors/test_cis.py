@@ -92,6 +92,8 @@ def test_a_wrong_setting_is_refused_in_one_sentence(override, parts):
 def test_a_setting_may_stand_bare_or_with_its_table():
     assert load_cis("phone", ["cis.line_us=3"]) == load_cis("phone", ["line_us=3"])
     assert load_cis("phone", ["shading=[]"]).shading == ()
+    with pytest.raises(UsageError, match="shading"):
+        load_cis("phone", ["shading=[1e300]"])
 
 
 def test_interrupted_at_any_frame_it_goes_on_to_the_same_bits():

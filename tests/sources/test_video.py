@@ -332,6 +332,14 @@ def test_a_truncated_file_gives_what_it_has_and_says_so(encode, name: str, codec
     assert len(list(source.frames(5))) == len(frames) - 5
 
 
+@pytest.mark.parametrize("name", ["a.mkv", "a.nut"])
+def test_a_whole_file_that_begins_late_is_not_truncated(encode, name: str) -> None:
+    path = encode(name, noisy(13), stamps=[90 + k for k in range(13)])
+    source = open_source(path)
+    assert len(list(source.frames())) == 13 and not source.warnings
+    assert source.frames_expected in (12, 13)  # (NUT says when the last one begins)
+
+
 @pytest.mark.parametrize("container_options", [{}, {"mpegts_m2ts_mode": "1"}], ids=["188", "192"])
 def test_a_stream_that_ends_within_a_packet_says_that_it_is_truncated(encode, container_options) -> None:
     """MPEG-TS, which announces nothing; what ends with a packet may be whole."""

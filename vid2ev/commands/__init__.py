@@ -21,15 +21,23 @@ import click
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
-MEMORY_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
+GPU_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
+MEMORY_FULL = "the memory is full; take smaller frames, tiles or batches, or fewer workers"
+
+
+def asks_to_end() -> list[signal.Signals]:
+    """The signals, beside Ctrl-C's, that ask this program to end and that nobody else has taken: SIGTERM, SIGHUP."""
+    if threading.current_thread() is not threading.main_thread():
+        return []
+    asks = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    return [each for each in asks if signal.getsignal(each) is signal.SIG_DFL]
 
 
 @contextmanager
 def tidy() -> Iterator[None]:
-    """Within it, what asks a program to end (SIGTERM, SIGHUP) ends it as Ctrl-C does: what is half made is removed."""
-    asks = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    ours = threading.current_thread() is threading.main_thread()
-    heard = [each for each in asks if ours and signal.getsignal(each) is signal.SIG_DFL]
+    """Within it, what asks a program to end does so as Ctrl-C does: what is half made is removed, or said to be
+    kept."""
+    heard = asks_to_end()
     for each in heard:
         signal.signal(each, signal.default_int_handler)
     try:
@@ -73,14 +81,26 @@ class Commands(click.Group):
             said = DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
             click.echo(f"error: {said}", err=True)
             sys.exit(said.exit_code)
-        except RuntimeError as error:
-            if type(error).__name__ != "OutOfMemoryError":  # (torch's: to import it takes a second)
+        except Exception as error:
+            if not (full := what_is_full(error)):
                 raise
-            click.echo(f"error: {MEMORY_FULL}", err=True)
+            click.echo(f"error: {full}", err=True)
             sys.exit(DataError.exit_code)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
+
+
+def what_is_full(error: Exception) -> str | None:
+    """A sentence for an error that means that there is no more memory; None for all others.
+
+    numpy, Python and FFmpeg raise MemoryError; torch and OpenCV errors of their own, which take a second to import.
+    """
+    if type(error).__name__ == "OutOfMemoryError":
+        return GPU_FULL
+    said = str(error)
+    theirs = "DefaultCPUAllocator: can't allocate memory" in said or "Insufficient memory" in said
+    return MEMORY_FULL if isinstance(error, MemoryError) or theirs else None
 
 
 def refuse_nothing(words: list[str]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from vid2ev.commands import INTERRUPTED
+from vid2ev.commands import INTERRUPTED, tidy
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
@@ -118,17 +118,18 @@ def shared_out(
 ) -> Iterator[Outcome]:
     """The outcomes of tasks, in whatever order they come, with a live line and what is `said` of each unless `quiet`.
 
-    Ctrl-C ends the program, and says that it can be resumed.
+    What asks the program to end does so, and it says that it can be resumed.
     """
     from vid2ev.cluster.work import outcomes
 
     live = None if quiet else Live(len(tasks), noun, quiet)
     try:
-        for outcome in outcomes(tasks, workers, live.watch if live else None):
-            if live:
-                text, events, failed = said(outcome)
-                live.end(outcome.name, failed, events, text)
-            yield outcome
+        with tidy():
+            for outcome in outcomes(tasks, workers, live.watch if live else None):
+                if live:
+                    text, events, failed = said(outcome)
+                    live.end(outcome.name, failed, events, text)
+                yield outcome
     except KeyboardInterrupt:
         click.echo("interrupted; what is done is kept, the same command with --resume goes on", err=True)
         sys.exit(INTERRUPTED)

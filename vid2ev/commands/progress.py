@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from vid2ev.commands import INTERRUPTED
+from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError
 
@@ -50,9 +50,10 @@ def kept(directory: Path, again: bool = True) -> Iterator[None]:
 
 @contextmanager
 def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
-    """Ctrl-C counts even where Python loses it, as in a callback of compiled code: what this yields raises it anew.
+    """Ctrl-C, and all else that asks to end, counts even where Python loses it, as in a callback of compiled code: what
+    this yields raises it anew.
 
-    `gently` lets it return True for the first Ctrl-C instead: a camera has no other end.
+    `gently` lets it return True the first time instead: a camera has no other end.
     """
     asked = 0
 
@@ -74,12 +75,13 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
     if threading.current_thread() is not threading.main_thread():
         yield check
         return
-    before, tell_before = signal.signal(signal.SIGINT, note), sys.unraisablehook
-    sys.unraisablehook = tell
+    before = {each: signal.signal(each, note) for each in (signal.SIGINT, *asks_to_end())}
+    sys.unraisablehook, tell_before = tell, sys.unraisablehook
     try:
         yield check
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
         sys.unraisablehook = tell_before
 
 

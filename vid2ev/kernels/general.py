@@ -45,7 +45,7 @@ from vid2ev.physics.photoreceptor import (
     separate_rates,
     turning_points,
 )
-from vid2ev.physics.photoreceptor_noise import rice_expected, rice_gap, rice_words
+from vid2ev.physics.photoreceptor_noise import fresh_share, rice_expected, rice_gap, rice_words
 from vid2ev.physics.random import unit
 
 KNOTS = 8  # room for the ends of the pieces: three of the response, each cut once at most
@@ -187,10 +187,11 @@ def accept_rice(path, s, k, expected, on, off, pixel, num, iv):
     """Does candidate k happen at s? 1 as ON, -1 as OFF, 0 not at all."""
     here = value(path, s)
     chance = unit(rice_words(pixel, k, num, iv)[1]) * expected
-    upward = rice_expected(on - here, np.inf, num, iv)
+    upward = rice_expected(on - here, np.inf, num, iv) * fresh_share(on - here, num)
     if chance < upward:
         return 1
-    return -1 if chance < upward + rice_expected(np.inf, here - off, num, iv) else 0
+    downward = rice_expected(np.inf, here - off, num, iv) * fresh_share(here - off, num)
+    return -1 if chance < upward + downward else 0
 
 
 @inner

@@ -18,7 +18,7 @@ Source: the paper, section II.A: a polynomial of the distance from the centre re
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -32,11 +32,13 @@ from vid2ev.stream.chances import at_most
 from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 from vid2ev.stream.scene import Omission, Scene
 
+GREATEST = 1e6  # of a coefficient
+
 
 class Shading(BaseModel, frozen=True, extra="forbid"):
     """Parameter of the lens shading."""
 
-    shading: tuple[float, ...] = Field(
+    shading: tuple[Annotated[float, Field(ge=-GREATEST, le=GREATEST)], ...] = Field(
         (),
         max_length=16,
         description="coefficients of r, r^2, ... of the optical gain, r in widths of the picture from its centre",

@@ -22,7 +22,8 @@ class Record(BaseModel, frozen=True, extra="forbid"):
     def _something_or_nothing(self) -> Self:
         for name, value in self:
             if isinstance(value, float) and 0.0 < abs(value) < LEAST:
-                raise ValueError(f"{name} {value}: expected 0, or at least {LEAST}")
+                above_0 = any(hasattr(each, "gt") for each in type(self).model_fields[name].metadata)
+                raise ValueError(f"{name} {value}: expected {'' if above_0 else '0, or '}at least {LEAST}")
         return self
 
 

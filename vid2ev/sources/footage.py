@@ -203,7 +203,8 @@ def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction 
     """Where a stream that begins at `begin_s` ends [s] by the header: its tag (Matroska), or the duration if the file
     holds nothing else.
 
-    Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there.
+    Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there, and
+    reads it so of NUT.
     """
     tag = re.fullmatch(r"(\d+):(\d+):(\d+(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
     if tag:
@@ -213,7 +214,8 @@ def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction 
         said_s = Fraction(container.duration, 10**6)
     else:
         return None
-    is_end = "matroska" in container.format.name and _muxer(container).startswith("Lavf") and said_s > begin_s
+    of_lavf = "matroska" in container.format.name and _muxer(container).startswith("Lavf")
+    is_end = (of_lavf or container.format.name == "nut") and said_s > begin_s
     return said_s if is_end else begin_s + said_s
 
 
