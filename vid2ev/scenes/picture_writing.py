@@ -55,8 +55,7 @@ def _write(codes: np.ndarray, path: Path) -> None:
     import cv2
 
     quick = [cv2.IMWRITE_PNG_COMPRESSION, 2] if path.suffix == ".png" else []
-    if not cv2.imwrite(str(path), codes[..., ::-1], quick):
-        raise OSError(f"{path.name} cannot be written")
+    path.write_bytes(cv2.imencode(path.suffix, codes[..., ::-1], quick)[1].tobytes())  # (imwrite does not say why not)
 
 
 WRITERS: dict[str, Writer] = {"png": _write_png, "png16": _write_png16, "tiff": _write_tiff, "exr": _write_exr}
