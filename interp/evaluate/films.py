@@ -63,7 +63,7 @@ class Film:
 
     def __init__(self, video: str, protocol: Protocol, name: str, simulated: Simulated, limit: int | None = None):
         self.name, self.video, self._protocol, self._limit = name, video, protocol, limit
-        self.multiple, self._simulated, self._told = protocol.multiple, simulated, Told()
+        self.multiple, self.begin, self._simulated, self._told = protocol.multiple, 0, simulated, Told()
         source = simulated.opened(video)
         if not source.rewindable:
             raise UsageError(f"{video} can be read once only; save it as a file to score methods on it")

@@ -62,12 +62,14 @@ class Footage(Protocol):
     name        by which it is called, and its files
     expected    number of groups, for progress; may be an estimate
     multiple    frames per key frame
+    begin       the first key frame
     identity    what tells it from another, ready for JSON
     """
 
     name: str
     expected: int
     multiple: int
+    begin: int
     identity: dict[str, Any]
 
     @property

@@ -55,7 +55,8 @@ class Predictions:
         folder = self.folder / footage.name
         files = pictures_in(folder / self.within if self.within else folder)
         try:
-            return replace(self, files=by_frame(files, footage.frames, footage.multiple), unpaired="", unfit={})
+            known = by_frame(files, footage.frames, footage.multiple, footage.begin)
+            return replace(self, files=known, unpaired="", unfit={})
         except DataError as error:
             return replace(self, files={}, unpaired=str(error), unfit={})
 
@@ -91,17 +92,19 @@ def predictions_in(folder: str | Path) -> list[Predictions]:
     return found
 
 
-def by_frame(files: Sequence[Path], frames: int, multiple: int) -> dict[int, Path]:
+def by_frame(files: Sequence[Path], frames: int, multiple: int, begin: int = 0) -> dict[int, Path]:
     """Pictures, in order of their names, by the number of the frame that each is of.
 
     frames, multiple   how many the sequence has, and how many there are for each key frame
+    begin              the first key frame
     Raises DataError where there is no telling.
     """
     ends = [re.search(r"(\d+)\D*$", path.stem) for path in files]
     numbers = [int(end[1]) for end in ends if end]
     known = len({*numbers}) == len(files)
     gapless = known and max(numbers, default=0) - min(numbers, default=0) < len(files)
-    rebuilt = [frame for frame in range((frames - 1) // multiple * multiple) if frame % multiple]
+    gaps = max(frames - 1 - begin, 0) // multiple
+    rebuilt = [begin + place for place in range(gaps * multiple) if place % multiple]
     if len(files) == frames or not files:
         return dict(enumerate(files))
     if len(files) == len(rebuilt) and (gapless or not known or max(numbers) >= frames):

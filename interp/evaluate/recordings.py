@@ -31,9 +31,9 @@ class Recording:
         self.name, self._sequence, self._protocol = name, sequence, protocol
         self.multiple = multiple = protocol.multiple
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
-        self._begin = self._own_keys[0] if self._own_keys else 0
+        self.begin = self._own_keys[0] if self._own_keys else 0
         self.frames = len(self._sequence.times_us)
-        found = windows(self._sequence, multiple, multiple, self._begin)
+        found = windows(self._sequence, multiple, multiple, self.begin)
         self._not_scored = dict(found.unusable)
         self._firsts = [int(first) for first in found.first][:limit]
         if left := len(found.first) - len(self._firsts):
@@ -77,7 +77,7 @@ class Recording:
         seen, _ = sequence.events(start_us, stop_us).within(sequence.event_size)
         size, dead_time = sequence.event_size, sequence.dead_time
         counts = count_events(seen, size, start_us, stop_us, protocol.steps, dead_time=dead_time)
-        number = (first - self._begin) // protocol.multiple
+        number = (first - self.begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
         events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart)
         if events.places is not None:
@@ -86,12 +86,12 @@ class Recording:
 
     def _remarks(self) -> list[str]:
         multiple, remarks = self._protocol.multiple, list[str]()
-        if self.frames - self._begin < 2:
+        if self.frames - self.begin < 2:
             remarks.append("a single frame from its first key frame on, with none after it to rebuild")
-        if left := max(self.frames - 1 - self._begin, 0) % multiple:
+        if left := max(self.frames - 1 - self.begin, 0) % multiple:
             remarks.append(f"{left} frames after the last complete group of {multiple} are not rebuilt")
-        if self._begin:
-            remarks.append(f"{self._begin} frames before the first key frame are not rebuilt")
+        if self.begin:
+            remarks.append(f"{self.begin} frames before the first key frame are not rebuilt")
         used = {k for first in self._firsts for k in (first, first + multiple)}
         if self._own_keys and (others := sum(k not in self._own_keys for k in used)):
             apart = self._own_keys[1] - self._own_keys[0] if len(self._own_keys) > 1 else 0

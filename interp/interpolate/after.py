@@ -35,14 +35,17 @@ class After:
     """Post-processing with the weights of a file.
 
     events   whether there are any
+    channels  1 or 3, of the frames
     tile     the parts of large frames: see `interp.methods.tiling.parse_tiling`
     Raises UsageError for weights of another network, and for such as need events without them.
     """
 
-    def __init__(self, path: Path, events: bool, device: torch.device | str, tile: str = "auto"):
+    def __init__(self, path: Path, events: bool, channels: int, device: torch.device | str, tile: str = "auto"):
         network = load(path).to(device)
         if not isinstance(network, Hdr):
             raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
+        if network.spec.colours < channels:
+            raise UsageError(f"HDR with {path}, trained with grey frames, and these have colours; leave it out")
         self.network, self.device, self.tile = network, device, tile
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"

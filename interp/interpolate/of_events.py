@@ -22,7 +22,10 @@ MOMENT = 4  # of a gap, before the first event and after the last: there need no
 
 
 class FramesBesideEvents(OfSource):
-    """A video or a folder of images, and the events of a file; both on one clock, edge on edge."""
+    """A video or a folder of images, and the events of a file; both on one clock.
+
+    Of events of another resolution nobody says where they belong: that is found (`interp.candidates.registered`).
+    """
 
     def __init__(self, path: str, options: Options, events: Path):
         super().__init__(path, options, has_events=True)

@@ -92,4 +92,5 @@ class OfSequence:
         return found
 
     def _identity(self) -> dict[str, Any]:
-        return {"identity": identity(self.folder)}
+        inner = sorted(each for each in self.folder.iterdir() if each.is_dir())  # (images and events, each in its own)
+        return {"identity": identity(self.folder), "folders": {each.name: identity(each) for each in inner}}

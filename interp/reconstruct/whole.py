@@ -24,7 +24,7 @@ from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
-from vid2ev.recording.manifest import identity, machine, read_manifest, sha256, versions
+from vid2ev.recording.manifest import as_stated, identity, machine, read_manifest, sha256, versions
 from vid2ev.sensors.limits import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
 from vid2ev.views.window import beginning_us, window
@@ -224,11 +224,11 @@ def _remarks(path: Path, file: EventFile, recording: Recording) -> list[str]:
 def _contrast(path: Path) -> tuple[float, float]:
     """Thresholds of the sensor, where the recording says so."""
     manifest = path / "manifest.json" if path.is_dir() else path.with_name("manifest.json")
-    if manifest.exists() and (sensor := read_manifest(manifest).get("sensor")):
-        numbers = sensor["parameters"]
-        if "threshold_on" in numbers:
-            return numbers["threshold_off"], numbers["threshold_on"]
-    return USUAL_NATS, USUAL_NATS
+    if not manifest.exists() or not (path.is_dir() or path.stem == "events"):  # (others only lie beside it)
+        return USUAL_NATS, USUAL_NATS
+    with as_stated(manifest):
+        numbers = (read_manifest(manifest).get("sensor") or {"parameters": {}})["parameters"]
+        return (numbers["threshold_off"], numbers["threshold_on"]) if "threshold_on" in numbers else (USUAL_NATS,) * 2
 
 
 def _choice(

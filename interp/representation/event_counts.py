@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 USUAL_NATS = 0.15  # the paper's threshold
 PER_VOXEL_NATS = 3 * USUAL_NATS
 LARGEST = 10.0
+WHOLE16 = 2048  # the largest up to which float16 has all whole numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,8 +170,8 @@ def count_events(
     counts = np.zeros((2, steps, height, width), np.uint8 if worth is None else np.float16)
     for k, chosen in enumerate(_parts(step, steps)):
         part = np.bincount(place[chosen], None if worth is None else worth[chosen], 2 * height * width)
-        if counts.dtype == np.uint8 and part.max(initial=0) > 255:
-            counts = counts.astype(np.int32)
+        if part.max(initial=0) > (255 if worth is None else WHOLE16):
+            counts = counts.astype(np.int32 if worth is None else np.float32)
         counts[:, k] = part.reshape(2, height, width)
     return EventCounts(torch.from_numpy(counts)[None], torch.tensor([contrast], dtype=torch.float32))
 

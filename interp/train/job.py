@@ -104,6 +104,9 @@ class Job(BaseModel):
             "window": _valid(Window, asked["window"], "window."),
             "validation": _valid(Validation, {"videos": tuple(validation_videos)} | asked["validation"], "validation."),
         }
+        if (network == "hdr") != (parts["clips"].light == "linear"):
+            other, wanted = ("srgb", "linear") if network == "hdr" else ("linear", "srgb")
+            raise UsageError(f"clips.light = '{other}' for {network}, which learns from '{wanted}'; leave it out")
         named = {"network": network, "size": size, "options": options, "starts": digests(starts)}
         return _valid(cls, named | parts, "")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from torch.utils.data import Dataset, default_collate
 from interp.data.ahead import Ahead
 from interp.data.chance import chance
 from interp.data.clip import Clip, read_clip, write_clip
-from interp.data.pool import Pool, Report
+from interp.data.pool import VERSION, Pool, Report
 from interp.data.samples import Samples
 from interp.data.sensor_ranges import SENSORS
 from interp.data.sequences import Sequences, clipped
@@ -83,7 +84,7 @@ def validation_of(job: Job, cache: Path) -> list[tuple[str, Batch]]:
     batches = []
     for sensor in MEASURED_WITH:
         clips = job.clips.model_copy(update={"sensors": SENSORS[sensor]})
-        for number, clip in enumerate(_kept_clips(job, clips, cache / sensor)):
+        for number, clip in enumerate(_kept_clips(job, clips, cache / f"{sensor}-{_known_by(job, clips)}")):
             group = f"{'scenes' if number < job.validation.clips else 'real'}-{sensor}"
             batches.append((group, default_collate([_whole(job, clip, number)])))
     return batches
@@ -99,12 +100,17 @@ def _whole(job: Job, clip: Clip, number: int) -> Batch:
     return sample | {"times": inner.float() / clip.multiple, "truth": as_tensor(clip.truth[1:-1])}
 
 
+def _known_by(job: Job, settings: ClipSettings) -> str:
+    """A short name of clips to validate with; others have another."""
+    said = f"{settings.name} {job.validation.model_dump_json()} {VERSION}"
+    return hashlib.sha256(said.encode()).hexdigest()[:12]
+
+
 def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:
     """The clips to validate with, from their folder if they are all there."""
-    paths = sorted(cache.glob("*.npy"))
     whole = cache / "whole"
-    if whole.exists():
-        return [read_clip(path) for path in paths]
+    if whole.exists():  # (first: what is listed before may be less than that)
+        return [read_clip(path) for path in sorted(cache.glob("*.npy"))]
     clips = validation_clips(settings, job.validation.clips, job.validation.videos)
     cache.mkdir(parents=True, exist_ok=True)
     for number, clip in enumerate(clips):

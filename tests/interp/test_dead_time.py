@@ -122,6 +122,14 @@ def test_what_is_not_behind_a_dead_time_counts_as_one() -> None:
         assert (DeadTime(BLIND_US, law).crossings(t_us, 0 * t_us, p) == 1).all()
 
 
+def test_more_crossings_than_sixteen_bits_tell_are_counted_all() -> None:
+    t = 100 * np.arange(1, 100_001, dtype=np.int64)
+    here = np.zeros(len(t), np.uint16)
+    events = Events(t, here, here, np.ones(len(t), np.uint8))
+    counts = count_events(events, (1, 1), 0, int(t[-1]), steps=1, dead_time=DeadTime(1000.0))
+    assert float(counts.off_on.sum()) == len(t)
+
+
 def test_counts_are_of_crossings_where_the_dead_time_is_known() -> None:
     t_us = np.array([1000, 1150, 6000, 6200], np.int64)
     zeros = np.zeros(4, np.uint16)

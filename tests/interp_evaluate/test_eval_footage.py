@@ -399,6 +399,13 @@ def test_predictions_of_the_first_gaps_alone_are_known_by_their_numbers(numbers:
     assert by_frame([*files.values()], 213, 4) == files
 
 
+def test_predictions_are_of_the_frames_that_are_rebuilt_wherever_the_first_key_frame_is() -> None:
+    files = [Path(f"{k}.png") for k in range(14)]
+    for begin, frames in ((0, 17), (1, 18), (3, 25)):
+        rebuilt = [begin + gap + place for gap in (0, 8) for place in range(1, 8)]
+        assert by_frame(files, frames, 8, begin) == dict(zip(rebuilt, files, strict=True))
+
+
 @pytest.mark.parametrize("names", [["a", "b", "c"], ["1", "2", "3", "4"], ["7a7", "8b7", "9c7"]])
 def test_predictions_of_which_nobody_can_tell_what_they_are_of_are_refused(names: list[str]) -> None:
     with pytest.raises(DataError, match=r"\d pictures for 13 frames, of which 9 are rebuilt; expected as many as"):

@@ -229,6 +229,7 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--network", "events.safetensors"], 2, "needs events"),
         (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
         (["b", "--hdr-network", "events.safetensors"], 2, "network hdr"),
+        (["b", "--hdr-network", "grey.safetensors"], 2, "these have colours"),
         (["b", "--start", "9"], 2, "expected a part of its"),
         (["b", "--start", "nan"], 2, "expected seconds"),
         (["b", "--stop", "inf"], 2, "expected seconds"),
@@ -246,6 +247,7 @@ def test_what_is_wrong_is_said_in_one_sentence(
     (tmp_path / "weights.safetensors").write_bytes(b"nothing")
     for name, network in (("hdr", "hdr"), ("events", "rrin_events_light")):
         save(tmp_path / f"{name}.safetensors", network, make(network))
+    save(tmp_path / "grey.safetensors", "hdr", make("hdr", colours=1))
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(command, arguments)
     assert isinstance(result.exception, (UsageError, DataError))

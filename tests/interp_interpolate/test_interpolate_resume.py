@@ -19,6 +19,7 @@ from interp.interpolate.whole import interpolate
 from interp.networks import make
 from interp.weights import save
 from vid2ev.errors import UsageError
+from vid2ev.recording.exposures import write_codes
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
@@ -74,6 +75,15 @@ def test_a_folder_goes_on_to_the_same_bytes(tmp_path: Path, at: int) -> None:
     assert counted[0] == at // 3 * 3 - (3 if at % 3 == 0 else 0)  # (a stretch of three frames is done with its line)
     assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
     assert not (tmp_path / "twice.partial").exists()
+
+
+def test_what_is_another_sequence_by_now_is_not_gone_on_with(tmp_path: Path) -> None:
+    """The files of these layouts lie in folders of their folder."""
+    source = recording(tmp_path / "in", moving(3))
+    interpolate(source, tmp_path / "out", multiple=2, method="linear")
+    write_codes(source / "images_corrected" / "000001.png", moving(3, seed=1)[1])
+    with pytest.raises(UsageError, match="folders"):
+        interpolate(source, tmp_path / "out", multiple=2, method="linear", resume=True)
 
 
 def test_a_film_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

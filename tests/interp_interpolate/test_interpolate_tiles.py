@@ -190,7 +190,7 @@ def test_hdr_in_tiles_is_that_of_the_whole_also_when_it_remembers(tmp_path: Path
     network = make("hdr")
     torch.nn.init.normal_(network.out.weight, std=0.05)
     save(tmp_path / "hdr.safetensors", "hdr", network)
-    tiled, whole = (After(tmp_path / "hdr.safetensors", True, "cpu", tile) for tile in ("96x80", "none"))
+    tiled, whole = (After(tmp_path / "hdr.safetensors", True, 3, "cpu", tile) for tile in ("96x80", "none"))
     tiled_state, state = None, None
     for _ in range(3):
         frame, events = 1.2 * torch.rand(1, 3, *size[::-1]), torch.randn(1, 5, *size[::-1])

@@ -271,6 +271,13 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.parametrize("text", ['{"name": "an app"}', "no JSON", '{"sensor": {}}'])
+def test_what_lies_beside_an_event_file_is_not_its_manifest(tmp_path: Path, text: str) -> None:
+    source = written(tmp_path / "a.npz", drawn(100))
+    (tmp_path / "manifest.json").write_text(text)
+    assert reconstruct(source, tmp_path / "out")["source"]["contrast"] == [0.15, 0.15]
+
+
 @pytest.mark.parametrize("contrast", [(0, 0.2), (math.nan, 0.2), (0.2, math.inf), (0.2,), 0.2])
 def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> None:
     with pytest.raises(UsageError, match="expected nats"):

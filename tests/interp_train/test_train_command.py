@@ -133,6 +133,11 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--set", 'clips.textures=["cofee"]'], "texture 'cofee' (did you mean coffee?): no picture"),
         (["--dry-run", "--set", 'clips.environments=["sky.hdr"]'], "environment 'sky.hdr': no picture"),
         (["--dry-run", "--network", "hdr", "--data", "."], "recordings have codes of 8 bits, where light"),
+        (["--dry-run", "--set", 'clips.light="linear"'], "clips.light = 'linear' for rrin_events_guided"),
+        (
+            ["--dry-run", "--network", "hdr", "--set", 'clips.light="srgb"'],
+            "clips.light = 'srgb' for hdr, which learns",
+        ),
         (["--dry-run", "--set", "clips.textures=[]"], "setting clips.textures = [] is impossible"),
         (["--dry-run", "--set", "clips.coarser=[0]"], "setting clips.coarser.0 = 0 is impossible"),
         (["--dry-run", "--set", "clips.gap_ms=[0,8]"], "gap_ms (0.0, 8.0): expected times above 0"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
 from interp.networks import names
 from interp.train.job import Job
+from interp.train.made_of import validation_of
 from interp.train.recipe import Recipe
 from vid2ev.errors import UsageError
 
@@ -70,3 +72,12 @@ def test_every_number_of_the_recipe_says_what_it_is_and_stays() -> None:
     assert all(field.description for field in Recipe.model_fields.values())
     with pytest.raises(ValidationError):
         Recipe().rate = 1.0  # type: ignore[misc]
+
+
+def test_clips_to_validate_with_are_those_of_the_job_whatever_others_have_left(tmp_path: Path) -> None:
+    small = ["clips.scenes=0.0", "clips.multiples=[4]", "clips.coarser=[2]"]
+    for clips, side in ((1, 32), (2, 32), (2, 48)):
+        job = Job.of(settings=[*small, f"clips.size=[{side}, {side}]", f"validation.clips={clips}"])
+        for _ in range(2):  # (made, and found again)
+            sizes = [batch["truth"].shape[-2:] for _, batch in validation_of(job, tmp_path)]
+            assert sizes == [(side, side)] * 2 * clips
