@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,9 @@ def write_clip(path: Path, clip: Clip) -> None:
     record = np.zeros((), np.dtype(kinds))
     for name, value in (arrays | {"contrast": clip.contrast, "gap_us": clip.gap_us, "about": about}).items():
         record[name] = value
-    beside = path.with_name(f"{path.name}.{os.getpid()}.new")
+    beside = path.with_name(
+        f"{path.name}.{secrets.token_hex(8)}.new"
+    )  # (machines that share a disk share numbers, too)
     try:
         with open(beside, "wb") as file:
             write_npy(file, record)

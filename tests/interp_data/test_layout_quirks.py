@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shutil
 from pathlib import Path
 from typing import Any
@@ -406,10 +407,11 @@ def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
-def test_why_a_disk_does_not_take_a_clip_is_said(tmp_path: Path) -> None:
+def test_why_a_disk_does_not_take_a_clip_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written(tmp_path / "seq", images=10)
     clip = clip_of(open_sequence(tmp_path / "seq"), 1, 4)
-    (tmp_path / f"0.npy.{os.getpid()}.new").symlink_to("/dev/full")
+    monkeypatch.setattr(secrets, "token_hex", lambda _: "its")
+    (tmp_path / "0.npy.its.new").symlink_to("/dev/full")
     with pytest.raises(OSError) as raised:
         write_clip(tmp_path / "0.npy", clip)
     assert raised.value.errno == errno.ENOSPC
