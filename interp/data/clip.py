@@ -59,9 +59,8 @@ def write_clip(path: Path, clip: Clip) -> None:
     record = np.zeros((), np.dtype(kinds))
     for name, value in (arrays | {"contrast": clip.contrast, "gap_us": clip.gap_us, "about": about}).items():
         record[name] = value
-    beside = path.with_name(
-        f"{path.name}.{secrets.token_hex(8)}.new"
-    )  # (machines that share a disk share numbers, too)
+    # (a number of the process could be that of another machine's that writes to the same folder)
+    beside = path.with_name(f"{path.name}.{secrets.token_hex(8)}.new")
     try:
         with open(beside, "wb") as file:
             write_npy(file, record)

@@ -23,7 +23,7 @@ from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
 from interp.methods.tiling import Tile, parse_tiling, strips
-from interp.networks.hdr import AROUND, DEEPEST, MULTIPLE, Hdr, HdrState
+from interp.networks.hdr import AROUND, MULTIPLE, Hdr, HdrState
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
@@ -34,10 +34,11 @@ from vid2ev.recording.manifest import sha256
 class After:
     """Post-processing with the weights of a file.
 
-    events   whether there are any
-    channels  1 or 3, of the frames
-    tile     the parts of large frames: see `interp.methods.tiling.parse_tiling`
-    Raises UsageError for weights of another network, and for such as need events without them.
+    events     whether there are any
+    channels   of the frames, 1 or 3
+    tile       the parts of large frames: see `interp.methods.tiling.parse_tiling`
+    Raises UsageError for weights of another network, such as need events without them, and those of grey frames for
+    frames that have colours.
     """
 
     def __init__(self, path: Path, events: bool, channels: int, device: torch.device | str, tile: str = "auto"):
@@ -104,8 +105,7 @@ class After:
         """`Hdr.residue`, part by part."""
 
         def law(tile: Tile) -> tuple[torch.Tensor, ...]:
-            rows, columns = (slice(each.start // DEEPEST, each.stop // DEEPEST) for each in tile.within)
-            seen = tuple(state[..., rows, columns] for state in cell)
+            seen = tuple(tile.part_of(state, height) for state in cell)
             made, after = self.network.residue(path_a[(..., *tile.within)], path_b[(..., *tile.within)], seen)
             return made, *after
 

@@ -44,7 +44,15 @@ class Tile:
     @property
     def within(self) -> tuple[slice, slice]:
         """Its rows and columns."""
-        return slice(self.top, self.bottom), slice(self.left, self.right)
+        return self.within_coarser(1)
+
+    def within_coarser(self, k: int) -> tuple[slice, slice]:
+        """Its rows and columns where k x k pixels are one."""
+        return slice(self.top // k, self.bottom // k), slice(self.left // k, self.right // k)
+
+    def part_of(self, state: torch.Tensor, height: int) -> torch.Tensor:
+        """The part of [..., h / k, w / k] in it, of frames of this height [px]."""
+        return state[(..., *self.within_coarser(height // state.shape[-2]))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +100,13 @@ class Tiling:
                     min(right + halo_px, width),
                     min(bottom + halo_px, height),
                 )
+                own = Tile(left, top, right, bottom)
+                inner = Tile(left - wide.left, top - wide.top, right - wide.left, bottom - wide.top)
                 for n, made in enumerate(law(wide)):
                     k = (wide.bottom - wide.top) // made.shape[-2]
                     if n == len(wholes):
                         wholes.append(made.new_empty(*made.shape[:-2], height // k, width // k))
-                    inner = made[..., (top - wide.top) // k :, (left - wide.left) // k :]
-                    rows, columns = slice(top // k, bottom // k), slice(left // k, right // k)
-                    wholes[n][..., rows, columns] = inner[..., : (bottom - top) // k, : (right - left) // k]
+                    wholes[n][(..., *own.within_coarser(k))] = made[(..., *inner.within_coarser(k))]
         return tuple(wholes)
 
     def describe(self) -> str:

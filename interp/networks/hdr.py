@@ -39,7 +39,6 @@ SLOPE = 0.2
 BLOCKS = 5
 WITHIN = 0.1
 MULTIPLE = 8  # sides of 8 at least, so that reflected borders fit
-DEEPEST = 4  # pixels across one of the LSTM's
 AROUND = 64  # px that a pixel of the residue sees around it: 59, on whole multiples
 
 
@@ -127,7 +126,7 @@ class Hdr(nn.Module):
     def residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:
         """What comes out [B, C, H, W] for both paths [B, ..., H, W], and the state of the LSTM.
 
-        Pixels see `AROUND` others around them, so parts of whole multiples of `DEEPEST` may be made one by one.
+        Pixels see `AROUND` others around them, so parts may be made one by one, which begin and end at multiples of 4.
         """
         first = _leaky(self.into_a(path_a))
         second = _leaky(self.down_a(first))

@@ -60,7 +60,7 @@ class OfNetwork:
         (height, width), shape = voxels.shape[-2:], list[int]()
 
         def law(tile: Tile) -> list[torch.Tensor]:
-            seen = tuple(state and tuple(part_of(each, tile, height) for each in state) for state in states)
+            seen = tuple(state and tuple(tile.part_of(each, height) for each in state) for state in states)
             image, after = self.network.step(voxels[(..., *tile.within)], seen)
             shape[:] = [len(state or ()) for state in after]
             return [image, *(each for state in after for each in state or ())]
@@ -77,10 +77,3 @@ class OfNetwork:
     def remember(self, memory: dict[str, np.ndarray]) -> None:
         """Take that up."""
         (self._states,) = nested(memory, self.device)
-
-
-def part_of(state: torch.Tensor, tile: Tile, height: int) -> torch.Tensor:
-    """The part of a state in a tile of pictures of a height; k x k pixels have one of its own."""
-    k = height // state.shape[-2]
-    rows, columns = (slice(each.start // k, each.stop // k) for each in tile.within)
-    return state[..., rows, columns]

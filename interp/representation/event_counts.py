@@ -167,11 +167,12 @@ def count_events(
     step = ((t[kept] - start_us) * steps - 1) // max(stop_us - start_us, 1)
     place = (np.minimum(p, 1) * height + y) * width + x
     worth = dead_time.crossings(t[kept], y * width + x, p) if dead_time else None
-    counts = np.zeros((2, steps, height, width), np.uint8 if worth is None else np.float16)
+    narrow, most, wide = (np.uint8, 255, np.int32) if worth is None else (np.float16, WHOLE16, np.float32)
+    counts = np.zeros((2, steps, height, width), narrow)
     for k, chosen in enumerate(_parts(step, steps)):
         part = np.bincount(place[chosen], None if worth is None else worth[chosen], 2 * height * width)
-        if part.max(initial=0) > (255 if worth is None else WHOLE16):
-            counts = counts.astype(np.int32 if worth is None else np.float32)
+        if counts.dtype == narrow and part.max(initial=0) > most:
+            counts = counts.astype(wide)
         counts[:, k] = part.reshape(2, height, width)
     return EventCounts(torch.from_numpy(counts)[None], torch.tensor([contrast], dtype=torch.float32))
 

@@ -11,7 +11,8 @@ waits for a threshold in between, sends nothing.  The share of those that are,
 
     fresh(theta) = 1 - exp(-1.9 z^0.85),    z = max(theta / sigma, 2) sqrt(tau1 tau2) / (tau1 + tau2)
 
-is that of an absorbing level: 0.8 to 0.95 for two poles that are alike, 0.5 for one ten times as fast as the other.
+is that of an absorbing level; at 3 sigma 0.93 for poles that are alike, 0.8 where one is ten times as fast as the
+other, 0.5 where it is a hundred times.
 
 Where the interval **resolves** it (dt <= tau2 / RESOLVED) the pair (n1, n2) takes one exact step of its Gaussian
 process per interval, and the line between its ends is added to the signal.  Where it does not, sampling would miss
