@@ -41,6 +41,11 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
     "--contrast", metavar="C|OFF,ON", help="What an event stands for [nat].  [default: as the recording says, or 0.15]"
 )
 @click.option(
+    "--refractory", "refractory_us", type=float, metavar="US",
+    help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the recording"
+    " says, or else nothing is]",
+)  # fmt: skip
+@click.option(
     "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
     help="Where; auto: on a GPU, if there is one.",
 )  # fmt: skip

@@ -6,7 +6,7 @@ A new kind is a class that satisfies `Take`, and a line in `open_take`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
@@ -141,11 +141,7 @@ class Options:
 
     def dead_time(self, said: DeadTime | None = None) -> DeadTime | None:
         """Of an event camera, of which the recording says `said`."""
-        if self.refractory_us is None:
-            return said
-        if self.refractory_us == 0:
-            return None
-        return replace(said, refractory_us=self.refractory_us) if said else DeadTime(self.refractory_us)
+        return DeadTime.asked(self.refractory_us, said)
 
 
 AS_IT_IS = Options()

@@ -42,10 +42,10 @@ class HighPass:
         self._level = np.zeros(size[::-1], np.float64)
         self._last_us = np.zeros(size[::-1], np.int64)
 
-    def add(self, events: Events, start_us: int, stop_us: int) -> None:
-        """Events of a slice, in order of time."""
+    def add(self, events: Events, start_us: int, stop_us: int, worth: np.ndarray | None = None) -> None:
+        """See `Reconstructor`."""
         columns = events.t, events.x, events.y, events.p
-        _add(*columns, self._level, self._last_us, self.per_us, -self.contrast[0], self.contrast[1])
+        _add(*columns, worth, self._level, self._last_us, self.per_us, -self.contrast[0], self.contrast[1])
 
     def picture(self, stop_us: int) -> np.ndarray:
         """Light [H, W] float32 at an instant that is not before the last event."""
@@ -62,10 +62,10 @@ class HighPass:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add(t, x, y, p, level, last_us, per_us, off, on):  # type: ignore[no-untyped-def]
+def _add(t, x, y, p, worth, level, last_us, per_us, off, on):  # type: ignore[no-untyped-def]
     for k in range(t.size):
         i, j = y[k], x[k]
         if level[i, j] != 0:  # (before its first event a pixel has no time to decay from)
             level[i, j] *= np.exp(-per_us * (t[k] - last_us[i, j]))
-        level[i, j] += on if p[k] > 0 else off
+        level[i, j] += (on if p[k] > 0 else off) * (1.0 if worth is None else worth[k])
         last_us[i, j] = t[k]

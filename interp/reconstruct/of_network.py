@@ -44,9 +44,9 @@ class OfNetwork:
         self._voxel = Voxel(size, int(network.spec.bins), polarity=True)  # type: ignore[arg-type, union-attr]
         self._states: States = ()
 
-    def add(self, events: Events, start_us: int, stop_us: int) -> None:
-        """Events of a slice, in order of time."""
-        self._voxel.add(events, start_us, stop_us)
+    def add(self, events: Events, start_us: int, stop_us: int, worth: np.ndarray | None = None) -> None:
+        """See `Reconstructor`."""
+        self._voxel.add(events, start_us, stop_us, worth)
 
     @torch.inference_mode()
     def picture(self, stop_us: int) -> np.ndarray:

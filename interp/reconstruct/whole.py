@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any
 
 from interp import pretrained
 from interp.interpolate.choice import device_of
@@ -18,13 +16,15 @@ from interp.interpolate.pictures import SLOWEST_HZ, Pictures, checked_play, of_f
 from interp.interpolate.shelf import Shelf, kind_of, manifest_of
 from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
+from interp.reconstruct.made_good import MadeGood
 from interp.reconstruct.of_network import OfNetwork
-from interp.representation.event_counts import USUAL_NATS
-from vid2ev import Events
+from interp.reconstruct.reconstructor import Reconstructor
+from interp.reconstruct.sensor import Sensor, sensor_of
+from interp.representation.dead_time import stated
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
-from vid2ev.recording.manifest import as_stated, identity, machine, read_manifest, sha256, versions
+from vid2ev.recording.manifest import identity, machine, sha256, versions
 from vid2ev.sensors.limits import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
 from vid2ev.views.window import beginning_us, window
@@ -32,25 +32,6 @@ from vid2ev.views.window import beginning_us, window
 Report = Callable[[int, int | None], object]  # events taken in, of how many
 FPS = 30
 AT_ONCE = 16  # pictures between two instants from which it can go on
-
-
-class Reconstructor(Protocol):
-    """What makes pictures of events, slice after slice."""
-
-    @property
-    def name(self) -> str: ...
-
-    def add(self, events: Events, start_us: int, stop_us: int) -> None:
-        """Events of a slice, in order of time."""
-
-    def picture(self, stop_us: int) -> np.ndarray:
-        """Light [H, W] float32 at the end of the slice."""
-
-    def memory(self) -> dict[str, np.ndarray]:
-        """All that it knows between two slices."""
-
-    def remember(self, memory: dict[str, np.ndarray]) -> None:
-        """Take that up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +55,7 @@ def reconstruct(
     start_s: float | None = None,
     stop_s: float | None = None,
     contrast: tuple[float, float] | None = None,
+    refractory_us: float | None = None,
     device: str = "cpu",
     overwrite: bool = False,
     resume: bool = False,
@@ -92,10 +74,13 @@ def reconstruct(
     play        pictures per second of the film; by default in real time, or 30 where pictures are of so many events
     start_s, stop_s   the part to take [s after the beginning]; nothing is known of what was before
     contrast    what an OFF and an ON event stand for [nat]; by default what the recording says, or else 0.15
+    refractory_us   how long a pixel is blind after an event, by default what the recording says; 0 for not at all.
+                What it missed then is made good (`made_good.py`)
     resume      go on where an interrupted run was, to the same bytes
     report      told how many events were taken in, of how many
 
-    All of the file is read in blocks; memory depends on the sensor's size alone, and with `events_per_frame` on that.
+    All of the file is read in blocks; memory depends on the sensor's size alone; with `events_per_frame` on that, and
+    where dead time is made good on the events of a picture.
     Raises UsageError for requests that cannot be meant, DataError for what cannot be read or written.
     """
     output, path = Path(output), of_only_camera(events)
@@ -103,16 +88,22 @@ def reconstruct(
     check_contrast(contrast)
     file, recording = _window(path, start_s, stop_s)
     size = recording.size
-    nats = contrast or _contrast(path)
+    sensor = sensor_of(path, contrast, refractory_us)
     where = device_of(device)
-    made_by, why, about = _choice(network, cutoff_hz, size, nats, where)
+    made_by, why, about = _choice(network, cutoff_hz, size, sensor, where)
     if told:
         told(f"{made_by.name}: {why}")
     rate = checked_play(play) or (Fraction(FPS) if isinstance(slicing, Count) else of_film(10**6 / slicing.us))
     pictures = Pictures(kind, 8, "srgb")
     job = {
         "versions": versions(("torch",)),
-        "source": {"path": str(path), "size": list(size), "identity": identity(path), "contrast": list(nats)},
+        "source": {
+            "path": str(path),
+            "size": list(size),
+            "identity": identity(path),
+            "contrast": list(sensor.contrast),
+            "dead_time": stated(sensor.dead_time),
+        },
         "part": {"start_s": start_s, "stop_s": stop_s},
         "pictures": str(slicing),
         "reconstruction": about,
@@ -221,27 +212,21 @@ def _remarks(path: Path, file: EventFile, recording: Recording) -> list[str]:
     return [*[guessed] * (file.size is None), *(f"{path}: {text}" for text in dict.fromkeys(file.warnings))]
 
 
-def _contrast(path: Path) -> tuple[float, float]:
-    """Thresholds of the sensor, where the recording says so."""
-    manifest = path / "manifest.json" if path.is_dir() else path.with_name("manifest.json")
-    if not manifest.exists() or not (path.is_dir() or path.stem == "events"):  # (others only lie beside it)
-        return USUAL_NATS, USUAL_NATS
-    with as_stated(manifest):
-        numbers = (read_manifest(manifest).get("sensor") or {"parameters": {}})["parameters"]
-        return (numbers["threshold_off"], numbers["threshold_on"]) if "threshold_on" in numbers else (USUAL_NATS,) * 2
-
-
 def _choice(
-    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], nats: tuple[float, float], device: Any
+    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], sensor: Sensor, device: Any
 ) -> tuple[Reconstructor, str, dict[str, Any]]:
     """What makes the pictures, why, and what it is, for JSON."""
     if network and cutoff_hz is not None:
         raise UsageError(f"--network {network} and --cutoff {cutoff_hz:g}: leave out one of them")
     asked = network or cutoff_hz is not None
     path = pretrained.path_of(network) if network else None if asked else pretrained.first(pretrained.OF_EVENTS)
+    made_by: Reconstructor
+    about: dict[str, Any]
     if path:
         why = "as asked" if asked else "the network that comes with vid2ev"
-        return OfNetwork(path, size, nats, device), why, {"network": str(path), "sha256": sha256(path)}
-    why = "as asked" if asked else "the best that needs no training"
-    cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz
-    return HighPass(size, nats, cutoff), why, {"filter": "high-pass", "cutoff_hz": cutoff}
+        made_by, about = OfNetwork(path, size, sensor.contrast, device), {"network": str(path), "sha256": sha256(path)}
+    else:
+        why = "as asked" if asked else "the best that needs no training"
+        cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz
+        made_by, about = HighPass(size, sensor.contrast, cutoff), {"filter": "high-pass", "cutoff_hz": cutoff}
+    return MadeGood(made_by, sensor.dead_time, size) if sensor.dead_time else made_by, why, about

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -63,6 +63,15 @@ class DeadTime:
             raise ValueError(f"refractory period {refractory_us} us, {law}")
         by_clock = parameters["timing"] == "frame" or float(parameters["frame_rate_hz"]) > 0
         return None if by_clock or not SHORTEST_US <= refractory_us <= LONGEST_US else cls(refractory_us, law)
+
+    @staticmethod
+    def asked(refractory_us: float | None, said: DeadTime | None) -> DeadTime | None:
+        """That of an event camera of which a recording says `said`, and a user another time, 0 for none."""
+        if refractory_us is None:
+            return said
+        if refractory_us == 0:
+            return None
+        return replace(said, refractory_us=refractory_us) if said else DeadTime(refractory_us)
 
     def crossings(self, t_us: np.ndarray, pixel: np.ndarray, p: np.ndarray) -> np.ndarray:
         """m of N events, float32 [N], of one camera in order of time.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from exact_voxels import exact_voxels
 
 from interp.light import to_codes
 from interp.representation.event_counts import EventCounts, count_events
-from interp.representation.exact_voxels import exact_voxels
 from vid2ev import Dvs, Events, load_sensor
 
 SIDE = 64

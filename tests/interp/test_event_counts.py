@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
+from exact_voxels import exact_voxels
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pairs import counts, events
 
 from interp.representation.bins import bin_weights
 from interp.representation.event_counts import PER_VOXEL_NATS, EventCounts, as_voxels, count_events
-from interp.representation.exact_voxels import exact_voxels
 from vid2ev import Events, UsageError
 from vid2ev.views.voxel import voxel_grid
 
@@ -113,8 +113,6 @@ def test_events_outside_of_the_sensor_and_no_sub_intervals_are_refused() -> None
     for number in (0, 2.5, True, None):
         with pytest.raises(UsageError, match="at least 1"):
             count_events(some, SIZE, START, STOP, number)  # type: ignore[arg-type]
-        with pytest.raises(UsageError, match="at least 1"):
-            exact_voxels(some, SIZE, START, STOP, number)  # type: ignore[arg-type]
 
 
 def test_changes_of_windows_in_a_row_add_up() -> None:

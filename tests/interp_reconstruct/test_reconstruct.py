@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
+from exact_voxels import exact_voxels
 
 from interp import pretrained
 from interp.commands.reconstruct import reconstruct as command
@@ -25,7 +26,6 @@ from interp.networks import make
 from interp.reconstruct.high_pass import GREY, HighPass
 from interp.reconstruct.of_network import OfNetwork
 from interp.reconstruct.whole import AT_ONCE, reconstruct
-from interp.representation.exact_voxels import exact_voxels
 from interp.weights import save
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
@@ -295,6 +295,8 @@ def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> Non
         ("cutoff_hz", "1", "from 0 to 10000"),
         ("network", 3, "weights 3: no such file"),
         ("start_s", "1", "expected seconds"),
+        ("refractory_us", 0.5, "refractory period 0.5 us: expected 1 to 1e"),
+        ("refractory_us", math.nan, "refractory period nan us"),
     ],
 )
 def test_arguments_that_are_none_are_refused_in_a_sentence(

@@ -43,11 +43,14 @@ class Voxel:
         self.tiles = columns, -(-bins // columns)
         self._grid = np.zeros((2 if polarity else 1, *grid), self.dtype)
 
-    def add(self, events: Events, start_us: int, stop_us: int) -> None:
-        """Add events between two instants [us]; those outside count as at the nearer one."""
+    def add(self, events: Events, start_us: int, stop_us: int, worth: np.ndarray | None = None) -> None:
+        """Add events between two instants [us]; those outside count as at the nearer one.
+
+        worth   what each counts for, float32 [N], in place of 1
+        """
         check_within(events, self.size)
         scale = (self.bins - 1) / (stop_us - start_us) if stop_us > start_us else 0.0
-        _add(events.t, events.x, events.y, events.p, start_us, scale, self._grid)
+        _add(events.t, events.x, events.y, events.p, worth, start_us, scale, self._grid)
 
     def take(self, stop_us: int = 0) -> np.ndarray:
         """The grid of the events since the last call."""
@@ -99,13 +102,14 @@ def _normalised(grid: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add(t, x, y, p, start_us, scale, grid):  # type: ignore[no-untyped-def]
+def _add(t, x, y, p, worth, start_us, scale, grid):  # type: ignore[no-untyped-def]
     apart, last = grid.shape[0] == 2, grid.shape[1] - 1
     for i in range(len(t)):
         at = min(max((t[i] - start_us) * scale, 0.0), float(last))
         bin_ = min(int(at), max(last - 1, 0))
         share = np.float32(at - bin_)
         sign = np.float32(1 if apart or p[i] else -1)
+        sign *= np.float32(1) if worth is None else worth[i]
         channel = min(p[i], 1) if apart else 0
         grid[channel, bin_, y[i], x[i]] += sign * (np.float32(1) - share)
         if last:
