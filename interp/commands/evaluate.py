@@ -149,7 +149,7 @@ def kept(folder: Path) -> Iterator[None]:
 
 
 def _name(dataset: str) -> str:
-    from interp.evaluate.identity import plain
+    from interp.evaluate.naming import plain
     from vid2ev.sources import SCENE_PREFIX
 
     name = dataset.removeprefix(SCENE_PREFIX)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from interp.data.card import card_text
 from interp.data.dataset_spec import DatasetSpec, Scene, scenes_of
+from interp.data.inputs import digests_of
 from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from vid2ev import DataError, UsageError, convert
@@ -63,7 +64,8 @@ def write_dataset(
     Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, no
     scene can be made, or the workers of one died.
     """
-    job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")}))
+    inputs = {"inputs": digests_of(spec.videos)} if spec.videos else {}
+    job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")} | inputs))
     if directory.exists():
         return _finished(directory, job, resume)
     made_in = directory.with_name(f"{directory.name}.partial")

@@ -1,6 +1,6 @@
 """A pool of clips: a folder that keeps what `made` gives while it is drawn from.
 
-    FOLDER/NAME/000123.npy     clip 123 of the settings, seed and version that NAME stands for
+    FOLDER/NAME/000123.npy     clip 123 of the settings, files, seed and version that NAME stands for
 
 The folder is a cache of a pure function and no more: whatever is missing is made again, so that nothing depends on who
 made a clip, when, or whether the process was killed meanwhile.
@@ -22,6 +22,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.inputs import known_by
 from interp.data.making import made
 from interp.data.settings import ClipSettings
 from vid2ev.errors import UsageError
@@ -62,7 +63,7 @@ class Pool:
             )
         self.settings, self.seed, self.begin, self.most, self.fresh = settings, seed, begin, most, fresh
         self.device = device
-        self.folder = folder / f"{settings.name}-{seed}-{VERSION}"
+        self.folder = folder / f"{known_by(settings)}-{seed}-{VERSION}"
         with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
 

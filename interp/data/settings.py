@@ -1,8 +1,7 @@
-"""What clips are made of: one frozen record, which with a seed and a number decides every bit of a clip."""
+"""What clips are made of: one frozen record, which with a seed, a number and the files it names decides every bit."""
 
 from __future__ import annotations
 
-import hashlib
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -95,11 +94,6 @@ class ClipSettings(BaseModel):
     def shares(self) -> tuple[float, ...]:
         """Of `SOURCES`."""
         return self.scenes, self.photographs, self.videos, self.recordings
-
-    @property
-    def name(self) -> str:
-        """A short name; settings that differ have others."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
 
 PRESETS = {

@@ -7,7 +7,9 @@ each other in time: the field's have 240 frames a second (GoPro) and 150 or so (
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from interp.evaluate.group import Cameras, Group
-from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
 from interp.own_codes import curve_of
@@ -25,6 +26,7 @@ from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import count_events
 from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.manifest import identity
 from vid2ev.sources import is_scene
 
 SLOW_HZ = 240.0
@@ -72,8 +74,7 @@ class Film:
         self._stored = str(about.get("pixel_format", ""))
         count = max((source.frames_expected or 0) - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
-        path = Path(video)
-        self.identity: dict[str, Any] = {"video": path.name, **contents(path)} if path.exists() else {"video": video}
+        self.identity: dict[str, Any] = _identity(video, about)
 
     @cached_property
     def frames(self) -> int:
@@ -142,6 +143,14 @@ class Film:
         cameras = Cameras(disparity_px=0.0, offset_us=0.0)  # (one place, one clock; how it was exposed, nobody knows)
         first, positions = number * self.multiple, protocol.positions
         return Group(number, first, keys, positions, truth, times_us, counts, cameras, self.curve)
+
+
+def _identity(video: str, about: Mapping[str, Any]) -> dict[str, Any]:
+    """What tells a film from another: what is in its files, or of a scene every number of it."""
+    path = Path(video)
+    if path.exists():
+        return {"video": path.name, **identity(path, copies=True, deep=True)}
+    return {"video": video, "sha256": hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()}
 
 
 def _after(events: Events, t_us: int) -> Events:

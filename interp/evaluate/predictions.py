@@ -24,10 +24,11 @@ from typing import Any, Self
 import numpy as np
 
 from interp.evaluate.group import Footage, Group
-from interp.evaluate.identity import contents, plain
+from interp.evaluate.naming import plain
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
 from vid2ev.light.recognise import natural
+from vid2ev.recording.manifest import identity
 
 TRUTH = "gt"
 SUFFIX = ".png"
@@ -81,7 +82,7 @@ def predictions_in(folder: str | Path) -> list[Predictions]:
     folder = Path(folder)
     children = sorted(each for each in folder.iterdir() if each.is_dir()) if folder.is_dir() else []
     inner = sorted({each.name for child in children for each in child.iterdir() if each.is_dir() and pictures_in(each)})
-    known = contents(folder) if children else {}
+    known = identity(folder, copies=True, deep=True) if children else {}
     found = [Predictions(plain(name), folder, name, known) for name in inner if name.lower() != TRUTH]
     if any(pictures_in(child) for child in children):
         found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known))

@@ -16,7 +16,7 @@ from interp import pretrained
 from interp.data.tensors import as_tensor
 from interp.evaluate import protocol as protocols
 from interp.evaluate.group import Footage, Group
-from interp.evaluate.identity import apart
+from interp.evaluate.naming import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
 from interp.methods.tiling import tiling_of

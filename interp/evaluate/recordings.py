@@ -13,11 +13,11 @@ from interp.data.layouts.own import Own
 from interp.data.tensors import as_tensor
 from interp.evaluate.cameras import CamerasOf
 from interp.evaluate.group import Cameras, Group
-from interp.evaluate.identity import contents
 from interp.evaluate.protocol import Protocol
 from interp.representation.carried import over
 from interp.representation.event_counts import count_events
 from vid2ev.errors import DataError
+from vid2ev.recording.manifest import identity
 
 
 class Recording:
@@ -39,7 +39,7 @@ class Recording:
         if left := len(found.first) - len(self._firsts):
             self._not_scored[f"beyond the limit of {limit}"] = left
         self.expected, self._scored = len(self._firsts), 0
-        self.identity: dict[str, Any] = contents(sequence.folder)
+        self.identity: dict[str, Any] = identity(sequence.folder, copies=True, deep=True)
 
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; groups with a file that cannot be read are counted."""

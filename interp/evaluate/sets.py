@@ -10,7 +10,7 @@ from interp.data.layouts import Sequence as Recorded
 from interp.data.layouts import opened_in
 from interp.evaluate.films import Film
 from interp.evaluate.group import Footage
-from interp.evaluate.identity import apart, plain
+from interp.evaluate.naming import apart, plain
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
 from interp.evaluate.simulated import Simulated

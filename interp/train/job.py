@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from interp.data.inputs import inputs_of
 from interp.data.samples import SampleSettings
 from interp.data.settings import PRESETS, ClipSettings
 from interp.networks import spec_of
@@ -48,10 +49,11 @@ class Validation(BaseModel):
 
 
 class Job(BaseModel):
-    """All that decides a run.
+    """All that decides a run, with the files that it names.
 
     options   those of the network that are not its defaults
     starts    digests of the weights that it begins with, by part (`starts.py`)
+    inputs    digests of the files that it is trained and validated with, as they were when it was begun
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,6 +67,7 @@ class Job(BaseModel):
     window: Window
     validation: Validation
     starts: dict[str, str] = {}
+    inputs: dict[str, str] = {}
 
     @property
     def sequences(self) -> bool:
@@ -115,8 +118,9 @@ class Job(BaseModel):
         return self.model_copy(update={"recipe": self.recipe.model_copy(update={"processes": processes})})
 
     def kept(self) -> dict[str, Any]:
-        """It as JSON, as a run's folder keeps it."""
-        return self.model_dump(mode="json", exclude=None if self.starts else {"starts"})
+        """It as JSON, as a run's folder keeps it, with what is in the files that it names now."""
+        now = {"starts": self.starts, "inputs": inputs_of(self.clips, self.validation.videos)}
+        return self.model_dump(mode="json", exclude=set(now)) | {name: known for name, known in now.items() if known}
 
 
 def network_and_size(network: str | None, size: str | None, starts: Mapping[str, Path]) -> tuple[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from torch.utils.data import Dataset, default_collate
 from interp.data.ahead import Ahead
 from interp.data.chance import chance
 from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.inputs import digests_of, known_by
 from interp.data.pool import VERSION, Pool, Report
 from interp.data.samples import Samples
 from interp.data.sensor_ranges import SENSORS
@@ -102,8 +102,7 @@ def _whole(job: Job, clip: Clip, number: int) -> Batch:
 
 def _known_by(job: Job, settings: ClipSettings) -> str:
     """A short name of clips to validate with; others have another."""
-    said = f"{settings.name} {job.validation.model_dump_json()} {VERSION}"
-    return hashlib.sha256(said.encode()).hexdigest()[:12]
+    return known_by(settings, job.validation.model_dump_json(), digests_of(job.validation.videos), VERSION)
 
 
 def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:

@@ -224,6 +224,21 @@ def test_a_scene_is_seen_from_where_its_frames_are_whatever_rig_it_comes_with(tm
     np.testing.assert_array_equal(seen.events.off_on, expected.events.off_on)
 
 
+def test_a_scene_that_was_edited_is_another(tmp_path: Path) -> None:
+    predefined = Path(vid2ev.__file__).parent / "scenes" / "predefined" / "spinning-shapes.toml"
+    text, place = predefined.read_text(), "[-1.1, -0.75, 2.0]"
+    assert place in text
+    (tmp_path / "mine.toml").write_text(text)
+    known = []
+    for seed in (0, 0, 1):
+        scene, simulated = f"scene:{tmp_path / 'mine.toml'},seed={seed}", Simulated.of("clean", size="32x24")
+        known.append(Film(scene, Protocol(3, 3), "mine", simulated, 1).identity["sha256"])
+    (tmp_path / "mine.toml").write_text(text.replace(place, "[-1.1, -0.75, 2.1]"))
+    scene = f"scene:{tmp_path / 'mine.toml'},seed=0"
+    known.append(Film(scene, Protocol(3, 3), "mine", Simulated.of("clean", size="32x24"), 1).identity["sha256"])
+    assert known[0] == known[1] and len(set(known)) == 3
+
+
 def test_films_are_gone_through_a_group_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_film(tmp_path / "film.npz", pictures(40))
     film = Film(str(tmp_path / "film.npz"), Protocol(3, 3), "film", Simulated.of("clean"))

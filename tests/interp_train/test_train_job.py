@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
+from interp.data.inputs import known_by
 from interp.networks import names
 from interp.train.job import Job
 from interp.train.made_of import validation_of
@@ -72,6 +74,25 @@ def test_every_number_of_the_recipe_says_what_it_is_and_stays() -> None:
     assert all(field.description for field in Recipe.model_fields.values())
     with pytest.raises(ValidationError):
         Recipe().rate = 1.0  # type: ignore[misc]
+
+
+def test_a_job_is_known_by_what_is_in_the_files_that_it_names(tmp_path: Path) -> None:
+    """Not by where they lie in time: copies with another time of change are the same."""
+    (tmp_path / "frames").mkdir()
+    files = [tmp_path / "a.npz", tmp_path / "frames" / "1.png", tmp_path / "frames" / "2.png", tmp_path / "seen.npz"]
+    for file in files:
+        file.write_bytes(bytes(100_000))
+    job = Job.of(videos=[str(files[0]), str(tmp_path / "frames")], validation_videos=[str(files[3])])
+    known, clips = job.kept(), known_by(job.clips)
+    assert set(known["inputs"]) == {str(files[0]), str(tmp_path / "frames"), str(files[3])}
+    assert Job(**known).kept() == known
+    os.utime(files[0], (0, 0))
+    assert (job.kept(), known_by(job.clips)) == (known, clips)
+    for file in files:
+        file.write_bytes(bytes(99_999) + b"1")
+        assert job.kept() != known and (known_by(job.clips) != clips or file == files[3])
+        known, clips = job.kept(), known_by(job.clips)
+    assert "inputs" not in Job.of().kept()
 
 
 def test_clips_to_validate_with_are_those_of_the_job_whatever_others_have_left(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
-HEAD = 1 << 20  # bytes at the start of a file by which it is known
+HEAD, LEAST = 1 << 20, 4096  # bytes of all beginnings by which files are known, and of each at least; of ends as many
 
 
 def versions(more: Sequence[str] = ()) -> dict[str, str]:
@@ -33,19 +33,25 @@ def machine() -> dict[str, Any]:
     return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}
 
 
-def identity(path: Path) -> dict[str, Any]:
-    """What tells a source from another: size, time of change, and a digest of names, sizes and the first content."""
-    files = sorted(child for child in path.iterdir() if child.is_file()) if path.is_dir() else [path]
+def identity(path: Path, *, copies: bool = False, deep: bool = False) -> dict[str, Any]:
+    """What tells a file or a folder of files from another: bytes, time of change, and a digest of the names, the sizes,
+    the beginnings and the ends of all of them.
+
+    copies   a copy is the same: without the time of change
+    deep     with the folders in a folder
+    """
+    within = path.rglob("*") if deep else path.iterdir() if path.is_dir() else ()
+    files = sorted(child for child in within if child.is_file()) if path.is_dir() else [path]
     stats = [file.stat() for file in files]
-    digest = hashlib.sha256(repr([(file.name, stat.st_size) for file, stat in zip(files, stats, strict=True)]).encode())
-    if files:
-        with open(files[0], "rb") as file:
-            digest.update(file.read(HEAD))
-    return {
-        "bytes": sum(stat.st_size for stat in stats),
-        "changed_ns": max((stat.st_mtime_ns for stat in stats), default=0),
-        "sha256": digest.hexdigest(),
-    }
+    sizes = [(file.relative_to(path).as_posix(), stat.st_size) for file, stat in zip(files, stats, strict=True)]
+    digest, part = hashlib.sha256(repr(sizes).encode()), max(HEAD // max(len(files), 1), LEAST)
+    for file, stat in zip(files, stats, strict=True):
+        with open(file, "rb") as content:
+            digest.update(content.read(part))
+            content.seek(max(part, stat.st_size - part))
+            digest.update(content.read(part))
+    changed = {} if copies else {"changed_ns": max((stat.st_mtime_ns for stat in stats), default=0)}
+    return {"bytes": sum(stat.st_size for stat in stats), **changed, "sha256": digest.hexdigest()}
 
 
 def sha256(path: Path) -> str:

@@ -1,0 +1,34 @@
+"""Files and folders that clips are made of: what settings name by a path is known by what is in it.
+
+    inputs    name: digest, as of a copy of it wherever it lies (`vid2ev.recording.manifest.identity`)
+
+What comes with vid2ev, scenes and photographs by their names, is not among them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from interp.data.settings import ClipSettings
+from vid2ev.recording.manifest import identity
+
+
+def digests_of(names: Iterable[str]) -> dict[str, str]:
+    """Digests of those of the names that are paths of files or folders."""
+    there = sorted({name for name in names if Path(name).exists()})
+    return {name: identity(Path(name), copies=True, deep=True)["sha256"] for name in there}
+
+
+def inputs_of(settings: ClipSettings, videos: Iterable[str] = ()) -> dict[str, str]:
+    """Those of settings of clips, and of further videos."""
+    named = (settings.video_files, settings.recording_folders, settings.textures, settings.environments, videos)
+    return digests_of(name for names in named for name in names)
+
+
+def known_by(settings: ClipSettings, *more: object) -> str:
+    """A short name of clips; those of other settings, other files and others of what else decides have another."""
+    said = [settings.model_dump_json(), json.dumps(inputs_of(settings)), *map(str, more)]
+    return hashlib.sha256(" ".join(said).encode()).hexdigest()[:12]
