@@ -60,6 +60,13 @@ def test_table_file_and_picture(clip: str) -> None:
     assert "upsample" not in json.dumps(json.loads(again.stdout)["settings"])
 
 
+def test_what_was_measured_is_said_also_where_it_cannot_be_written(clip: str) -> None:
+    Path("taken").write_text("a file")
+    done = call(cost, clip, *COMMON, "--repeats", "1", "--upsample", "none", "-o", "taken/cost")
+    assert done.exit_code == 1 and "straight light" not in done.output
+    assert "default" in done.stdout and "taken/cost.json cannot be written" in done.output
+
+
 def test_a_budget_that_nothing_meets_ends_with_2_and_what_was_measured_is_there(clip: str) -> None:
     for options in ([], ["--json", "--overwrite"]):
         done = call(cost, clip, *COMMON, "--repeats", "1", "--budget", "time=1e-9x", *options)

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from moving_texture import texture
@@ -186,6 +187,18 @@ def test_a_single_frame_is_refused_with_what_to_do(tmp_path: Path) -> None:
     np.save(tmp_path / "one.npy", np.zeros((1, 8, 8)))
     with pytest.raises(UsageError, match=r"a single frame .* expected two or more, of a clip with more frames"):
         measured(str(tmp_path / "one.npy"), clock=ticks(), **SIMPLE)
+
+
+def test_settings_are_tried_where_there_are_pictures(tmp_path: Path) -> None:
+    """At the beginning, where nothing is in the middle, as of a screen that waits."""
+    times_s = [*np.arange(40) / 30, *(8 + np.arange(40) / 30)]
+    (tmp_path / "screen").mkdir()
+    for k in range(len(times_s)):
+        cv2.imwrite(str(tmp_path / "screen" / f"{k:03d}.png"), np.full((24, 32), 20 + 2 * k, np.uint8))
+    (tmp_path / "screen" / "timestamps.txt").write_text("\n".join(f"{t:.6f}" for t in times_s))
+    given = SIMPLE | {"fps": None, "upsample": "none", "given": ("upsample",)}
+    found = measured(str(tmp_path / "screen"), clock=ticks(), **given)
+    assert found.stretch_s == pytest.approx((0.0, 1.0), abs=1e-6) and found.reference.events > 0
 
 
 def test_the_reference_draws_the_noise_that_is_drawn_in_a_stretch_from_the_middle(clip: str) -> None:

@@ -96,6 +96,31 @@ def test_every_effect_of_every_preset_has_a_row(name: str) -> None:
     assert json.loads(json.dumps(plan.describe(), allow_nan=False))["rows"] == plan.describe()["rows"]
 
 
+@pytest.mark.parametrize("shots", [False, True])
+@pytest.mark.parametrize("name", preset_names())
+def test_where_no_time_passes_nothing_is_sent_and_nothing_changes(name: str, shots: bool) -> None:
+    """In a single picture, or where a shot begins with every one."""
+    spec = load_sensor(name)
+    frames = [Frame(np.full((8, 8), 0.1 + 0.2 * k, np.float32), k * 1_000_000, cut=True) for k in range(1 + 3 * shots)]
+    plan = plan_of(scene_of(spec, (8, 8), frames), spec)
+    assert all(row.omission.distance in (0.0, None) for row in plan.rows if row.effect == "leak")
+    assert all(row.omission.distance is None or np.isfinite(row.omission.distance) for row in plan.rows)
+
+
+@pytest.mark.parametrize("pictures", [30, 60])
+def test_of_few_events_more_may_be_rounded_up_than_is_to_be_expected(pictures: int) -> None:
+    """A delay of half a microsecond in place of a pole: each event is off by 0 or 1."""
+    spec = DvsSpec(**QUIET, refractory_us=0, photoreceptor_tau_us=0.0, follower_tau_us=0.5)
+    rounds, beyond = 40, 0
+    for phase in range(rounds):
+        lights = [0.3 * (1 + 0.9 * math.sin(0.4 * k + 0.1571 * phase)) for k in range(pictures)]
+        frames = [Frame(np.full((1, 1), light, np.float32), 5_000_000 * k) for k, light in enumerate(lights)]
+        said = EFFECTS["follower"].omission(scene_of(spec, (1, 1), frames), spec)
+        left = without(spec, "follower", said)
+        beyond += distance(sent(spec, (1, 1), frames), sent(left, (1, 1), frames), (1, 1)) > said.distance
+    assert beyond == 0
+
+
 def test_effects_by_name() -> None:
     spec = DvsSpec()
     seen = scene("edge", spec)

@@ -59,13 +59,13 @@ def compare(
     for name, (one, other) in cameras.items():
         with event_bar(quiet) as report:
             found[name] = compare_recordings(one, other, report=report, **options)
-        if name in pictures:
-            draw(found[name].comparison, pictures[name])
     if as_json:
         numbers = {name: compared.as_dict() for name, compared in found.items()}
         click.echo(json.dumps(numbers.get("", {"cameras": numbers}), indent=2))
     else:
         click.echo("\n\n".join(summary.lines(_facts(name, compared)) for name, compared in found.items()))
+    for name, picture in pictures.items():
+        draw(found[name].comparison, picture)
 
 
 def _facts(name: str, compared: Compared) -> list[tuple[str, str]]:

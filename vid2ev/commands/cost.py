@@ -95,14 +95,11 @@ def cost(
         else:
             options |= {"multiple": multiple, "networks": networks, "gaps": gaps}
             found = _of_rebuilding()(source, given=asked, report=report, **options)
+    click.echo(json.dumps(found.described, indent=2) if as_json else found.text)
     store(found.described, places[0])
     found.draw(places[1])
-    if as_json:
-        click.echo(json.dumps(found.described, indent=2))
-    else:
-        click.echo(found.text)
-        if not quiet:
-            click.echo(f"\n{places[0]}, {places[1]}")
+    if not (as_json or quiet):
+        click.echo(f"\n{places[0]}, {places[1]}")
     if found.refusal:
         raise UsageError(found.refusal)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any
 
 from vid2ev.recipe import Recipe
@@ -30,8 +31,22 @@ def stretch_of(
     return round(float(begin_s), 6), round(float(begin_s) + wanted_s, 6)
 
 
+def beginning_of(
+    recipe: Recipe, options: Mapping[str, Any], duration_s: float | None = None, frames: int = FRAMES
+) -> Stretch:
+    """The start and stop of the first pictures of what is asked for, likewise."""
+    slowdown = float(options.get("slowdown") or 1)
+    wanted = max(FEWEST, round(frames * _share(recipe.source.size))) + 1
+    times = [float(frame.t_ns) / 1e9 * slowdown for frame in islice(recipe.source.frames(), wanted)]
+    return times[0], times[-1] if duration_s is None else times[0] + duration_s
+
+
+def _share(size: tuple[int, int]) -> float:
+    return min(1.0, VGA / (size[0] * size[1]))
+
+
 def _wanted_s(frames: int, size: tuple[int, int], of_all: int | None, whole_s: float | None) -> float:
-    share = min(1.0, VGA / (size[0] * size[1]))
+    share = _share(size)
     if not of_all or not whole_s:
         return LONGEST_S * share
     frame_s = whole_s / of_all

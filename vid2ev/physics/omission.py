@@ -260,6 +260,8 @@ def omitted(
     light = crowded * scene.events
     swallowed = light * spec.refractory_us * 1e-6 * (most - unforced) / max(scene.pixels * scene.seconds, 1e-9)
     many = light + unforced + min(swallowed, noise)
+    if not many:  # (as of a single picture)
+        return Omission(0.0, "99.9 % bound", figure, why, replace)
     share = many / (many + noise)
     distance = max(unlike(scene, lag_s), trembling(scene, spec)[1]) * share
     if not obstacle(spec) and math.isfinite(mean):

@@ -25,6 +25,7 @@ from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import echoes, late_noise, levels_between, omitted, tau_at, taus_of, tracks
 from vid2ev.physics.slopes import slopes_at
 from vid2ev.stream.bounds import PIXELS_DIFFER, delayed, later, steeper
+from vid2ev.stream.chances import at_most
 from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 
 FOLLOWER_OFF: dict[str, Any] = {"follower_tau_us": 0.0}
@@ -169,6 +170,12 @@ class LeftOut(NamedTuple):
     stir_s2: float
 
 
+def _rounded_us(off_us: float, events: float) -> float:
+    """By how much later or earlier events are in the mean of which each is so with a chance, by 1 us, as times are of
+    whole microseconds: of few events more of them may be than is to be expected."""
+    return min(at_most(off_us * events) / max(events, 1e-9), 1.0)
+
+
 def _delay_instead(scene: Scene, spec: Any, poles: LeftOut, late_us: float, off: dict[str, Any]) -> Omission:
     spread = f"{math.sqrt(poles.variance_s2.max()) * 1e6:.3g} us of spread"
     if spec.photoreceptor_noise > 0:
@@ -176,7 +183,7 @@ def _delay_instead(scene: Scene, spec: Any, poles: LeftOut, late_us: float, off:
     if scene.still:
         return Omission(0.0, "99.9 % bound", spread, "nothing moves")
     delay_us = float(f"{spec.delay_us + poles.mean_us:.6g}")
-    rounded_us = abs(delay_us - math.floor(delay_us + 0.5))
+    rounded_us = _rounded_us(abs(delay_us - math.floor(delay_us + 0.5)), scene.events)
     mean = delayed(
         scene,
         poles.variance_s2,
