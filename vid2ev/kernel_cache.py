@@ -1,8 +1,9 @@
-"""Compiled kernels on disk are dropped when any of their sources has changed, and two processes never mix theirs up.
+"""Compiled functions on disk are made again when a source of theirs has changed, and processes never mix theirs up.
 
 numba keeps compiled code beside the file of the cached function and looks only at that file's date; the laws that a
-kernel calls are in other files.  So the dates of all of them are stamped into one file, and a new stamp empties the
-caches.
+kernel calls, and the numbers that any function takes from other files, are in others.  So a function is of one version
+of all files beside its own, and of those that all kernels are made of if it is one (`KERNELS`); and where these have
+changed, what was compiled of them is deleted.
 
 numba also numbers the files of a function's variants 1, 2, ...: two processes that compile different variants at the
 same time both write number 1, and whoever reads the index then runs the wrong code.  A process's own mark in the
@@ -12,24 +13,55 @@ names keeps them apart; the variant whose place in the index is lost that way is
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import uuid
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
-_COMPILED = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream")
+KERNELS = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream", "pictures")
+COLOURS = ("pictures",)  # of which functions of many rooms take numbers
 _MARK = uuid.uuid4().hex[:8]
 
 
 _save = IndexDataCacheFile.save
 
 
-def mark_our_kernels() -> None:
-    """Let this process's compiled kernels have names that no other process writes; where they cannot be written, as on
-    a full disk, they are compiled again the next time."""
+def cached(function: Callable) -> Any:
+    """A function of arrays: compiled when it is first called, cached, and without the lock of the interpreter."""
+    return cached_with()(function)
+
+
+def cached_with(**options: Any) -> Callable[[Callable], Any]:
+    """The same, by more of numba's options."""
+    compiled = njit(cache=True, nogil=True, error_model="numpy", **options)
+    return lambda function: of_this_version(compiled(function), COLOURS)
+
+
+def of_this_version(dispatcher: Any, rooms: Iterable[str] = KERNELS) -> Any:
+    """A cached function; what was compiled of other files in these rooms, or its own, is compiled again."""
+    own = Path(dispatcher.py_func.__code__.co_filename).parent
+    dispatcher._cache._cache_file._source_stamp = _versions(own, *(_HERE / room for room in rooms))
+    return dispatcher
+
+
+@functools.cache
+def _versions(*rooms: Path) -> tuple[tuple[str, int, int], ...]:
+    """Names, times and sizes of the files in rooms, and of what compiles them."""
+    files = {*_HERE.glob("kernel_*.py"), *(file for room in rooms for file in room.glob("*.py"))}
+    return tuple(
+        sorted((f"{file.parent.name}/{file.name}", (stat := file.stat()).st_mtime_ns, stat.st_size) for file in files)
+    )
+
+
+def _mark_ours() -> None:
+    """Let what this process compiles have names that no other process writes; where it cannot be written, as on a full
+    disk, it is compiled again the next time."""
     IndexDataCacheFile._data_name = lambda cache, number: f"{Path(cache._index_name).stem}.{_MARK}.{number}.nbc"  # type: ignore[method-assign]
     IndexDataCacheFile.save = _save_if_possible  # type: ignore[method-assign]
 
@@ -41,11 +73,9 @@ def _save_if_possible(cache: IndexDataCacheFile, key: Any, data: Any) -> None:
 
 def drop_stale_kernels() -> None:
     """Delete the cached kernels if the sources are not those that they were compiled from; never fails."""
-    folders = [_HERE / name for name in _COMPILED]
-    sources = sorted([*_HERE.glob("kernel_*.py"), *(path for folder in folders for path in folder.glob("*.py"))])
-    dates = [(str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in sources]
-    stamp = hashlib.sha256(repr(dates).encode()).hexdigest()
-    stamp_file = _HERE / _COMPILED[0] / "__pycache__" / "kernels.stamp"
+    folders = [_HERE / room for room in KERNELS]
+    stamp = hashlib.sha256(repr(_versions(*folders)).encode()).hexdigest()
+    stamp_file = _HERE / KERNELS[0] / "__pycache__" / "kernels.stamp"
     # A folder that cannot be written is not one in which sources change: numba then keeps its cache elsewhere.
     with contextlib.suppress(OSError):
         if stamp_file.exists() and stamp_file.read_text() == stamp:
@@ -55,3 +85,6 @@ def drop_stale_kernels() -> None:
                 cached.unlink(missing_ok=True)
         stamp_file.parent.mkdir(exist_ok=True)
         stamp_file.write_text(stamp)
+
+
+_mark_ours()

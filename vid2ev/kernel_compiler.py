@@ -12,9 +12,7 @@ kernels call is here made ready to be inlined, and no more, also where Python ca
 **Passes.** Of numba's passes over a function those are left out that look for what kernels do not have: closures,
 `with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
-**Caches.** numba compiles a function again where its own file has changed, but not where one has that it calls.  Here
-a kernel is of one version of all files that kernels are made of, and of those beside its own, and its file on disk has
-a name that no other process writes.
+**Caches** are of one version of all files that kernels are made of (`kernel_cache.py`).
 
 **Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
 """
@@ -25,7 +23,6 @@ import dis
 import functools
 import gc
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from llvmlite.binding import Linkage, get_host_cpu_features
@@ -53,14 +50,11 @@ from numba.core.untyped_passes import (
 )
 
 from vid2ev.kernel_borrowing import LoweringWithBorrowing
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import of_this_version
 from vid2ev.kernel_call_types import kept_call_types
 from vid2ev.kernel_flags import Numba, pass_over_flags
 
-mark_our_kernels()
-
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-MADE_OF = ("kernels", "physics", "scenes/rays", "stream")
 INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}
 
 
@@ -89,21 +83,6 @@ def _for_python_and_kernels(function: Callable, options: dict[str, Any]) -> Any:
     part = _for_kernels(function, options)
     dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
     return of_this_version(dispatcher)
-
-
-def of_this_version(dispatcher: Any) -> Any:
-    """The same; what was compiled of other files is compiled again."""
-    dispatcher._cache._cache_file._source_stamp = source_stamp(Path(dispatcher.py_func.__code__.co_filename).parent)
-    return dispatcher
-
-
-@functools.cache
-def source_stamp(room: Path) -> tuple[tuple[str, int, int], ...]:
-    """Names, times and sizes of the files that the kernels of a folder are made of."""
-    package = Path(__file__).parent
-    rooms = {*(package / part for part in MADE_OF), room}
-    files = [*package.glob("kernel_*.py"), *(each for part in rooms for each in part.glob("*.py"))]
-    return tuple(sorted((file.name, (stat := file.stat()).st_mtime_ns, stat.st_size) for file in files))
 
 
 def of_plain_types(dispatcher: Any) -> Any:

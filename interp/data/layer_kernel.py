@@ -9,10 +9,11 @@ red, green, blue and the share that is covered, times which they are.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_cache import cached, cached_with
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+@cached_with(fastmath={"contract", "nsz"})
 def _spline(share, weights):  # type: ignore[no-untyped-def]
     """Weights of four pixels about a place `share` behind the second."""
     rest = np.float32(1) - share
@@ -22,7 +23,7 @@ def _spline(share, weights):  # type: ignore[no-untyped-def]
     weights[3] = share * share * share / np.float32(6)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+@cached_with(fastmath={"contract", "nsz"})
 def lay(layer, place, waves, mirrored, out):  # type: ignore[no-untyped-def]
     """Lay a layer [h, w, 4] float32 over light [H, W, 3].
 
@@ -66,7 +67,7 @@ def lay(layer, place, waves, mirrored, out):  # type: ignore[no-untyped-def]
                 out[j, i, c] = sums[c] + (np.float32(1) - sums[3]) * out[j, i, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _mirrored(k, length):  # type: ignore[no-untyped-def]
     k %= 2 * length
     return k if k < length else 2 * length - 1 - k

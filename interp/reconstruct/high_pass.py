@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from vid2ev import Events
 from vid2ev.errors import UsageError
+from vid2ev.kernel_cache import cached
 
 GREY = 0.18
 CUTOFF_HZ = 1.0
@@ -61,7 +61,7 @@ class HighPass:
         self._level[...], self._last_us[...] = memory["level"], memory["last_us"]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _add(t, x, y, p, worth, level, last_us, per_us, off, on):  # type: ignore[no-untyped-def]
     for k in range(t.size):
         i, j = y[k], x[k]

@@ -28,7 +28,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_cache import cached
 
 MOST = 8  # crossings that an event may stand for
 PACE = 0.3  # of ln r, from one interval to the next
@@ -40,7 +41,7 @@ JITTER = 0.2  # of the time from one crossing to the next
 UNLIKELY = 0.1  # N of what is not looked at: 0.001 is the same to 0.0005, and takes 1.7 times as long
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def crossings_in_runs(t_us, pixel, p, pixels, refractory_us):  # type: ignore[no-untyped-def]
     """The mean of m of N events in order of time, float32 [N]; `pixel` is less than `pixels`."""
     order = _by_pixel(pixel, pixels)
@@ -57,7 +58,7 @@ def crossings_in_runs(t_us, pixel, p, pixels, refractory_us):  # type: ignore[no
     return seen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _by_pixel(pixel, pixels):  # type: ignore[no-untyped-def]
     """Places of events in order of their pixels, then of time."""
     begins, order = np.zeros(pixels + 1, np.int64), np.empty(pixel.size, np.int64)
@@ -70,7 +71,7 @@ def _by_pixel(pixel, pixels):  # type: ignore[no-untyped-def]
     return order
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _runs(pixel, p, order):  # type: ignore[no-untyped-def]
     """Where runs begin, events of one pixel and sign; and where the last one ends."""
     begins, found = np.empty(order.size + 1, np.int64), 0
@@ -83,7 +84,7 @@ def _runs(pixel, p, order):  # type: ignore[no-untyped-def]
     return begins[: found + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _steepness(t_us, order, begins, refractory_us):  # type: ignore[no-untyped-def]
     """a: how much fewer fast rates there are than slow ones."""
     short, longer = 1, 1
@@ -95,7 +96,7 @@ def _steepness(t_us, order, begins, refractory_us):  # type: ignore[no-untyped-d
     return min(max(EVEN + STEEP * math.log(longer / short), LEAST), GREATEST)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _means(t_us, run, refractory_us, likely, room, seen):  # type: ignore[no-untyped-def]
     """Write the means of m of a run of events; that of the first, before which nothing is known, is 1."""
     (told, before, rates), most = room
@@ -120,7 +121,7 @@ def _means(t_us, run, refractory_us, likely, room, seen):  # type: ignore[no-unt
             after, next_ = next_, after
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _tell(since_us, refractory_us, likely, told, rates):  # type: ignore[no-untyped-def]
     """Write how likely each m is by an interval alone, and ln r of each; how many there are to look at."""
     told[0], rates[0] = 1.0, -math.log(max(since_us, 1.0))
@@ -135,7 +136,7 @@ def _tell(since_us, refractory_us, likely, told, rates):  # type: ignore[no-unty
     return MOST
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _carry(shares, told, rates, most, to_rates, to_most, carried):  # type: ignore[no-untyped-def]
     """Write what the m of one interval say of those of the next, or the one before: as much in sum as there are."""
     total = 0.0

@@ -24,10 +24,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from interp.representation.blind_runs import MOST, crossings_in_runs
 from vid2ev.errors import UsageError
+from vid2ev.kernel_cache import cached
 
 LEAST = 0.03  # R: 0.01 and 0.1 are the same to 0.02 dB
 SHORTEST_US = 1.0  # less is no dead time: times are of whole microseconds
@@ -89,7 +89,7 @@ def stated(dead_time: DeadTime | None) -> dict[str, Any] | None:
     return asdict(dead_time) if dead_time else None
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _tracked(t_us, pixel, p, pixels, refractory_us):  # type: ignore[no-untyped-def]
     last, seen = np.full(pixels, -1, np.int64), np.ones(t_us.size, np.float32)
     for k in range(t_us.size):

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 
 
@@ -57,7 +57,7 @@ def by_pixel(blocks: Iterable[Events], width: int, rows: range) -> ByPixel:
     return ByPixel(ordered, begins)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _of_rows(t, x, y, p, width, first, stop):  # type: ignore[no-untyped-def]
     many = 0
     for row in y:
@@ -72,13 +72,13 @@ def _of_rows(t, x, y, p, width, first, stop):  # type: ignore[no-untyped-def]
     return pixels, moments
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _count(pixels, begins):  # type: ignore[no-untyped-def]
     for pixel in pixels:
         begins[pixel + np.uint32(1)] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _scatter(pixels, moments, places, ordered):  # type: ignore[no-untyped-def]
     for i in range(len(pixels)):
         pixel = pixels[i]

@@ -24,9 +24,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from vid2ev.compare.by_pixel import ByPixel
+from vid2ev.kernel_cache import cached
 
 TAUS_US = (1000, 100)  # the headline, and a magnifier for small errors of time
 _NEVER = np.int64(1 << 62)
@@ -44,7 +44,7 @@ def squared_distances(
     return _distances(a.moments, a.begins, b.moments, b.begins, float(tau_us), into, start_us, 1.0 / bin_us)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _distances(a, a_begins, b, b_begins, tau_us, bins, start_us, bins_per_us):  # type: ignore[no-untyped-def]
     pixels = len(a_begins) - 1
     squared = np.zeros(pixels)
@@ -74,7 +74,7 @@ def _distances(a, a_begins, b, b_begins, tau_us, bins, start_us, bins_per_us):  
     return squared
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _next_us(a, i, i_stop, b, j, j_stop):  # type: ignore[no-untyped-def]
     """The instant of the next event of either."""
     return min(a[i] >> 1 if i < i_stop else _NEVER, b[j] >> 1 if j < j_stop else _NEVER)

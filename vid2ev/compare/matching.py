@@ -29,9 +29,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from vid2ev.compare.by_pixel import ByPixel
+from vid2ev.kernel_cache import cached
 
 WINDOW_US = 5000
 
@@ -65,7 +65,7 @@ def partners(a_us: np.ndarray, b_us: np.ndarray, window_us: int = WINDOW_US) -> 
     return np.flatnonzero(a_kept), np.flatnonzero(b_kept)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _pair(a, b, a_many, b_many, window, a_kept, b_kept, scratch):  # type: ignore[no-untyped-def]
     """Mark the events that have partners: a[:a_many] and b[:b_many] are times [us], ascending."""
     live, right, left = scratch[0], scratch[1], scratch[2]
@@ -108,7 +108,7 @@ def _pair(a, b, a_many, b_many, window, a_kept, b_kept, scratch):  # type: ignor
             k += b_kept[j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _match(a, a_begins, b, b_begins, window, errors, a_most, b_most):  # type: ignore[no-untyped-def]
     a_us, b_us = np.empty((2, a_most), np.int64), np.empty((2, b_most), np.int64)
     a_kept, b_kept = np.empty(a_most, np.bool_), np.empty(b_most, np.bool_)
@@ -131,7 +131,7 @@ def _match(a, a_begins, b, b_begins, window, errors, a_most, b_most):  # type: i
     return polarity_errors
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _by_polarity(moments, times, many):  # type: ignore[no-untyped-def]
     """The times of OFF and ON events, each for itself."""
     many[:] = 0
@@ -141,7 +141,7 @@ def _by_polarity(moments, times, many):  # type: ignore[no-untyped-def]
         many[p] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _note(a, b, a_many, a_kept, b_kept, errors):  # type: ignore[no-untyped-def]
     """Count the errors of time of the pairs."""
     zero, j = len(errors) // 2, 0
@@ -153,7 +153,7 @@ def _note(a, b, a_many, a_kept, b_kept, errors):  # type: ignore[no-untyped-def]
             j += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _leave(times, many, kept):  # type: ignore[no-untyped-def]
     """Take the events that have partners out of the others, and return how many are left."""
     left = 0

@@ -22,7 +22,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_cache import cached
 
 PEAK = 255.0
 HIGHEST_DB = 100.0  # of pictures without an error
@@ -132,7 +133,7 @@ def _blurred(plane: np.ndarray) -> np.ndarray:
     return blurred.reshape(plane.shape)[RADIUS_PX:-RADIUS_PX, RADIUS_PX:-RADIUS_PX]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _products(made, true, out):  # type: ignore[no-untyped-def]
     for i in range(made.shape[0]):
         for j in range(made.shape[1]):
@@ -142,7 +143,7 @@ def _products(made, true, out):  # type: ignore[no-untyped-def]
                 out[2, i, j, c], out[3, i, j, c] = x * x + y * y, x * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _ssim(mean_x, mean_y, squares, product, peak, scale, out):  # type: ignore[no-untyped-def]
     c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
     channels = mean_x.shape[2]

@@ -26,9 +26,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from vid2ev.compare.comparison import percentile
+from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 
 NEIGHBOUR_US = 5000
@@ -182,7 +182,7 @@ def statistics_of(
     return gathering.statistics(span_us)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _gather(t, x, y, p, reach_us, edges, counts, last_us, last_kind, intervals, isolated, shortest):  # type: ignore[no-untyped-def]
     height, width = last_us.shape
     for i in range(len(t)):

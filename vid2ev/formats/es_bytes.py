@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vid2ev.formats.es import EXPOSURES, OUTSIDE, TIME
-from vid2ev.kernel_cache import mark_our_kernels
-
-mark_our_kernels()
+from vid2ev.kernel_cache import cached
 
 EVENT = 5  # bytes
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode_dvs(
     state: np.ndarray,
     data: np.ndarray,
@@ -47,7 +44,7 @@ def decode_dvs(
     return used, found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode_atis(
     state: np.ndarray,
     data: np.ndarray,

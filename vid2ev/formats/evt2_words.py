@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vid2ev.formats.evt_state import Left, State
-from vid2ev.kernel_cache import mark_our_kernels
-
-mark_our_kernels()
+from vid2ev.kernel_cache import cached
 
 HIGH, TRIGGER, OTHERS, CONTINUED = 0x8, 0xA, 0xE, 0xF
 BEAT = 64  # steps of EVT_TIME_HIGH, of 64 us each, after which there is one even in silence
@@ -17,7 +14,7 @@ _HIGH, _LOOPS = int(State.HIGH), int(State.LOOPS)
 _EARLY, _OUTSIDE, _TRIGGERS, _OTHERS = (int(name) for name in Left)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode(
     state: np.ndarray,
     left: np.ndarray,
@@ -60,7 +57,7 @@ def decode(
     return len(words), found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode_vectors(
     state: np.ndarray,
     left: np.ndarray,
@@ -106,7 +103,7 @@ def decode_vectors(
     return used, found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def encode(
     t: np.ndarray,
     x: np.ndarray,

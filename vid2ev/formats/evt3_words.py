@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vid2ev.formats.evt_state import Left, State
-from vid2ev.kernel_cache import mark_our_kernels
-
-mark_our_kernels()
+from vid2ev.kernel_cache import cached
 
 ROW, COLUMN, BASE, VECTOR_12, VECTOR_8, LOW, HIGH = 0x0, 0x2, 0x3, 0x4, 0x5, 0x6, 0x8
 EXPOSURE_ROW, CONTINUED_4, TRIGGER, CONTINUED_12 = 0x1, 0x7, 0xA, 0xF
@@ -20,7 +17,7 @@ _HIGH, _LOOPS, _LOW, _ROW, _COLUMN, _ON, _WIDTH = (int(name) for name in State)
 _EARLY, _OUTSIDE, _TRIGGERS, _OTHERS = (int(name) for name in Left)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode(
     state: np.ndarray,
     left: np.ndarray,
@@ -88,7 +85,7 @@ def decode(
     return used, found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def encode(
     t: np.ndarray,
     x: np.ndarray,

@@ -14,12 +14,13 @@ Source: https://github.com/ros-event-camera/event_camera_codecs
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from vid2ev.kernel_cache import cached
 
 TIME_HIGH, TIME_LOW, COLUMN, ROW, BASE, VECTOR_8 = range(6)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def decode(
     words: np.ndarray, base_us: int, place: np.ndarray, t: np.ndarray, x: np.ndarray, y: np.ndarray, p: np.ndarray
 ) -> int:

@@ -5,11 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
-
-mark_our_kernels()
+from vid2ev.kernel_cache import cached
 
 NOTHING, T, X, Y, P, LABEL = -1, 0, 1, 2, 3, 4  # what a field can be
 WIDEST = 48  # bytes of a line that is written
@@ -19,7 +16,7 @@ TAB, NEWLINE, RETURN, BLANK = 9, 10, 13, 32
 HASH, PERCENT, PLUS, COMMA, MINUS, POINT, ZERO, NINE, SEMICOLON, LARGE_E, SMALL_E = tuple(b"#%+,-.09;Ee")
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def digits(data: np.ndarray, at: int, value: int) -> tuple[int, int, int, int]:
     """A value with the digits at a place added to its end; the place after them, how many there are, and how many of
     them have been dropped because an int64 cannot hold them."""
@@ -35,7 +32,7 @@ def digits(data: np.ndarray, at: int, value: int) -> tuple[int, int, int, int]:
         at += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def number(data: np.ndarray, at: int, power: int) -> tuple[int, int, bool]:
     """The number at a place, times 10**power and rounded; the place after it, and whether there is one that is whole.
 
@@ -74,7 +71,7 @@ def number(data: np.ndarray, at: int, power: int) -> tuple[int, int, bool]:
     return -value if negative else value, at, good
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def after_blanks(data: np.ndarray, at: int) -> int:
     """The next place that is not empty."""
     while data[at] == BLANK or data[at] == TAB or data[at] == RETURN:
@@ -82,7 +79,7 @@ def after_blanks(data: np.ndarray, at: int) -> int:
     return at
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def parse(
     data: np.ndarray,
     fields: np.ndarray,
@@ -133,7 +130,7 @@ def parse(
     return found, end
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def put(text: np.ndarray, at: int, value: Any, least: int) -> int:
     """Write a number that is not negative, with zeros in front to make it `least` digits; returns the place after."""
     count, limit = 1, 10
@@ -147,7 +144,7 @@ def put(text: np.ndarray, at: int, value: Any, least: int) -> int:
     return at + count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def write(
     t: np.ndarray,
     x: np.ndarray,

@@ -20,8 +20,8 @@ from typing import Any, Self
 
 import av
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.pictures.colours import BLUE, BLUE_SPAN, GREEN, NEUTRAL, RED, RED_SPAN
 
 BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg
@@ -157,7 +157,7 @@ _LUMA, _U, _V = (np.float32(scale / 255) for scale in (219, 224 / BLUE_SPAN, 224
 _LEAST, _HALF = np.float32(0.01), np.float32(0.5)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _encode(picture, luma, chroma):  # type: ignore[no-untyped-def]
     for block_i in range(chroma.shape[1]):
         for block_j in range(chroma.shape[2]):

@@ -7,17 +7,15 @@ Light is float32, rows [H, n]; sums are float64 [n] each, one under the other.  
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 
-mark_our_kernels()
 LEAST, MOST, SUM, LIT_MOST, LIT_SUM, LIT_SQUARE = range(6)  # of the light behind the lens shading
 SHADED, CLIPPED, OVERFULL, NEAR = 6, 8, 10, 12  # changes, and how many values are near the full well
 SUMS = 13
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def add_light(light, shade, dark, bright, black, white, gain, well, near_well, sums):
     """Add the light of an exposure.  All is in light: what lies between dark and bright may be seen, black is the first
     code and white the last, a well is what a pixel `gain` times as sensitive holds, near_well where it may be full.
@@ -47,7 +45,7 @@ def add_light(light, shade, dark, bright, black, white, gain, well, near_well, s
             sums[NEAR, i] += 1.0 if seen >= near_well else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def add_change(one, other, shade, dark, bright, sums):
     """Add what two pictures of light differ by, between dark and bright; behind the lens or before it, whatever is more
     (float64 [2, n])."""

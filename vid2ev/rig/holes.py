@@ -17,11 +17,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 
-mark_our_kernels()
 F = np.float32
 NOTHING = -1
 ALIKE = F(1.05)  # inverse depths of one surface: up to so many times that of the farthest,
@@ -74,7 +72,7 @@ def apply_fill(fill: Fill, picture: np.ndarray, smoothings: int = 0) -> None:
             _apply(fill.holes, fill.around, fill.shares, pixels)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _look_around(inverse, holes, hits):
     height, width = inverse.shape
     last = np.full(width, NOTHING, np.int64)  # in each column
@@ -99,7 +97,7 @@ def _look_around(inverse, holes, hits):
                 k -= 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _weigh(inverse, holes, hits, inset, weights):
     height, width = inverse.shape
     depths = inverse.reshape(-1)
@@ -132,7 +130,7 @@ def _weigh(inverse, holes, hits, inset, weights):
             weights[k, way] /= max(total, F(1e-30))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _find_around(inverse, filled, holes, around):
     height, width = inverse.shape
     for k in range(holes.size):
@@ -144,7 +142,7 @@ def _find_around(inverse, filled, holes, around):
                     around[k, 3 * (row - y + 1) + column - x + 1] = row * width + column
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _apply(holes, sources, weights, pixels):
     filled = np.empty((holes.size, pixels.shape[1]), np.float32)
     for k in range(holes.size):

@@ -16,11 +16,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.spline import MARGIN, Spline
 
-mark_our_kernels()
 F = np.float32
 _NOWHERE = np.zeros((0, 0), np.bool_)
 _SIXTH, _HALF, _ONE, _TWO, _ZERO = F(1 / 6), F(0.5), F(1), F(2), F(0)
@@ -62,7 +61,7 @@ def pixel_means(fine: np.ndarray, samples: int) -> np.ndarray:
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _sample(weights, limits, x, y, begin, end, out):
     """Rows of places, each twice: once for where they are and for the weights of the splines there, once for light."""
     channels, height, width, _ = limits.shape
@@ -118,7 +117,7 @@ def keys_weights(a):
     return w0, _ONE - w0 - w2 - w3, w2, w3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _sample_beside_cuts(pixels, x, y, near_cut, inverse, steep, begin, end, out):
     """Places near cuts once more, by cubic convolution among the pixels of one surface."""
     height, width = near_cut.shape
@@ -150,7 +149,7 @@ def _sample_beside_cuts(pixels, x, y, near_cut, inverse, steep, begin, end, out)
                 out[j, i, c] = min(max(own + total, low), high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _means(fine, samples, out):
     share = F(1) / F(samples * samples)
     for j in range(out.shape[0]):

@@ -23,12 +23,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 from vid2ev.rig.bands import Bands
 
-mark_our_kernels()
 F = np.float32
 POLE = F(math.sqrt(3) - 2)
 BRIGHTEST = 65504.0
@@ -75,7 +73,7 @@ class Spline:
             _limits(begin, end, pixels, limits)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _planes(begin, end, light, pixels):
     """Colour by colour, and each a number."""
     brightest = F(BRIGHTEST)
@@ -89,7 +87,7 @@ def _planes(begin, end, light, pixels):
                     pixels[c, j, i] = brightest if value > _ZERO else -brightest if value < _ZERO else _ZERO
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _filter(c):
     """From light to weights along the columns of c [n, m], in place; the picture goes on mirrored."""
     n, m = c.shape
@@ -118,7 +116,7 @@ def _filter(c):
             here[i] = POLE * (below[i] - here[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _filter_rows(c):
     """The same along rows with margins, eight at a time lest the processor wait for each step; margins mirrored."""
     n, last = c.shape[1] - 2 * MARGIN, c.shape[0] - 1
@@ -139,7 +137,7 @@ def _filter_rows(c):
             c[j, n + MARGIN - 1 + i] = c[j, MARGIN + max(n - 1 - i, 0)]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _limits(begin, end, pixels, limits):
     """How low and how high the light nearest to each pixel may be."""
     height, width = pixels.shape

@@ -26,16 +26,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import bent, rays_of
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.triangles import draw_patches, draw_quads
 
-mark_our_kernels()
 F = np.float32
 STEEPEST_DEG = 85.0
 GAP_PX = 2.0
@@ -117,7 +115,7 @@ def _placed(rays: np.ndarray, inverse: np.ndarray, camera: Intrinsics, pose: Pos
     return tuple(np.ascontiguousarray(values).reshape(shape) for values in (u, v, over_c, there))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _place(rays, inverse, turn, way, lens, u, v, over_c, there):
     for i in range(inverse.size):
         x, y, w = rays[i, 0], rays[i, 1], inverse[i]
@@ -129,7 +127,7 @@ def _place(rays, inverse, turn, way, lens, u, v, over_c, there):
         over_c[i], there[i] = q, w * q
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _find_cuts(inverse, steep, cut, near_cut):
     height, width = near_cut.shape
     for j in range(height + 1):
@@ -157,7 +155,7 @@ def _patches_of(surface: Surface, quads: np.ndarray) -> _Patches:
     return patches
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _quarter(quads, columns, rows, rays, inverse, steep, patch_columns, patch_rows, patch_rays, patch_inverse):
     depth, joined, own = np.empty(4, np.float32), np.empty(4, np.bool_), np.empty(4, np.float32)
     for n in range(len(quads)):
@@ -184,7 +182,7 @@ def _quarter(quads, columns, rows, rays, inverse, steep, patch_columns, patch_ro
                 patch_inverse[patch, c] = own[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _depths_of_quarter(depth, joined, k, own):
     """Inverse depths of the patch at corner k: means with the corners on the same surface, so that patches meet."""
     following, before = (k + 1) % 4, (k + 3) % 4

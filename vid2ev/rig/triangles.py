@@ -15,16 +15,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernel_cache import mark_our_kernels
+from vid2ev.kernel_cache import cached
 
-mark_our_kernels()
 F = np.float32
 ROUNDING = F(1e-4)  # of a triangle's area: by so much its edges reach out, lest rounding makes a crack
 REACH = F(1e-4)  # px; the same of its bounds
 _ZERO, _ONE = F(0), F(1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def draw_quads(begin, end, u, v, q, w, columns, rows, cut, gap, x, y, inverse):
     """The quads between corners [H, W], two triangles each, on the pixels' rows begin ... end.
 
@@ -62,7 +61,7 @@ def draw_quads(begin, end, u, v, q, w, columns, rows, cut, gap, x, y, inverse):
             )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def draw_patches(begin, end, u, v, q, w, columns, rows, x, y, inverse):
     """Patches of four corners [n, 4] that go round clockwise; as in `draw_quads`."""
     for k in range(u.shape[0]):
@@ -102,7 +101,7 @@ def _draw(u, v, q, w, columns, rows, begin, end, x, y, inverse):
                         y[row, column] = (e0 * rows[0] + e1 * rows[1] + e2 * rows[2]) * share
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _on_rows(above, below, first, last):
     """Whether any of the corners of two rows, or a side between them, may be on the rows first ... last."""
     low, high = F(np.inf), F(-np.inf)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.pictures.colours import MOST, event_colours, in_8_bits
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
@@ -54,7 +54,7 @@ def counts_of(events: Events, size: tuple[int, int]) -> np.ndarray:
     return counts.take()
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _count(x, y, p, counts):  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         polarity, row, column = min(p[i], 1), y[i], x[i]

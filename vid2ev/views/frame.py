@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
 
@@ -45,7 +45,7 @@ class Frame:
         return np.repeat(np.rint(255 * array).astype(np.uint8)[..., None], 3, axis=2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _add(x, y, p, net):  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         net[y[i], x[i]] += 1 if p[i] else -1

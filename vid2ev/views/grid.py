@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numba import njit
 
 from vid2ev.errors import UsageError
+from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
 
@@ -115,7 +115,7 @@ def windows_of(windows_us: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     return windows
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _count(t, x, y, p, edges, most, planes):  # type: ignore[no-untyped-def]
     apart, k, last = planes.shape[1] == 2, 0, len(edges) - 2
     for i in range(len(t)):

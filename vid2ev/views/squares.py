@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
 
@@ -33,7 +33,7 @@ class Squares:
         return at
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _fills(x, y, first, column, row, counts, most):  # type: ignore[no-untyped-def]
     for i in range(first, len(x)):
         square = row[y[i]] + column[x[i]]

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
@@ -79,13 +79,13 @@ def _picture(surface: np.ndarray) -> np.ndarray:
     return COLOURS[(on >= off).astype(np.uint8), np.maximum(on, off)]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _stamp(t, x, y, p, newest):  # type: ignore[no-untyped-def]
     for i in range(len(t)):
         newest[min(p[i], 1), y[i], x[i]] = t[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _decayed(newest, t_us, tau_us):  # type: ignore[no-untyped-def]
     surface = np.zeros(len(newest), np.float32)
     for i in range(len(newest)):

@@ -18,8 +18,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from vid2ev.kernel_cache import cached
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits, strength
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
@@ -101,7 +101,7 @@ def _normalised(grid: np.ndarray) -> np.ndarray:
     return grid
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached
 def _add(t, x, y, p, worth, start_us, scale, grid):  # type: ignore[no-untyped-def]
     apart, last = grid.shape[0] == 2, grid.shape[1] - 1
     for i in range(len(t)):
