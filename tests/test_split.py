@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +20,7 @@ from vid2ev.commands import main
 from vid2ev.conversion import Paused
 from vid2ev.formats import read_events
 from vid2ev.parts import Replayed
+from vid2ev.recording.disk import lock, unlock
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.split import convert_split
 from vid2ev.stream.events import Events
@@ -35,6 +36,14 @@ def here(tasks: Sequence[Task]) -> None:
     """All tasks in this process, the last first."""
     for task in reversed(tasks):
         task.call(lambda _: None)
+
+
+@contextmanager
+def lock_held(folder: Path) -> Iterator[None]:
+    """A folder that somebody else writes."""
+    handle = lock(folder)
+    yield
+    unlock(folder, handle)
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +134,49 @@ def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_p
     for name in FILES[:2]:
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert {path.name for path in tmp_path.iterdir()} == {"whole", "made"}
+
+
+@pytest.mark.parametrize("name", ["thesis.txt", "0-of-2", "notes/thesis.txt"])
+@pytest.mark.parametrize("how", ["overwrite", "resume"])
+def test_what_is_no_part_is_never_removed(clip: str, tmp_path: Path, name: str, how: str) -> None:
+    theirs = tmp_path / "made.parts" / name
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("of somebody else")
+    with pytest.raises(UsageError, match=r"made\.parts is needed to work in, and holds .*, which is no part"):
+        convert_split(clip, tmp_path / "made", "tiles", 2, here, fps=50, **{how: True})
+    assert theirs.read_text() == "of somebody else"
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [theirs]
+
+
+def test_parts_that_another_process_makes_are_left_to_it(clip: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "preview": False}
+
+    def meanwhile(tasks: Sequence[Task]) -> None:
+        tasks[0].call(lambda _: None)
+        for how in ({"overwrite": True}, {"resume": True}):
+            with pytest.raises(UsageError, match=r"another vid2ev is writing .*made\.parts; wait for it"):
+                convert_split(clip, tmp_path / "made", "tiles", 2, here, **how, **options)
+        assert (tmp_path / "made.parts" / "0-of-2" / "manifest.json").exists()
+        here(tasks)
+
+    convert_split(clip, tmp_path / "made", "tiles", 2, meanwhile, **options)
+    assert {path.name for path in tmp_path.iterdir()} == {"made"}
+
+
+def test_starting_again_removes_the_parts_that_were_begun(clip: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "preview": False}
+    begun = [tmp_path / "made.parts" / name for name in ("0-of-7", "1-of-7.partial")]
+    for part in begun:
+        part.mkdir(parents=True)
+
+    def look(tasks: Sequence[Task]) -> None:
+        assert not any(part.exists() for part in begun)
+        here(tasks)
+
+    with lock_held(begun[1]), pytest.raises(UsageError, match="another vid2ev is writing"):  # (by a worker left over)
+        convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
+    convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
+    assert {path.name for path in tmp_path.iterdir()} == {"made"}
 
 
 @pytest.mark.parametrize("kind", ["tiles", "cuts"])

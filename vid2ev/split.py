@@ -1,7 +1,9 @@
 """A clip shared out by parts, of its pixels or of its time; what is put together has the bytes of a recording made at
 once, but for parts begun with a warm-up.
 
-    DIR.parts/K-of-N/    the recording of a part
+    DIR.parts/           while the recording is being made
+        lock             held by the process that shares it out
+        K-of-N/          the recording of a part; K-of-N.partial/ while it is being made
     DIR/                 the recording
 
     tiles        blocks of pixels; every worker makes the light for itself, so this pays where the sensor takes longer
@@ -12,10 +14,12 @@ once, but for parts begun with a warm-up.
 
 from __future__ import annotations
 
+import os
+import re
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,13 +31,14 @@ from vid2ev.kernels.layout import BLOCK
 from vid2ev.outputs import Outputs
 from vid2ev.parts import Made
 from vid2ev.recipe import Recipe
-from vid2ev.recording.disk import writing
+from vid2ev.recording.disk import lock, undisturbed, unlock, writing
 from vid2ev.recording.folder import begun_job, check_free
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
 from vid2ev.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
 
 KINDS = ("tiles", "cuts", "approximate")
+PART = re.compile(r"\d+-of-\d+(\.partial)?")  # the folder of a part
 
 ShareOut = Callable[[Sequence[Task]], object]  # does all tasks; raises what one ends with
 
@@ -58,36 +63,79 @@ def convert_split(
 
     Raises UsageError for what cannot be split, and as `convert` does.
     """
-    beside = parts_of(directory)
-    check_free(directory, overwrite, resume)
-    if resume and directory.exists() and not beside.exists():
+    check_parts_free(directory, overwrite, resume)
+    if resume and directory.exists() and not _begun(parts_of(directory)):
         return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
-    if beside.exists() and not (overwrite or resume):
-        raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")
-    if overwrite and not resume:
-        shutil.rmtree(beside, ignore_errors=True)
-    if options.get("seed", 0) is None:
-        options["seed"] = begun_part(directory).get("seed", secrets.randbits(32))
     parts, notes = _parts(video, kind, count, dict(options), look)
-    folders = tuple(beside / f"{number}-of-{len(parts)}" for number in range(len(parts)))
-    with writing(directory):
+    with _held(directory) as beside:
+        check_parts_free(directory, overwrite, resume)  # (once more: another may have written there until now)
+        if overwrite and not resume:
+            _remove_parts(beside)
+        if options.get("seed", 0) is None:
+            options["seed"] = begun_part(directory).get("seed", secrets.randbits(32))
+        folders = tuple(beside / f"{number}-of-{len(parts)}" for number in range(len(parts)))
+        share_out(_tasks(video, parts, folders, options))
+        options |= {"notes": {**(options.get("notes") or {}), **notes}} if notes else {}
+        made = Made(folders, in_time=kind != "tiles")
+        manifest = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=made, **options)
+        _remove_parts(beside)
+    return manifest
+
+
+def check_parts_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
+    """`recording.folder.check_free` of a recording and of its parts."""
+    check_free(directory, overwrite, resume)
+    beside = parts_of(directory)
+    if beside.exists() and not beside.is_dir():
+        raise UsageError(f"{beside} is needed to work in, and is a file; choose another folder with -o")
+    for path in sorted(beside.iterdir()) if beside.is_dir() else ():
+        if not ((path.is_dir() and PART.fullmatch(path.name)) or path.name == "lock"):
+            raise UsageError(
+                f"{beside} is needed to work in, and holds {path.name}, which is no part; choose another folder with -o"
+            )
+    if _begun(beside) and not (overwrite or resume):
+        raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")
+
+
+@contextmanager
+def _held(directory: Path) -> Iterator[Path]:
+    """The folder for the parts of a recording, which no other process touches meanwhile; where nothing was begun in it
+    that could be taken up, it is gone in the end."""
+    beside = parts_of(directory)
+    with writing(directory), undisturbed():
         beside.mkdir(parents=True, exist_ok=True)
+        handle = lock(beside)
+    try:
+        yield beside
+    finally:
+        unlock(beside, handle)
+        with suppress(OSError):
+            beside.rmdir()
+
+
+def _begun(beside: Path) -> list[Path]:
+    """The parts that are there, in whole or in part."""
+    return sorted(path for path in beside.iterdir() if PART.fullmatch(path.name)) if beside.is_dir() else []
+
+
+def _remove_parts(beside: Path) -> None:
+    """Remove parts, and nothing else.  Raises UsageError for one that a worker left over is still making."""
+    for part in _begun(beside):
+        with writing(part), ExitStack() as holding:
+            if part.suffix == ".partial":
+                holding.callback(os.close, lock(part))
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def _tasks(video: str, parts: Sequence[dict[str, Any]], folders: Sequence[Path], options: dict[str, Any]) -> list[Task]:
+    """The recording of each part, in its folder."""
     not_in_parts = Outputs.__dataclass_fields__.keys() - {"probe"}
     of_parts = {key: value for key, value in options.items() if key not in not_in_parts}
     calls = [
         partial(_part, video=video, folder=folder, options=of_parts | part)
         for folder, part in zip(folders, parts, strict=True)
     ]
-    try:
-        share_out([Task(f"{video}, part {number} of {len(parts)}", call) for number, call in enumerate(calls, 1)])
-    finally:
-        with suppress(OSError):
-            beside.rmdir()  # (where nothing was begun that could be taken up)
-    options |= {"notes": {**(options.get("notes") or {}), **notes}} if notes else {}
-    made = Made(folders, in_time=kind != "tiles")
-    manifest = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=made, **options)
-    shutil.rmtree(beside, ignore_errors=True)
-    return manifest
+    return [Task(f"{video}, part {number} of {len(parts)}", call) for number, call in enumerate(calls, 1)]
 
 
 def parts_of(directory: Path) -> Path:
