@@ -13,9 +13,8 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,6 +24,7 @@ from interp.data.inputs import digests_of
 from interp.data.layouts import open_sequence
 from interp.data.layouts.own import Own
 from vid2ev import DataError, UsageError, convert
+from vid2ev.cluster.processes import processes
 from vid2ev.cluster.task import Task, Tell
 from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
@@ -96,8 +96,8 @@ def _all(
     elif workers.scheduler or has_dask():
         yield from _shared_out(scenes, make, workers, share)
     else:
-        with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as processes:
-            futures = [processes.submit(make, scene) for scene in scenes]
+        with processes(workers.jobs) as submit:
+            futures = [submit(make, scene) for scene in scenes]
             yield from _told((future.result() for future in as_completed(futures)), len(scenes), report)
 
 

@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from interp.data.clip import Clip, read_clip, write_clip
 from interp.data.inputs import known_by
 from interp.data.making import made
 from interp.data.settings import ClipSettings
+from vid2ev.cluster.processes import processes
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import writing
 from vid2ev.sensors.devices import CPU, Device
@@ -102,7 +102,10 @@ class Pool:
             self._path(number - self.most - KEPT).unlink(missing_ok=True)
 
     def fill(self, sample: int, jobs: int = 1, report: Report | None = None) -> None:
-        """Make what samples from this one on need at first, with some processes, and remove what they do not."""
+        """Make what samples from this one on need at first, with some processes, and remove what they do not.
+
+        Where one clip cannot be made, those that no process has begun are not tried.
+        """
         self.remove_others(sample)
         missing = self.missing(sample)
         if not missing:
@@ -113,9 +116,8 @@ class Pool:
                 if report:
                     report(done, len(missing))
             return
-        # (processes that are not forked: threads of torch and numba do not survive it)
-        with ProcessPoolExecutor(jobs, get_context("spawn"), _alone) as processes:
-            making = [processes.submit(_make, self, number) for number in missing]
+        with processes(jobs, _alone) as submit:
+            making = [submit(_make, self, number) for number in missing]
             for done, future in enumerate(as_completed(making), 1):
                 future.result()
                 if report:

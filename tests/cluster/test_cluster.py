@@ -14,6 +14,7 @@ import shared_tasks as made
 
 from vid2ev import UsageError, convert
 from vid2ev.cluster import workers as workers_module
+from vid2ev.cluster.processes import processes
 from vid2ev.cluster.task import Task, share_of
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
@@ -32,6 +33,19 @@ def all_of(tasks: list[Task], workers: Workers, **watch: Any) -> dict[str, Outco
 
 def begun(name: str) -> int:
     return len(list(Path().glob(f"{name}.*")))
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, UsageError])
+def test_processes_do_not_begin_what_is_queued_where_something_goes_wrong(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    with pytest.raises(error), processes(1) as submit:
+        submit(os.mkdir, tmp_path / "first").result()
+        submit(time.sleep, 0.5)
+        for number in range(20):
+            submit(os.mkdir, tmp_path / str(number))
+        raise error
+    assert (tmp_path / "first").exists() and len(list(tmp_path.iterdir())) < 5  # (a few are on their way already)
 
 
 def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(

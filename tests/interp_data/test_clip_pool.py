@@ -15,7 +15,7 @@ import torch
 from torch.utils.data import DataLoader
 
 from interp.data.clip import read_clip, write_clip
-from interp.data.making import made
+from interp.data.making import made, wanted
 from interp.data.pool import AHEAD, KEPT, Pool
 from interp.data.samples import Samples, SampleSettings
 from interp.data.sensor_ranges import SENSORS
@@ -85,6 +85,19 @@ def test_processes_fill_a_pool_with_the_same_bytes(tmp_path: Path) -> None:
         clips.clip(number)
         name = f"{number:06d}.npy"
         assert (clips.folder / name).read_bytes() == (two.folder / name).read_bytes()
+
+
+def test_a_clip_that_cannot_be_made_is_not_waited_for(tmp_path: Path) -> None:
+    """Of those that are queued, no process begins another."""
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(b"no film")
+    films = TINY.model_copy(update={"photographs": 3.0, "videos": 1.0, "video_files": (str(broken),)})
+    clips = pool(tmp_path / "clips", films, begin=40, most=40)
+    shares = [wanted(clips.settings, 7, number).source for number in range(40 + AHEAD)]
+    assert 0 < shares.index("videos") < 12
+    with pytest.raises(DataError, match=r"broken\.mp4"):
+        clips.fill(0, jobs=2)
+    assert len(list(clips.folder.glob("*.npy"))) < 20
 
 
 FILL = """
