@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import secrets
+import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +16,9 @@ import numpy as np
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import write_npy
 from vid2ev.untrusted import first_line, json_of
+
+HALF_WRITTEN = re.compile(r"\d+\.npy\.[0-9a-f]{16}\.new")  # by `write_clip`
+LEFT_S = 3600.0  # since the last byte of one that nobody writes any more: a clip is written in less than a second
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +73,23 @@ def write_clip(path: Path, clip: Clip) -> None:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def sound_clip(path: Path) -> Clip | None:
+    """A clip of a folder that is a cache: None where there is none, or, as after a crash of the machine, a part of one,
+    which is to be made again."""
+    try:
+        return read_clip(path)
+    except (FileNotFoundError, DataError):
+        return None
+
+
+def remove_half_written(folder: Path) -> None:
+    """Remove what killed processes were writing of clips; what is not old may be being written, by another machine."""
+    for path in folder.glob("*.npy.*.new"):
+        with suppress(OSError):
+            if HALF_WRITTEN.fullmatch(path.name) and time.time() - path.stat().st_mtime > LEFT_S:
+                path.unlink()
 
 
 def read_clip(path: Path) -> Clip:

@@ -2,8 +2,8 @@
 
     FOLDER/NAME/000123.npy     clip 123 of the settings, files, seed and version that NAME stands for
 
-The folder is a cache of a pure function and no more: whatever is missing is made again, so that nothing depends on who
-made a clip, when, or whether the process was killed meanwhile.
+The folder is a cache of a pure function and no more: whatever is missing, or damaged by a crash of the machine, is made
+again, so that nothing depends on who made a clip, when, or whether the process was killed meanwhile.
 
 Samples are drawn from a window of clips that slides: sample i sees clips low(i) to high(i) - 1,
 
@@ -20,7 +20,7 @@ from collections.abc import Callable
 from concurrent.futures import as_completed
 from pathlib import Path
 
-from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.clip import Clip, remove_half_written, sound_clip, write_clip
 from interp.data.inputs import known_by
 from interp.data.making import made
 from interp.data.settings import ClipSettings
@@ -73,14 +73,12 @@ class Pool:
         return range(max(0, high - self.most), high)
 
     def clip(self, number: int) -> Clip:
-        """A clip, made if it is not there.  Raises DataError where the folder cannot be written."""
-        path = self._path(number)
-        try:
-            return read_clip(path)
-        except FileNotFoundError:
+        """A clip, made if it is not there, or is none.  Raises DataError where the folder cannot be written."""
+        clip = sound_clip(self._path(number))
+        if clip is None:
             clip = made(self.settings, self.seed, number)
             self.keep(number, clip)
-            return clip
+        return clip
 
     def keep(self, number: int, clip: Clip) -> None:
         """Write the clip of a number.  Raises DataError where the folder cannot be written."""
@@ -124,11 +122,14 @@ class Pool:
                     report(done, len(missing))
 
     def remove_others(self, sample: int) -> None:
-        """Remove clips that samples from this one on do not need, or not soon."""
+        """Remove clips that samples from this one on do not need, or not soon, those that are none, and what was left
+        half written."""
         window = self.window(sample)
+        soon = range(window.start, window.stop + AHEAD)
         for path in self.folder.glob("*.npy"):
-            if path.stem.isdecimal() and int(path.stem) not in range(window.start, window.stop + AHEAD):
+            if path.stem.isdecimal() and (int(path.stem) not in soon or sound_clip(path) is None):
                 path.unlink(missing_ok=True)
+        remove_half_written(self.folder)
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:06d}.npy"

@@ -10,6 +10,7 @@ from interp.data.clip import Clip
 from interp.data.making import made
 from interp.data.settings import HELD_OUT, ClipSettings
 
+EACH = 4  # clips of a real video
 SEED = 0x5EED  # whatever the seed of the training; the draws have names of their own beside
 
 
@@ -19,7 +20,7 @@ def held_out(settings: ClipSettings) -> ClipSettings:
 
 
 def validation_clips(
-    settings: ClipSettings, count: int = 16, videos: Sequence[str | Path] = (), each: int = 4
+    settings: ClipSettings, count: int = 16, videos: Sequence[str | Path] = (), each: int = EACH
 ) -> list[Clip]:
     """Clips to validate with: `count` of scenes and photographs with textures that training does not see, and `each` of
     every real video, of which K - 1 of K frames are dropped.

@@ -10,7 +10,7 @@ from torch.utils.data import Dataset, default_collate
 
 from interp.data.ahead import Ahead
 from interp.data.chance import chance
-from interp.data.clip import Clip, read_clip, write_clip
+from interp.data.clip import Clip, remove_half_written, sound_clip, write_clip
 from interp.data.inputs import digests_of, known_by
 from interp.data.pool import VERSION, Pool, Report
 from interp.data.samples import Samples
@@ -18,7 +18,7 @@ from interp.data.sensor_ranges import SENSORS
 from interp.data.sequences import Sequences, clipped
 from interp.data.settings import ClipSettings
 from interp.data.tensors import as_tensor, tensors
-from interp.data.validation import validation_clips
+from interp.data.validation import EACH, validation_clips
 from interp.networks import make
 from interp.train.batches import Batch, Feed
 from interp.train.event_fed import EventFedLearner
@@ -30,6 +30,7 @@ from interp.train.learner import Learner
 from interp.train.schedule import Schedule
 from interp.train.true_flows import WithFlowBetween, WithFlows, with_flows
 from vid2ev.sensors.devices import CPU, Device
+from vid2ev.recording.disk import sync, writing
 
 WITHOUT_END = 1 << 40  # samples
 MEASURED_WITH = ("clean", "noisy")  # event sensors
@@ -106,13 +107,26 @@ def _known_by(job: Job, settings: ClipSettings) -> str:
 
 
 def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:
-    """The clips to validate with, from their folder if they are all there."""
-    whole = cache / "whole"
-    if whole.exists():  # (first: what is listed before may be less than that)
-        return [read_clip(path) for path in sorted(cache.glob("*.npy"))]
+    """The clips to validate with, from their folder if they are all there.  Raises DataError where it cannot be
+    written.
+
+    Its file `whole` says how many there are, once all are on the disk.
+    """
+    whole, count = cache / "whole", job.validation.clips + EACH * len(job.validation.videos)
+    said, paths = f"{count}\n".encode(), [cache / f"{number:04d}.npy" for number in range(count)]
+    if whole.is_file() and whole.read_bytes() == said:
+        clips = [clip for clip in map(sound_clip, paths) if clip]
+        if len(clips) == count:
+            return clips
     clips = validation_clips(settings, job.validation.clips, job.validation.videos)
-    cache.mkdir(parents=True, exist_ok=True)
-    for number, clip in enumerate(clips):
-        write_clip(cache / f"{number:04d}.npy", clip)
-    whole.touch()
+    with writing(cache):
+        cache.mkdir(parents=True, exist_ok=True)
+        whole.unlink(missing_ok=True)
+        remove_half_written(cache)
+        for path, clip in zip(paths, clips, strict=True):
+            write_clip(path, clip)
+            sync(path)
+        sync(cache)  # (before anything says that they are there)
+        whole.write_bytes(said)
+        sync(whole)
     return clips

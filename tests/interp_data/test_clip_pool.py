@@ -142,6 +142,32 @@ def test_a_clip_goes_through_its_file_unchanged(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["clip.npy"]
 
 
+@pytest.mark.parametrize("left", [0, 100, -1], ids=["nothing", "its beginning", "all but its end"])
+def test_what_a_crash_of_the_machine_leaves_of_a_clip_is_made_again(tmp_path: Path, left: int) -> None:
+    clips = pool(tmp_path, begin=1, most=1, fresh=0.0)
+    clips.fill(0)
+    whole = (clips.folder / "000000.npy").read_bytes()
+    for number in (0, 7):
+        (clips.folder / f"{number:06d}.npy").write_bytes(whole[:left])
+    assert clips.clip(0).about == made(TINY, 7, 0).about
+    assert (clips.folder / "000000.npy").read_bytes() == whole
+    reports: list[tuple[int, int]] = []
+    clips.fill(0, report=lambda done, of: reports.append((done, of)))
+    assert reports == [(1, 1)]
+    assert read_clip(clips.folder / "000007.npy").about == made(TINY, 7, 7).about
+
+
+def test_what_killed_processes_were_writing_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    clips = pool(tmp_path)
+    old, new, other = (clips.folder / f"000003.npy.{name}.new" for name in ("a" * 16, "b" * 16, "notes"))
+    for path in (old, new, other):
+        path.write_bytes(b"half")
+    for path in (old, other):
+        os.utime(path, (time.time() - 7200,) * 2)
+    clips.remove_others(0)
+    assert not old.exists() and new.exists() and other.exists()
+
+
 @pytest.mark.parametrize("content", [b"", b"no clip", b"\x93NUMPY\x01\x00v\x00"])
 def test_what_is_no_clip_is_named(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "000001.npy").write_bytes(content)

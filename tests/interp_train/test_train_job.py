@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+import torch
 from pydantic import ValidationError
 
 from interp.data.inputs import known_by
@@ -102,3 +104,40 @@ def test_clips_to_validate_with_are_those_of_the_job_whatever_others_have_left(t
         for _ in range(2):  # (made, and found again)
             sizes = [batch["truth"].shape[-2:] for _, batch in validation_of(job, tmp_path)]
             assert sizes == [(side, side)] * 2 * clips
+
+
+def damage(clips: list[Path], whole: Path) -> None:
+    clips[0].write_bytes(clips[0].read_bytes()[:200])
+
+
+def empty(clips: list[Path], whole: Path) -> None:
+    clips[1].write_bytes(b"")
+
+
+def lose(clips: list[Path], whole: Path) -> None:
+    clips[1].unlink()
+
+
+def say_nothing(clips: list[Path], whole: Path) -> None:
+    whole.write_bytes(b"")
+    clips[0].write_bytes(clips[1].read_bytes())
+
+
+@pytest.mark.parametrize("crash", [damage, empty, lose, say_nothing])
+def test_clips_to_validate_with_are_all_there_after_a_crash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, crash: Any
+) -> None:
+    small = ["clips.scenes=0.0", "clips.multiples=[4]", "clips.size=[32, 32]", "validation.clips=2"]
+    monkeypatch.setattr("interp.train.made_of.MEASURED_WITH", ("clean",))
+    synced: list[str] = []
+    monkeypatch.setattr(os, "fsync", lambda handle: synced.append(os.readlink(f"/proc/self/fd/{handle}")))
+    before = validation_of(Job.of(settings=small), tmp_path)
+    (cache,) = tmp_path.iterdir()
+    clips, whole = sorted(cache.glob("*.npy")), cache / "whole"
+    assert synced == [*map(str, [*clips, cache, whole])]
+    crash(clips, whole)
+    again = validation_of(Job.of(settings=small), tmp_path)
+    assert len(before) == len(again) == 2
+    for (_, one), (_, other) in zip(before, again, strict=True):
+        assert torch.equal(one["truth"], other["truth"]) and torch.equal(one["off_on"], other["off_on"])
+    assert [path.name for path in sorted(cache.iterdir())] == ["0000.npy", "0001.npy", "whole"]
