@@ -10,6 +10,7 @@ goes on draws what it would have drawn.
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from dataclasses import asdict
 from typing import Any
@@ -37,8 +38,8 @@ class Learner(LightningModule):
     skipped    steps whose gradients were not finite, so far
     table      mean scores of each group of clips, of the last validation, which was at step `validated_at`
                and took `validation_s`
-    best       the table of the validation that was best, and its step: of the mean PSNR of all groups, so that neither
-               scenes nor real clips, neither clean nor noisy sensors are given up for the rest
+    best       the table of the validation that was best, and its step: of the mean PSNR of all groups that have one,
+               so that neither scenes nor real clips, neither clean nor noisy sensors are given up for the rest
     """
 
     def __init__(self, network: nn.Module, recipe: Recipe, schedule: Schedule, features: Perceptual | None = None):
@@ -132,7 +133,7 @@ class Learner(LightningModule):
         self.log("step", float(self.trainer.global_step))
         for group, mean in self.table.items():
             self.log_dict(mean.named(f"validation/{group}."))
-        if not self.best[1] or overall(self.table) > overall(self.best[1]):
+        if is_better(self.table, self.best[1]):
             self.best = (self.validated_at, self.table)
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
@@ -155,9 +156,27 @@ def means(scores: list[tuple[str, list[Scores]]]) -> dict[str, Scores]:
     return {name: Scores.mean([one for group, each in scores if group == name for one in each]) for name in groups}
 
 
+def is_better(table: dict[str, Scores], best: dict[str, Scores]) -> bool:
+    """Whether a validation was better than the best so far, which is not if it has lost a number that the best has.
+
+    Raises DataError for one without any number.
+    """
+    here, there = ({group for group, scores in each.items() if not math.isnan(scores.psnr)} for each in (table, best))
+    mean = overall(table)
+    return not there or (there <= here and mean > overall(best))
+
+
 def overall(table: dict[str, Scores]) -> float:
-    """One number for a validation: the mean PSNR of all groups of clips [dB]."""
-    return sum(scores.psnr for scores in table.values()) / len(table)
+    """One number for a validation: the mean PSNR of all groups of clips that have one [dB].  Raises DataError if none
+    has."""
+    mean = Scores.mean([*table.values()]).psnr
+    if math.isnan(mean):
+        raise DataError(
+            f"clips to validate with ({', '.join(table) or 'none'}) have nothing to score, such as light beyond the"
+            " range of the frames: no validation is better than another; begin with more of them"
+            " (--set validation.clips=16)"
+        )
+    return mean
 
 
 def gathered(mine: list[Any]) -> list[Any]:

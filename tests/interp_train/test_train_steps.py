@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ from interp.methods import METHODS
 from interp.train.checkpoints import WholeFiles, read_checkpoint
 from interp.train.curves import read_curve
 from interp.train.frame_fed import FrameFedLearner
-from interp.train.learner import number_of
+from interp.train.learner import is_better, number_of
 from interp.train.recipe import Recipe
 from interp.train.schedule import Schedule
 from interp.train.scores import Scores
@@ -98,6 +99,34 @@ def test_the_weights_are_the_running_mean_where_it_was_best(tmp_path: Path) -> N
         same = [torch.equal(value, mean[f"network.{name}"]) for name, value in network.state_dict().items()]
         assert all(same) == (best == STEPS_OF_RUN)
         assert any(not torch.equal(mean[f"network.{n}"], mean[f"current.network.{n}"]) for n in network.state_dict())
+
+
+@pytest.mark.parametrize("without", [1, 2])
+def test_a_group_without_a_number_decides_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without: int
+) -> None:
+    """As clips of HDR light in which nothing lies beyond the range of the frames."""
+    real, numbers = FrameFedLearner.scored, [clip["truth"] for _, clip in clips(groups=2)[without:]]
+    nothing = Scores(math.nan, 0.5, math.nan, math.nan)
+
+    def scored(self: FrameFedLearner, clip: dict[str, torch.Tensor], images: torch.Tensor) -> list[Scores]:
+        found = real(self, clip, images)
+        return found if any(torch.equal(clip["truth"], truth) for truth in numbers) else [nothing] * len(found)
+
+    monkeypatch.setattr(FrameFedLearner, "scored", scored)
+    options = {"rate": 1e-4, "clip": 100.0, "groups": 2}
+    if without == 1:
+        assert session(tmp_path / "run", **options).best == STEPS_OF_RUN
+    else:
+        with pytest.raises(DataError, match=r"clips to validate with \(.*\) have nothing to score"):
+            session(tmp_path / "run", **options)
+
+
+def test_a_validation_that_loses_a_number_is_not_the_best() -> None:
+    one, better, none = (Scores(psnr, 0.9, psnr, psnr) for psnr in (20.0, 30.0, math.nan))
+    assert is_better({"a": better, "b": none}, {"a": one, "b": none})
+    assert not is_better({"a": better, "b": none}, {"a": one, "b": one})
+    assert is_better({"a": one, "b": one}, {}) and not is_better({"a": one}, {"a": one})
 
 
 def of_clip(network: torch.nn.Module, clip: dict[str, torch.Tensor]) -> list[Scores]:
