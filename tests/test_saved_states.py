@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from interp.evaluate import kept as kept_module
 from interp.evaluate.kept import Kept
+from interp.train import run_folder
 from interp.train.run_folder import RunFolder
 from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.outputs import Outputs
-from vid2ev.recording.disk import put_in_place
+from vid2ev.recording.disk import lock, put_in_place
 from vid2ev.recording.folder import partial_of
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -150,6 +153,54 @@ def test_what_a_kill_leaves_before_anything_has_begun_is_in_nobodys_way(tmp_path
     (tmp_path / "eval" / "job.json").unlink()
     with pytest.raises(UsageError, match="holds something else"):
         Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False)
+
+
+def test_what_cannot_be_begun_lets_others_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for _ in range(2):  # (a lock left behind would be in the way of the second)
+        with pytest.raises(DataError, match=r"gone\.safetensors|cannot be written"):
+            RunFolder(tmp_path / "run", {"a": 1}, resume=False, starts={"flow": tmp_path / "gone.safetensors"})
+    RunFolder(tmp_path / "run", {"a": 1}, resume=False).close()
+
+    def full(*_: object) -> bytes:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kept_module, "_line", full)
+        for _ in range(2):
+            with pytest.raises(DataError, match="No space left on device"):
+                Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False)
+    assert not (tmp_path / "eval").exists()
+
+
+def test_what_another_has_begun_until_the_folder_is_free_is_respected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs = {
+        tmp_path / "run" / "run.json": {"job": {"a": 2}},
+        tmp_path / "eval" / "job.json": {"a": 1, "methods": {"bridge": 2}},
+        tmp_path / "more" / "job.json": {"a": 1, "methods": {"bridge": 2}},
+    }
+    with Kept(tmp_path / "more", {"a": 1}, {"linear": 1}, resume=False):
+        pass
+
+    def waited_for(folder: Path) -> int:
+        for path, job in theirs.items():
+            if path.parent == folder:
+                path.write_text(json.dumps(job))
+        return lock(folder)
+
+    for module in (run_folder, kept_module):
+        monkeypatch.setattr(module, "lock", waited_for)
+    with pytest.raises(UsageError, match="holds a run; --resume"):
+        RunFolder(tmp_path / "run", {"a": 1}, resume=False)
+    with pytest.raises(UsageError, match="holds an evaluation; --resume"):
+        Kept(tmp_path / "eval", {"a": 1}, {"linear": 1}, resume=False)
+    with Kept(tmp_path / "more", {"a": 1}, {"linear": 1}, resume=True):
+        pass
+    run, evaluated, more = (json.loads(path.read_text()) for path in theirs)
+    assert run["job"] == {"a": 2} and evaluated["methods"] == {"bridge": 2}
+    assert more["methods"] == {"bridge": 2, "linear": 1}
+    assert not list(tmp_path.rglob("lock"))
 
 
 def test_less_than_nothing_cannot_have_been_evaluated(tmp_path: Path) -> None:

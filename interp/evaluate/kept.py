@@ -24,7 +24,7 @@ from typing import Any, get_type_hints
 
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, unlock, whole_file, writing
+from vid2ev.recording.disk import lock, undisturbed, unlock, whole_file, writing
 from vid2ev.recording.manifest import as_stated, difference
 from vid2ev.untrusted import json_of, read_text
 
@@ -100,30 +100,29 @@ class Kept(KeptRows):
     def __init__(self, folder: Path, job: Mapping[str, Any], methods: Mapping[str, Any], resume: bool):
         super().__init__(folder)
         wanted = json.loads(json.dumps({**job, "methods": methods}))
-        there = (folder / JOB).exists()
-        # (what is left of an evaluation that was killed before it had begun is no reason not to begin)
-        if folder.exists() and not there and {each.name for each in folder.iterdir()} - {"lock", f"{JOB}.new"}:
-            raise UsageError(f"{folder} holds something else; choose another folder with -o")
-        if there and not resume:
-            raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")
-        before = read_job(folder) if there else wanted
-        known = before["methods"]
-        shared = {name: of for name, of in wanted["methods"].items() if name in known}
-        begun, asked = (before | {"methods": {name: known[name] for name in shared}}, wanted | {"methods": shared})
-        if changed := difference(begun, asked):
-            raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
-        self._begins, self._makes_folder = not there, not folder.exists()
+        _known_methods(folder, wanted, resume)  # (before anything is written where something else is)
+        self._begins, self._makes_folder = False, not folder.exists()
         with writing(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            self._handle = lock(folder)
-            with whole_file(folder / JOB) as file:
-                file.write(_line(wanted | {"methods": known | wanted["methods"]}))
+            with undisturbed():
+                folder.mkdir(parents=True, exist_ok=True)
+                self._handle = lock(folder)
+            try:
+                known = _known_methods(folder, wanted, resume)  # (another may have begun there until now)
+                self._begins = not (folder / JOB).exists()
+                with whole_file(folder / JOB) as file:
+                    file.write(_line(wanted | {"methods": known | wanted["methods"]}))
+            except BaseException:
+                self._leave(nothing=self._begins)
+                raise
 
     def __enter__(self) -> Kept:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        nothing = kind is not None and self._begins and not any((self.folder / KEPT).rglob("*.jsonl"))
+        self._leave(nothing=kind is not None and self._begins and not any((self.folder / KEPT).rglob("*.jsonl")))
+
+    def _leave(self, nothing: bool) -> None:
+        """Let others at the folder, after `nothing` was done there as it was before."""
         for each in self.folder.iterdir() if nothing else ():
             if each.is_dir():
                 shutil.rmtree(each, ignore_errors=True)
@@ -133,6 +132,25 @@ class Kept(KeptRows):
         if nothing and self._makes_folder:
             with suppress(OSError):  # (somebody else has begun there meanwhile)
                 self.folder.rmdir()
+
+
+def _known_methods(folder: Path, wanted: Mapping[str, Any], resume: bool) -> dict[str, Any]:
+    """What decides the numbers of the methods that a folder knows.  Raises UsageError where it is taken, or was begun
+    with something else than is wanted."""
+    if not (folder / JOB).exists():
+        # (what is left of an evaluation that was killed before it had begun is no reason not to begin)
+        if folder.exists() and {each.name for each in folder.iterdir()} - {"lock", f"{JOB}.new"}:
+            raise UsageError(f"{folder} holds something else; choose another folder with -o")
+        return {}
+    if not resume:
+        raise UsageError(f"{folder} holds an evaluation; --resume goes on with it, or choose another with -o")
+    before = read_job(folder)
+    known: dict[str, Any] = before["methods"]
+    shared = {name: of for name, of in wanted["methods"].items() if name in known}
+    begun, asked = (before | {"methods": {name: known[name] for name in shared}}, {**wanted, "methods": shared})
+    if changed := difference(begun, asked):
+        raise UsageError(f"{folder} was begun with {changed}; --resume needs the same, or choose another with -o")
+    return known
 
 
 def read_job(folder: Path) -> dict[str, Any]:

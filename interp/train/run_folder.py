@@ -30,7 +30,7 @@ from typing import Any
 
 from interp.pretrained import OF_RUN
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, unlock, whole_file, writing
+from vid2ev.recording.disk import lock, undisturbed, unlock, whole_file, writing
 from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
@@ -58,21 +58,21 @@ class RunFolder:
         starts: Mapping[str, Path] = MappingProxyType({}),
     ):
         self.path, self.first = path, first
+        self._lock: int | None = None
         job = json.loads(json.dumps(job))
         if not first:  # (the process that leads has looked, and holds the folder)
             return
-        self._check(job, resume)
-        with writing(path, "make room or access there, or choose another folder with -o"):
-            path.mkdir(parents=True, exist_ok=True)
-            self._lock: int | None = lock(path)
-            for left in path.rglob("*.new"):  # (of files that were being written when a session was killed)
-                if self.clips not in left.parents:  # (those of another machine may be being written now)
-                    left.unlink(missing_ok=True)
-            if not resume:
-                for part, copy in self.starts(starts).items():
-                    with whole_file(copy) as file:
-                        file.write(starts[part].read_bytes())
-                self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
+        self._check(job, resume)  # (before anything is written where something else is)
+        try:
+            with writing(path, "make room or access there, or choose another folder with -o"):
+                with undisturbed():
+                    path.mkdir(parents=True, exist_ok=True)
+                    self._lock = lock(path)
+                self._check(job, resume)  # (another may have begun there until now)
+                self._begin(job, resume, starts)
+        except BaseException:
+            self.close()
+            raise
 
     def finished(self) -> dict[str, Any] | None:
         """How it came out; None until it is done."""
@@ -165,6 +165,18 @@ class RunFolder:
             for method, table in tables.items()
         }
         self._write("baselines.json", plain)
+
+    def _begin(self, job: Mapping[str, Any], resume: bool, starts: Mapping[str, Path]) -> None:
+        """Clear up after a session that was killed; write down what is trained."""
+        for left in self.path.rglob("*.new"):
+            if self.clips not in left.parents:  # (those of another machine may be being written now)
+                left.unlink(missing_ok=True)
+        if resume:
+            return
+        for part, copy in self.starts(starts).items():
+            with whole_file(copy) as file:
+                file.write(starts[part].read_bytes())
+        self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
 
     def _check(self, job: Mapping[str, Any], resume: bool) -> None:
         if self.path.exists() and not self.path.is_dir():
