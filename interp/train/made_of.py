@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,8 @@ from interp.train.job import EVENT_FED, Job
 from interp.train.learner import Learner
 from interp.train.schedule import Schedule
 from interp.train.true_flows import WithFlowBetween, WithFlows, with_flows
-from vid2ev.sensors.devices import CPU, Device
 from vid2ev.recording.disk import sync, writing
+from vid2ev.sensors.devices import CPU, Device
 
 WITHOUT_END = 1 << 40  # samples
 MEASURED_WITH = ("clean", "noisy")  # event sensors
@@ -55,7 +56,7 @@ def feed_of(
     device: Device = CPU,
     leads: bool = True,
 ) -> Feed:
-    """Samples from a step on, and clips to validate with.
+    """Samples from a step on, and clips to validate with; `close` of what is returned ends who makes clips.
 
     cache   a folder for clips; what is missing there is made again
     jobs    processes that make the first clips
@@ -64,13 +65,17 @@ def feed_of(
     """
     pool = Pool(cache, job.clips, job.recipe.seed, device=device, **job.window.model_dump())
     sample = step * job.recipe.batch
-    ahead = Ahead(pool, sample) if device.name != "cpu" and leads else None
-    if ahead:
-        ahead.fill(sample, report)
-    else:
-        pool.fill(sample, jobs, report)
-    validation = validation_of(job, cache / "validation")
-    return Feed(_samples(job, pool), validation, job.recipe.batch, workers, ahead)
+    with ExitStack() as undoing:  # (what fails here leaves no process that makes clips for nobody)
+        ahead = Ahead(pool, sample) if device.name != "cpu" and leads else None
+        if ahead:
+            undoing.callback(ahead.close)
+            ahead.fill(sample, report)
+        else:
+            pool.fill(sample, jobs, report)
+        validation = validation_of(job, cache / "validation")
+        feed = Feed(_samples(job, pool), validation, job.recipe.batch, workers, ahead)
+        undoing.pop_all()
+    return feed
 
 
 def _samples(job: Job, pool: Pool) -> Dataset[Batch]:

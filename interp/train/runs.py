@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import ExitStack
 from pathlib import Path
 
 from interp.train import told
@@ -61,15 +61,17 @@ def run(
             begin(learner, folder.starts(job.starts))
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = machines.spare(job.recipe.threads) if workers is None else workers
-        try:
-            with counting(quiet, CLIPS) as report:
-                feed = feed_of(job, folder.clips, step, spare, usable_cores(), report, clips_on, machines.first)
-            machines.check_clips(len(feed.validation))
-        except UsageError:
-            if not resume:
-                folder.give_up()
-            raise
-        with closing(feed):
+        with ExitStack() as fed:
+            try:
+                with counting(quiet, CLIPS) as report:
+                    feed = feed_of(job, folder.clips, step, spare, usable_cores(), report, clips_on, machines.first)
+                fed.callback(feed.close)
+                machines.check_clips(len(feed.validation))
+            except UsageError:
+                fed.close()  # (who still makes clips would put them where the folder was)
+                if not resume:
+                    folder.give_up()
+                raise
             outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:
             folder.finish(told.as_json(outcome))

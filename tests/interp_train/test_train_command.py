@@ -6,6 +6,7 @@ import json
 import re
 from multiprocessing import active_children
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from interp.train.batches import Feed
 from interp.train.job import Job
 from interp.train.machines import Machines
 from vid2ev.commands import Commands
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import write_codes
 from vid2ev.sensors.devices import Device
 
@@ -182,6 +184,33 @@ def test_training_has_its_clips_made_by_another_process(monkeypatch: pytest.Monk
     done = runs.run(job, tmp_path / "run", machines=alone, workers=0, quiet=True, clips_on=Device("simulated"))
     assert done.finished and not active_children()
     assert not (tmp_path / "run" / "clips").exists()
+
+
+@pytest.mark.long
+def test_who_makes_clips_ends_where_those_to_validate_with_cannot_be_made(tmp_path: Path) -> None:
+    from interp.train.made_of import feed_of
+
+    write_hsergb(tmp_path / "data" / "long", 20)
+    (tmp_path / "film.mp4").write_bytes(b"no film")
+    settings = [
+        "clips.size=[32,24]", "clips.scenes=0", "clips.photographs=0", "clips.recordings=1", "samples.size=16",
+        "window.begin=3", "window.most=4", "window.fresh=1.0", "validation.clips=1", "batch=2",
+    ]  # fmt: skip
+    job = Job.of("rrin-events-light", "tiny", settings, [], [str(tmp_path / "data")], [str(tmp_path / "film.mp4")], {})
+    with pytest.raises(DataError, match=r"film\.mp4"):
+        feed_of(job, tmp_path / "clips", 0, 0, 1, device=Device("simulated"))
+    assert not active_children()
+
+
+def test_who_makes_clips_ends_where_they_are_too_few_to_validate_with(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    ended: list[str] = []
+    ahead: Any = SimpleNamespace(close=lambda: ended.append("clips"))
+    monkeypatch.setattr(runs, "feed_of", lambda job, *_: Feed(Made(), clips(1), job.recipe.batch, 0, ahead))
+    with pytest.raises(UsageError, match="clips to validate with"):
+        runs.run(Job.of("rrin", settings=["batch=2"]), tmp_path / "run", machines=Machines(2, accelerator="cpu"))
+    assert ended == ["clips"]
 
 
 def test_recordings_that_give_no_clips_are_named_before_training(tmp_path: Path) -> None:
