@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 from vid2ev import Events, read_events
 from vid2ev.commands import batch, main
+from vid2ev.sources import many
 
 QUICK = ["--upsample", "none", "--threads", "1", "--fps", "100", "--no-preview"]
 
@@ -39,18 +40,18 @@ def vid2ev(*arguments: str) -> Result:
 
 
 def test_a_folder_stands_for_what_is_in_it() -> None:
-    assert batch.sources_in("clips") == [f"clips/{name}" for name in ("a9.npy", "a10.npy", "broken.mp4", "pictures")]
-    assert batch.sources_in("clips/pictures") == ["clips/pictures"]
-    assert batch.sources_in("clips/a9.npy") == ["clips/a9.npy"]
+    assert many.sources_in("clips") == [f"clips/{name}" for name in ("a9.npy", "a10.npy", "broken.mp4", "pictures")]
+    assert many.sources_in("clips/pictures") == ["clips/pictures"]
+    assert many.sources_in("clips/a9.npy") == ["clips/a9.npy"]
     Path("bare").mkdir()
-    assert batch.sources_in("bare") == ["bare"]  # (which is refused in words)
+    assert many.sources_in("bare") == ["bare"]  # (which is refused in words)
 
 
 def test_a_picture_beside_videos_is_none_of_them() -> None:
     shutil.copy("clips/pictures/0.png", "clips/cover.png")
-    assert "clips/broken.mp4" in batch.sources_in("clips") and "clips/cover.png" not in batch.sources_in("clips")
+    assert "clips/broken.mp4" in many.sources_in("clips") and "clips/cover.png" not in many.sources_in("clips")
     shutil.copy("clips/pictures/0.png", "clips/still.png")
-    assert batch.sources_in("clips") == ["clips"]  # (more pictures than videos: frames, with a preview of them)
+    assert many.sources_in("clips") == ["clips"]  # (more pictures than videos: frames, with a preview of them)
 
 
 def test_no_name_does_not_stand_for_the_folder_one_is_in() -> None:
@@ -203,4 +204,4 @@ def test_a_dry_run_of_many_says_what_is_planned() -> None:
 
 def test_standard_input_is_not_a_folder_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("-").mkdir()
-    assert batch.sources_in("-") == ["-"]
+    assert many.sources_in("-") == ["-"]

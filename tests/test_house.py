@@ -26,6 +26,7 @@ FLOORS = {
     "errors": 0,
     "cores": 0,
     "toml_text": 0,
+    "terminal": 0,
     "cluster": 1,
     "requests": 1,
     "untrusted": 1,
@@ -156,6 +157,14 @@ def test_a_client_uses_public_names_only(module: str) -> None:
         if isinstance(node, ast.ImportFrom) and package(node.module or "") == "vid2ev":
             parts = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
             assert not any(part.startswith("_") for part in parts), f"{module} imports {'.'.join(parts)}"
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if package(module) == "interp"])
+def test_only_commands_import_the_floor_of_commands(module: str) -> None:
+    """A library knows nothing of who calls it, whichever package it is of."""
+    nodes = [node for node in ast.walk(tree(module)) if isinstance(node, ast.stmt)]
+    above = {target for target in imports_of(nodes) if target.startswith(("vid2ev.commands", "vid2ev.gui"))}
+    assert not above or room(module) == "commands", f"{module} imports {', '.join(sorted(above))}"
 
 
 def test_imports_make_no_cycle() -> None:

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from vid2ev.commands import batch, main
+from vid2ev.commands import main
 from vid2ev.commands.live import Live
+from vid2ev.sources import many
 
 QUICK = ["--upsample", "none", "--fps", "100"]
 
@@ -53,16 +54,16 @@ def same_bytes(directory: str, names: list[str]) -> bool:
 
 
 def test_a_list_stands_for_its_lines() -> None:
-    assert batch.sources_in("list.txt") == ["clips/c0.npy", "clips/c1.npy", "clips/broken.mp4", "clips/c2.npy"]
+    assert many.sources_in("list.txt") == ["clips/c0.npy", "clips/c1.npy", "clips/broken.mp4", "clips/c2.npy"]
     Path("folders.txt").write_text("clips\n")
-    assert batch.sources_in("folders.txt") == batch.sources_in("clips")
+    assert many.sources_in("folders.txt") == many.sources_in("clips")
     Path("empty.txt").write_text("# nothing\n")
     Path("nested.txt").write_text("list.txt\n")
     for name, sentence in (("empty.txt", "names no videos"), ("nested.txt", "a list within a list")):
         result = vid2ev(name)
         assert result.exit_code == 2 and sentence in result.stderr
     Path("events.txt").write_text("32 24\n0.000001 3 4 1\n0.000002 3 5 0\n")
-    assert batch.sources_in("events.txt") == ["events.txt"]  # (which is refused in words)
+    assert many.sources_in("events.txt") == ["events.txt"]  # (which is refused in words)
 
 
 def test_two_workers_make_the_bytes_of_none_and_a_restart_goes_on() -> None:

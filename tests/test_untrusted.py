@@ -21,7 +21,6 @@ import torch
 from interp import weights
 from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
-from vid2ev.commands.batch import _listed, sources_in
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import open_events, recognise
 from vid2ev.light.picture_files import read_picture
@@ -38,6 +37,7 @@ from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.scene_file import read_scene
 from vid2ev.sensors.presets import load_sensor
 from vid2ev.sources import open_source
+from vid2ev.sources.many import _listed, sources_in
 from vid2ev.sources.motion import parse_motion
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.toml_text import parsed_toml

@@ -66,12 +66,13 @@ def dataset(
 
     from interp.data.dataset import write_dataset
     from interp.data.dataset_spec import DatasetSpec
-    from vid2ev.commands.batch import sources_in, table
+    from vid2ev.commands.batch import table
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import counting
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.cores import usable_cores
     from vid2ev.errors import UsageError, clause
+    from vid2ev.sources.many import sources_in
+    from vid2ev.terminal import counting
 
     workers = workers_of(options, usable_cores())
     found = tuple(source for video in videos for source in sources_in(video))

@@ -101,9 +101,10 @@ def evaluate(
     from interp.evaluate.simulated import Simulated
     from interp.methods import METHODS
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import counting, heard
+    from vid2ev.commands.progress import heard
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.sources import OPTIONS
+    from vid2ev.terminal import counting
 
     workers = workers_of(options)
     edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}

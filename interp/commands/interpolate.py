@@ -154,13 +154,13 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
 def _one(source: str, path: Path, quiet: bool, taken: Options, options: dict[str, Any]) -> dict[str, Any]:
     """Interpolate a source; returns the manifest."""
     from interp.interpolate.whole import interpolate as make
-    from vid2ev.commands import summary
+    from vid2ev.terminal import lines
 
     tell = None if quiet else lambda text: click.echo(f"by {text}")
     with kept(path), bar(quiet, FRAMES, " frames") as report:
         made = make(source, path, options=taken, report=report, told=tell, **options)
     if not quiet:
-        click.echo(summary.lines(_facts(path, made)))
+        click.echo(lines(_facts(path, made)))
     return made
 
 

@@ -10,19 +10,19 @@ def sources_in(source: str) -> list[str]:
     """What an argument stands for: itself, the recordings in a folder, its videos and folders of images, or what the
     lines of a list NAME.txt stand for.  Raises UsageError, DataError."""
     from interp.data.layouts import is_sequence, sequences_in
-    from vid2ev.commands import batch
     from vid2ev.errors import UsageError
+    from vid2ev.sources import many
 
     folder = Path(source)
     if not folder.is_dir():
-        found = batch.sources_in(source)
+        found = many.sources_in(source)
         return found if found == [source] else [each for line in found for each in sources_in(line)]
     if is_sequence(folder):
         return [source]
     try:
         recordings, unusable = sequences_in(folder)
     except UsageError:
-        return batch.sources_in(source)
+        return many.sources_in(source)
     return [*map(str, recordings), *unusable]
 
 

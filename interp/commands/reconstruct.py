@@ -73,9 +73,9 @@ def reconstruct(
     if as_json:
         click.echo(json.dumps(made, indent=2))
     elif not quiet:
-        from vid2ev.commands import summary
+        from vid2ev.terminal import lines
 
-        click.echo(summary.lines(_facts(path, made)))
+        click.echo(lines(_facts(path, made)))
 
 
 def keep_memory() -> bool:

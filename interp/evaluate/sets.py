@@ -16,6 +16,7 @@ from interp.evaluate.recordings import Recording
 from interp.evaluate.simulated import Simulated
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import SCENE_PREFIX, is_scene
+from vid2ev.sources.many import sources_in
 
 
 class Found(NamedTuple):
@@ -68,8 +69,6 @@ def _opened(place: str | Recorded, protocol: Protocol, name: str, simulated: Sim
 
 def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
     """Recordings, or films by what they are opened with; and what cannot be used."""
-    from vid2ev.commands.batch import sources_in
-
     if is_scene(dataset) or not Path(dataset).is_dir():
         return [dataset], {}
     try:

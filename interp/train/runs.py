@@ -15,11 +15,11 @@ from interp.train.machines import Machines
 from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import FINISHED, RunFolder
 from interp.train.starts import begin
-from vid2ev.commands.progress import counting
 from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import as_stated
 from vid2ev.sensors.devices import CPU, Device
+from vid2ev.terminal import counting
 
 CLIPS = "{percentage:3.0f}% {bar} clip {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left"
 

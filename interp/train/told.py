@@ -10,7 +10,7 @@ from typing import Any
 from interp.train.fit import Outcome
 from interp.train.job import Job
 from interp.train.scores import Scores
-from vid2ev.commands.summary import lines
+from vid2ev.terminal import lines
 
 COLUMNS = ("psnr", "ssim", "moving", "static")
 HEADS = ("PSNR", "SSIM", "moving", "static")

@@ -47,11 +47,11 @@ def compare(
     The distance is van Rossum's at 1 ms, per pixel and polarity: 0 is the same, 0.01 is 2 % of the events missing, 1 is
     nothing in common.  Timing errors are those of events that belong together, positive where A is late.
     """
-    from vid2ev.commands import summary
     from vid2ev.commands.progress import event_bar
     from vid2ev.compare.plots import plot as draw
     from vid2ev.compare.recordings import compare_recordings
     from vid2ev.compare.rigs import pairs
+    from vid2ev.terminal import lines
 
     cameras = pairs(recording, reference)
     pictures = _pictures(plot, list(cameras), overwrite)
@@ -63,7 +63,7 @@ def compare(
         numbers = {name: compared.as_dict() for name, compared in found.items()}
         click.echo(json.dumps(numbers.get("", {"cameras": numbers}), indent=2))
     else:
-        click.echo("\n\n".join(summary.lines(_facts(name, compared)) for name, compared in found.items()))
+        click.echo("\n\n".join(lines(_facts(name, compared)) for name, compared in found.items()))
     for name, picture in pictures.items():
         draw(found[name].comparison, picture)
 

@@ -186,6 +186,7 @@ def convert(
     from vid2ev.commands.progress import given
     from vid2ev.commands.splitting import split_among, split_of
     from vid2ev.commands.worker_options import workers_of
+    from vid2ev.sources.many import sources_in
 
     quiet |= as_json
     workers = workers_of(options)
@@ -194,7 +195,7 @@ def convert(
     if options["device"] == "cuda" and not quiet:
         _warn_without_gpu()
     options["seed"] = None if options["seed"] == "random" else options["seed"]
-    found = [source for video in videos for source in batch.sources_in(video)]
+    found = [source for video in videos for source in sources_in(video)]
     single = len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/")
     directory = Path(output) if output and single else conversion.default_directory(videos[0])
     if single and workers.scheduler is None and split is None:

@@ -23,6 +23,7 @@ def convert_one(
     from vid2ev.commands import summary
     from vid2ev.commands.dry_run import planned
     from vid2ev.commands.progress import bar, given, heard, kept
+    from vid2ev.terminal import lines
 
     budget = options["budget"]
     if budget is not None:
@@ -43,7 +44,7 @@ def convert_one(
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
         facts = [*summary.result_facts(manifest), *summary.file_facts(directory), *summary.speed_facts(manifest)]
-        click.echo(summary.lines(facts))
+        click.echo(lines(facts))
     return manifest
 
 

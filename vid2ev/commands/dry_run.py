@@ -16,6 +16,7 @@ def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[
     from vid2ev.recipe import Recipe
     from vid2ev.recording.folder import check_free
     from vid2ev.sensors.devices import device_for
+    from vid2ev.terminal import lines
 
     device = options.pop("device")
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
@@ -30,5 +31,5 @@ def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[
     files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
     facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
-    text = summary.lines([*facts, *([("threads", str(threads))] if threads else [])])
+    text = lines([*facts, *([("threads", str(threads))] if threads else [])])
     return described | {"outputs": outputs.describe()}, text

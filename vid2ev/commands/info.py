@@ -28,8 +28,9 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     Exit code 1 says that it cannot be read, 2 that there is no such file.
     """
     from vid2ev.commands import summary
-    from vid2ev.commands.batch import holds_pictures, is_list
     from vid2ev.formats import describe_events, holds_events, recognise
+    from vid2ev.sources.many import holds_pictures, is_list
+    from vid2ev.terminal import lines
 
     path = Path(file)
     if (path / "manifest.json").is_file():
@@ -55,7 +56,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
         found = {"path": file} | source.describe() | {"duration_expected_s": source.duration_expected_s}
         codes = [("codes", "of a sensor's ADC, not pictures")] if holds_adc_codes(path) else []
         facts = [("source", summary.source_text(found)), *codes, *(("warning", text) for text in source.warnings)]
-    click.echo(json.dumps(found, indent=2) if as_json else summary.lines(facts))
+    click.echo(json.dumps(found, indent=2) if as_json else lines(facts))
 
 
 def _opened(path: Path, file: str, options: dict[str, Any]) -> Source:

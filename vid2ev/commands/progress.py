@@ -15,6 +15,7 @@ from click.core import ParameterSource
 from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError
+from vid2ev.terminal import counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -108,30 +109,6 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
     finally:
         if shown is not None:
             shown.refresh()
-            shown.close()
-
-
-@contextmanager
-def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[..., None]]:
-    """A progress bar on a terminal; what this yields is told how many are done, of how many, and perhaps a name."""
-    from tqdm import tqdm
-
-    shown: tqdm | None = None
-
-    def report(done: int, count: int | None, name: str = "") -> None:
-        nonlocal shown
-        if shown is None:
-            shown = tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, **look)
-        shown.total = count
-        shown.set_postfix_str(name, refresh=False)
-        shown.update(done - shown.n)
-        if name:
-            shown.refresh()
-
-    try:
-        yield report
-    finally:
-        if shown is not None:
             shown.close()
 
 

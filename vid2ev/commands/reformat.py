@@ -31,6 +31,7 @@ def reformat(source: str, target: Path, as_json: bool, quiet: bool, **options: A
     from vid2ev.commands import summary
     from vid2ev.commands.progress import event_bar
     from vid2ev.reformat import reformat as make
+    from vid2ev.terminal import lines
 
     with event_bar(quiet) as report:
         made = make(source, target, report=report, **options)
@@ -43,4 +44,4 @@ def reformat(source: str, target: Path, as_json: bool, quiet: bool, **options: A
             ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.6g} s, {width}x{height} pixels"),
             *(("warning", text) for text in made["warnings"]),
         ]
-        click.echo(summary.lines(facts))
+        click.echo(lines(facts))

@@ -71,8 +71,8 @@ def render(events: str, output: Path | None, as_json: bool, quiet: bool, **optio
     Every event is shown once.  ON is amber, OFF is blue.  A film has a picture for each slice; FILE.png is a picture of
     all events from --start to --stop, or, with --by or without a window, of the slice with the most events.
     """
-    from vid2ev.commands import summary
     from vid2ev.commands.progress import event_bar
+    from vid2ev.terminal import lines
     from vid2ev.views.render import render as make
 
     with event_bar(quiet) as report:
@@ -80,7 +80,7 @@ def render(events: str, output: Path | None, as_json: bool, quiet: bool, **optio
     if as_json:
         click.echo(json.dumps(made, indent=2))
     elif not quiet:
-        click.echo(summary.lines(_facts(made)))
+        click.echo(lines(_facts(made)))
 
 
 def _default(events: str) -> Path:

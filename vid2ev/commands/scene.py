@@ -127,10 +127,10 @@ def _contents(options: dict[str, Any]) -> Contents:
 
 
 def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet: bool) -> Iterator[dict[str, Any]]:
-    from vid2ev.commands.progress import counting
     from vid2ev.scenes.folder import write_scene
     from vid2ev.scenes.source import SceneSource
     from vid2ev.scenes.world import World
+    from vid2ev.terminal import counting
 
     stem, seed, count = Path(file.name).stem, options["seed"], options["count"]
     output = options["output"] or Path(f"{stem}_scene" + "s" * (count is not None))

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-NAME = 10  # width of the names
 BEFORE_THE_SENSOR = ("view", "subframes")  # of a plan: what is made as it is needed, whatever is asked
-
-
-def lines(facts: Iterable[tuple[str, str]]) -> str:
-    """Facts under each other, their names in a column."""
-    facts = list(facts)
-    width = max(NAME, *(len(name) + 1 for name, _ in facts))
-    return "\n".join(f"{name:<{width}}{text}" for name, text in facts)
 
 
 def recipe_facts(recipe: Mapping[str, Any]) -> list[tuple[str, str]]:

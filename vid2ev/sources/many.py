@@ -1,0 +1,67 @@
+"""The many sources that one argument stands for: those in a folder, or in a list."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vid2ev.errors import UsageError
+from vid2ev.formats import recognise
+from vid2ev.light.recognise import head_of, natural, pictures_in
+from vid2ev.untrusted import read_lines
+
+CLIPS = {
+    ".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".wmv", ".flv", ".y4m", ".ogv", ".3gp",
+    ".mts", ".m2ts", ".gif", ".npy", ".npz",
+}  # fmt: skip
+ARRAYS = {".npy", ".npz"}
+
+LIST = ".txt"
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and is refused as what it is)
+
+
+def sources_in(video: str) -> list[str]:
+    """The sources that an argument stands for: itself, what a folder holds that is not of pictures (videos, arrays and
+    folders of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line.
+
+    Raises UsageError for a list without any, DataError for a list that cannot be read.
+    """
+    folder = Path(video)
+    if is_list(folder):
+        return [source for line in _listed(folder) for source in sources_in(line)]
+    if video == "-" or not folder.is_dir() or (folder / "manifest.json").exists():
+        return [video]
+    clips = [path for path in folder.iterdir() if _is_clip(path)]
+    films = sum(path.suffix.lower() not in ARRAYS for path in clips)
+    if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
+        return [video]
+    folders = [path for path in folder.iterdir() if path.is_dir() and holds_pictures(path)]
+    found = sorted(clips + folders, key=lambda path: natural(path.name))
+    return [str(path) for path in found] or [video]
+
+
+def _is_clip(path: Path) -> bool:
+    return path.suffix.lower() in CLIPS and path.is_file() and not path.stem.endswith("_timestamps")
+
+
+def holds_pictures(folder: Path) -> bool:
+    """Whether a folder has pictures in it."""
+    return bool(pictures_in(folder))
+
+
+def is_list(path: Path) -> bool:
+    """Whether a file named NAME.txt is a list: a text that holds no events."""
+    if path.suffix.lower() != LIST or not path.is_file():
+        return False
+    head = head_of(path)
+    return (b"\0" not in head or head.startswith(UTF_16)) and recognise(path) is None
+
+
+def _listed(path: Path) -> list[str]:
+    """The lines of a list but for empty ones and those that begin with #.  Raises DataError, UsageError."""
+    lines = [line.strip() for line in read_lines(path, "a list of videos, a line for each")]
+    found = [line for line in lines if line and not line.startswith("#")]
+    if not found:
+        raise UsageError(f"{path} names no videos; expected a line for each")
+    if inner := next((line for line in found if is_list(Path(line))), None):
+        raise UsageError(f"{path} names {inner}, a list within a list; expected videos and folders of them")
+    return found
