@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from forked import forks_of
 
-from vid2ev.recording.folder import partial_of
+from vid2ev.recording.destination import partial_of
 
 CLIP = "synthetic:moving-edge,size=48x32,fps=100,duration_s=0.16"
 RUN = """

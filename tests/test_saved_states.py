@@ -17,8 +17,8 @@ from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.outputs import Outputs
+from vid2ev.recording.destination import partial_of
 from vid2ev.recording.disk import lock, put_in_place
-from vid2ev.recording.folder import partial_of
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 

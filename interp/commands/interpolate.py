@@ -168,7 +168,7 @@ def _shared(
     paths: dict[str, Path], workers: Workers, quiet: bool, taken: Options, options: dict[str, Any]
 ) -> list[dict[str, Any]]:
     """Interpolate sources by workers."""
-    from interp.interpolate.shelf import check_free, kind_of
+    from interp.interpolate.destination import check_free, kind_of
     from vid2ev.commands import batch
 
     def check(_: str, path: Path) -> None:

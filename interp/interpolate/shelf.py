@@ -16,33 +16,31 @@ a method has to remember of the stretches before is kept beside (`keep`).
 from __future__ import annotations
 
 import json
-import operator
 import os
-import re
-import reprlib
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from types import MappingProxyType, TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 
+from interp.interpolate.destination import Kind, check_free, manifest_of
 from interp.interpolate.instants import TooFine
-from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.light.tags import tag_of
-from vid2ev.pictures.film import film_size, join_films, remarks_on_size, write_film
+from interp.interpolate.journal import Line, append_line, read_lines
+from interp.interpolate.pieces import Pieces
+from vid2ev.errors import DataError, Vid2evError
+from vid2ev.pictures.film import film_size, join_films, remarks_on_size
+from vid2ev.recording.destination import partial_of
 from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
-from vid2ev.recording.manifest import as_stated, difference, is_of_job, read_manifest, write_manifest
+from vid2ev.recording.manifest import difference, is_of_job, read_manifest, write_manifest
 from vid2ev.sources.images import FRAMES
-from vid2ev.untrusted import first_line, json_of, read_arrays, read_text
+from vid2ev.untrusted import first_line, read_arrays
 
-Kind = Literal["mp4", "png", "exr"]
 PIECE = 128  # pictures
-LATEST_US = 1 << 60
 REMEDY = "make room or access there, or choose another place with -o"
 
 
@@ -52,8 +50,9 @@ class Shelf:
     kind     mp4, a film; png or exr, a folder
     job      what decides the frames, for JSON
     write    writes light or codes to a path, of EXR; None: PNG of the codes
-    line     what the line of a stretch has beside its times: int or str
-    Raises UsageError where `output` is taken, or was begun with another job, DataError where it cannot be written.
+    line     what the line of a stretch has beside its times: int, bool or str
+    Raises UsageError where `output` is taken, or was begun with another job, DataError where it cannot be written, or
+    where something is missing of what is to be gone on with.
     """
 
     def __init__(
@@ -71,12 +70,13 @@ class Shelf:
         self.output, self.kind, self.rate = output, kind, rate
         self.job = json.loads(json.dumps(job))
         self.overwrite, self.resume = overwrite, resume
-        self.partial = output.with_name(f"{output.name}.partial")
+        self.partial = partial_of(output)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds all done
-        self.done: list[dict[str, Any]] = []
-        self._line = line
-        self._write, self._frames, self._pieces = write, self.partial / "frames", self.partial / "pieces"
-        self._whole = self.partial / "whole"
+        self.done: list[Line] = []
+        self._line = {**line, "memory": bool}
+        self._write, self._frames, self._whole = write, self.partial / "frames", self.partial / "whole"
+        self._journal = self.partial / "done.jsonl"
+        self._pieces = Pieces(self.partial / "pieces", rate, self.job["transfer"])
         self._lock: int | None = None
         self._begun = False
 
@@ -98,9 +98,14 @@ class Shelf:
     ) -> None:
         if self._lock is None:
             return
-        if self._begun and (not self.done or isinstance(error, TooFine)):
+        if not self._goes_on or isinstance(error, TooFine):
             shutil.rmtree(self.partial, ignore_errors=True)
         os.close(self._lock)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether there is something to go on with."""
+        return bool(self.done) if self._begun else (self.partial / "job.json").exists()
 
     @property
     def count(self) -> int:
@@ -129,22 +134,20 @@ class Shelf:
 
     def stretch(self, line: Mapping[str, Any], memory: Mapping[str, np.ndarray] | None = None) -> None:
         """All frames of a stretch are there: `t_us` of the line has their times."""
+        done = {**line, "memory": bool(memory)}
         sync(self._frames)
         if memory:
             with whole_file(self.partial / f"memory-{len(self.done) + 1}.npz") as file:
                 np.savez(file, allow_pickle=False, **memory)
-        with open(self.partial / "done.jsonl", "a", encoding="utf-8") as lines:
-            lines.write(json.dumps(line) + "\n")
-            lines.flush()
-            os.fsync(lines.fileno())
-        self.done.append(dict(line))
+        append_line(self._journal, done)
+        self.done.append(done)
         self._memory(len(self.done) - 1).unlink(missing_ok=True)
         self._encode(PIECE)
 
     def memory(self) -> dict[str, np.ndarray]:
-        """What was kept with the last stretch that is done."""
+        """What was kept with the last stretch that is done.  Raises DataError."""
         path = self._memory(len(self.done))
-        if not path.exists():
+        if not (self.done and self.done[-1]["memory"]):
             return {}
         try:
             return read_arrays(path)
@@ -173,7 +176,7 @@ class Shelf:
             if self.kind == "mp4":
                 self._encode(1)
                 film = self.partial / "film.mp4"
-                join_films(film, [(piece, first) for piece, first, _ in self._found()], self.rate)
+                join_films(film, [(piece, first) for piece, first, _ in self._pieces.found()], self.rate)
                 sync(film)
                 with whole_file(manifest_of(self.output, self.kind)) as file:
                     file.write((json.dumps(manifest, indent=2, allow_nan=False) + "\n").encode())
@@ -198,7 +201,7 @@ class Shelf:
             about_to_be_put, wanted = read_manifest(made_in), self.job
             if not difference({key: about_to_be_put.get(key) for key in wanted}, wanted):
                 self._whole.rename(self._frames)
-        if self.resume and job.exists() and self._frames.exists() and self._is_same(job):
+        if self.resume and job.exists() and self._is_same(job) and self._frames.exists():
             self._take_up()
             return
         if self.resume and self.output.exists() and made.exists() and self._is_same(made):
@@ -208,21 +211,22 @@ class Shelf:
             if path.name != "lock":
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         self._frames.mkdir()
-        self._pieces.mkdir()
+        self._pieces.folder.mkdir()
         with whole_file(job) as file:
             file.write(json.dumps(self.job, indent=2).encode())
 
     def _take_up(self) -> None:
-        journal = self.partial / "done.jsonl"
-        lines = journal.read_bytes().split(b"\n")[:-1] if journal.exists() else []  # (the rest was cut off in writing)
-        with as_stated(journal):
-            self.done = [_line_of(line, self._line) for line in lines]
-        with whole_file(journal) as file:
-            file.write(b"".join(line + b"\n" for line in lines))
-        encoded = max([stop for *_, stop in self._found()], default=0)
-        for path in self._frames.iterdir():
-            if not path.stem.isdecimal() or not encoded <= int(path.stem) < self.count:
-                path.unlink()
+        """Raises DataError unless each frame that is done is there, in a file of its own or in a piece."""
+        done = read_lines(self._journal, self._line)
+        count = sum(len(line["t_us"]) for line in done)
+        self._pieces.check(count)
+        wanted = {self._path(number) for number in range(self._pieces.stop, count)}
+        found = set(self._frames.iterdir())
+        if missing := wanted - found:
+            raise DataError(f"{min(missing)} is not there any more; --overwrite starts again")
+        for path in found - wanted:
+            path.unlink()
+        self.done = done
         self._encode(PIECE)
 
     def _is_same(self, path: Path) -> bool:
@@ -232,92 +236,15 @@ class Shelf:
         """Of a film, make a piece of the frames that wait, if there are so many."""
         if self.kind != "mp4":
             return
-        first = max([stop for *_, stop in self._found()], default=0)
-        stop = self.count
+        first, stop = self._pieces.stop, self.count
         if stop - first < least:
             return
-        aside = self.partial / "piece.mp4"
-        pictures = (_rgb(read_codes(self._path(number))) for number in range(first, stop))
-        write_film(aside, pictures, self.rate, tag_of(self.job["transfer"]))
-        sync(aside)
-        aside.replace(self._pieces / f"{first:06d}-{stop:06d}.mp4")
-        sync(self._pieces)
+        self._pieces.add((read_codes(self._path(number)) for number in range(first, stop)), first, stop)
         for number in range(first, stop):
             self._path(number).unlink()
-
-    def _found(self) -> list[tuple[Path, int, int]]:
-        """The pieces, in order, each with the number of its first frame and of the one after its last."""
-        named = ((path, re.fullmatch(r"(\d{6,12})-(\d{6,12})", path.stem)) for path in self._pieces.glob("*.mp4"))
-        return sorted([(path, int(of[1]), int(of[2])) for path, of in named if of], key=lambda piece: piece[1])
 
     def _path(self, number: int) -> Path:
         return self._frames / f"{number:06d}.{'exr' if self.kind == 'exr' else 'png'}"
 
     def _memory(self, count: int) -> Path:
         return self.partial / f"memory-{count}.npz"
-
-
-def _line_of(text: bytes, wanted: Mapping[str, type]) -> dict[str, Any]:
-    """A line of the journal.  Raises KeyError, TypeError, ValueError for what is none."""
-    line = json_of(text)
-    numbers = [*map(operator.index, line["t_us"])]
-    for key, kind in wanted.items():
-        if type(line[key]) is not kind:
-            raise TypeError(f"{key} = {reprlib.repr(line[key])}")
-        numbers += [line[key]] if kind is int else []
-    if any(abs(number) >= LATEST_US for number in numbers):
-        raise ValueError("times beyond all clocks")
-    return line
-
-
-def kind_of(output: Path | None, asked: str | None) -> Kind:
-    """What is made: as asked, or as the name says.  Raises UsageError if both differ."""
-    suffix = "" if output is None or output.is_dir() else output.suffix.lower()
-    if asked is None and suffix not in ("", ".mp4"):
-        raise UsageError(
-            f"{output}: '{suffix}' cannot be made; expected .mp4, or a folder's name without a dot, or --format png"
-        )
-    if asked is None:
-        return "mp4" if output is None or suffix else "png"
-    if asked not in ("mp4", "png", "exr") or (output is not None and (asked == "mp4") != (suffix == ".mp4")):
-        wanted = "a name that ends in .mp4" if asked == "mp4" else "the name of a folder"
-        raise UsageError(f"format {asked} to {output}: expected {wanted}, and mp4, png or exr")
-    return asked  # type: ignore[return-value]
-
-
-def manifest_of(output: Path, kind: str) -> Path:
-    """Where the manifest of an output is."""
-    return output.with_suffix(".json") if kind == "mp4" else output / FRAMES
-
-
-def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:
-    """Raise UsageError unless frames may be written to `output`; touches nothing."""
-    if kind != "mp4":
-        if output.name in ("", "..") or output.is_mount() or os.path.realpath(output) == os.getcwd():
-            raise UsageError(f"{output} cannot be renamed into place; give a folder within it, such as {output / 'x'}")
-        held = {path.name for path in output.iterdir()} if output.is_dir() else set()
-        ours = {"timestamps.txt", FRAMES}
-        if others := [name for name in held - ours if not (name[:-4].isdecimal() and name[-4:] in (".png", ".exr"))]:
-            raise UsageError(f"{output} holds other files ({min(others)}); choose another folder with -o")
-    begun = (output.with_name(f"{output.name}.partial") / "job.json").exists()
-    beside = manifest_of(output, kind)
-    if kind == "mp4" and beside.exists() and not (overwrite or _is_manifest(beside)):
-        raise UsageError(f"{beside} is to be the film's manifest, and is another file; choose another name with -o")
-    if output.exists() and not (overwrite or resume):
-        raise UsageError(f"{output} exists; --overwrite replaces it, -o chooses another place")
-    if begun and not (overwrite or resume):
-        raise UsageError(f"{output} was begun and not finished; --resume continues it, --overwrite starts again")
-    if output.exists() and resume and not overwrite and not begun and not beside.exists():
-        raise DataError(f"{output} has no manifest to go on by; --overwrite replaces it")
-
-
-def _is_manifest(path: Path) -> bool:
-    """Whether a file says of a film what `Shelf.publish` writes of one."""
-    try:
-        return "film_rate" in json_of(read_text(path))
-    except (OSError, ValueError, TypeError, DataError):
-        return False
-
-
-def _rgb(codes: np.ndarray) -> np.ndarray:
-    return codes if codes.ndim == 3 else np.repeat(codes[..., None], 3, axis=2)

@@ -16,12 +16,13 @@ import torch
 from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
+from interp.interpolate.destination import kind_of, manifest_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
 from interp.interpolate.of_still import OfStill
 from interp.interpolate.pictures import Pictures, film_rate
-from interp.interpolate.shelf import Shelf, kind_of, manifest_of
+from interp.interpolate.shelf import Shelf
 from interp.interpolate.stretches import Stretch, stretches
 from interp.interpolate.take import AS_IT_IS, Options, Take, open_take
 from interp.methods import open_method

@@ -11,9 +11,10 @@ from typing import Any
 
 from interp import pretrained
 from interp.interpolate.choice import device_of
+from interp.interpolate.destination import kind_of, manifest_of
 from interp.interpolate.instants import Number, parse_number
 from interp.interpolate.pictures import SLOWEST_HZ, Pictures, checked_play, of_film
-from interp.interpolate.shelf import Shelf, kind_of, manifest_of
+from interp.interpolate.shelf import Shelf
 from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
 from interp.reconstruct.made_good import MadeGood

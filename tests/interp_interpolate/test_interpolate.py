@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,10 @@ from interp.weights import save
 from vid2ev import open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import read_codes, write_codes
+
+
+def never(*_: object) -> None:
+    raise AssertionError("a frame is made")
 
 
 def made(folder: Path) -> list[np.ndarray]:
@@ -261,13 +266,50 @@ def test_a_file_of_somebody_else_is_not_replaced_by_the_manifest_of_a_film(tmp_p
     source, beside = images(tmp_path / "in", moving(2)), tmp_path / "clip.json"
     for text in ('{"mine": 1}', "no JSON", "[]"):
         beside.write_text(text)
-        for resume in (False, True):
+        for asked in ({}, {"resume": True}, {"overwrite": True}):
             with pytest.raises(UsageError, match=r"clip\.json is to be the film's manifest, and is another file"):
-                interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest", resume=resume)
+                interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest", **asked)
         assert beside.read_text() == text and len(list(tmp_path.iterdir())) == 2
-    interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest", overwrite=True)
+    beside.unlink()
+    interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest")
+    interpolate(source, tmp_path / "clip.mp4", multiple=3, method="nearest", overwrite=True)
     (tmp_path / "clip.mp4").unlink()
     interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest")  # (what is left of ours is no obstacle)
+
+
+@pytest.mark.parametrize("name", ["out", "out.mp4"])
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege there")
+def test_what_frames_cannot_take_the_place_of_is_refused_before_any_is_made(tmp_path: Path, name: str) -> None:
+    source, output = images(tmp_path / "in", moving(2)), tmp_path / name
+    output.symlink_to("elsewhere")
+    with pytest.raises(UsageError, match="is a link"):
+        interpolate(source, output, overwrite=True, report=never)
+    assert output.is_symlink()
+    output.unlink()
+    (tmp_path / f"{name}.partial").mkdir()
+    (tmp_path / f"{name}.partial" / "thesis.tex").touch()
+    with pytest.raises(UsageError, match="holds other files"):
+        interpolate(source, output, overwrite=True, report=never)
+    assert [path.name for path in (tmp_path / f"{name}.partial").iterdir()] == ["thesis.tex"]
+
+
+def test_a_file_where_a_folder_is_to_be_is_told_before_any_frame_is_made(tmp_path: Path) -> None:
+    source = images(tmp_path / "in", moving(2))
+    (tmp_path / "out").write_text("notes")
+    for asked in ({"overwrite": True}, {"resume": True, "overwrite": True}):
+        with pytest.raises(UsageError, match="out is a file"):
+            interpolate(source, tmp_path / "out", **asked, report=never)
+    assert (tmp_path / "out").read_text() == "notes" and len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("name", ["out", "out.mp4"])
+def test_what_was_made_of_another_job_is_refused_and_nothing_is_left_beside_it(tmp_path: Path, name: str) -> None:
+    source = images(tmp_path / "in", moving(2))
+    interpolate(source, tmp_path / name, multiple=2, method="nearest")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(UsageError, match="begun with grid"):
+        interpolate(source, tmp_path / name, multiple=3, method="nearest", resume=True, report=never)
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_folder_is_called_by_its_source_and_the_multiple_whatever_dots_these_have(

@@ -18,7 +18,7 @@ from interp.interpolate import shelf
 from interp.interpolate.whole import interpolate
 from interp.networks import make
 from interp.weights import save
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import write_codes
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
@@ -112,6 +112,30 @@ def test_what_was_cut_off_in_writing_does_not_count(tmp_path: Path) -> None:
     assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
 
 
+def test_what_is_missing_of_what_was_made_is_named_and_nothing_is_published(tmp_path: Path) -> None:
+    source = recording(tmp_path / "in", moving(6))
+    killed(source, tmp_path / "out", 11)
+    (tmp_path / "out.partial" / "frames" / "000002.png").unlink()
+    for _ in range(2):
+        with pytest.raises(DataError, match=r"000002\.png is not there any more; --overwrite starts again"):
+            interpolate(source, tmp_path / "out", multiple=3, resume=True)
+    assert not (tmp_path / "out").exists() and (tmp_path / "out.partial" / "frames" / "000003.png").exists()
+    assert interpolate(source, tmp_path / "out", multiple=3, overwrite=True)["frames"] == 16
+
+
+@pytest.mark.parametrize("piece", [0, 1])
+def test_a_piece_of_a_film_that_is_missing_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, piece: int
+) -> None:
+    monkeypatch.setattr(shelf, "PIECE", 8)
+    source = recording(tmp_path / "in", moving(9))
+    killed(source, tmp_path / "out.mp4", 20)
+    sorted((tmp_path / "out.mp4.partial" / "pieces").iterdir())[piece].unlink()
+    with pytest.raises(DataError, match=["frames 9 to 17 of 18 after the first 0", "000009.png is not there"][piece]):
+        interpolate(source, tmp_path / "out.mp4", multiple=3, resume=True)
+    assert not (tmp_path / "out.mp4").exists()
+
+
 @pytest.mark.parametrize("moment", ["publish", "put_in_place"])
 def test_killed_when_all_is_made_nothing_is_made_twice(
     tmp_path: Path, moment: str, monkeypatch: pytest.MonkeyPatch
@@ -199,6 +223,18 @@ def test_what_remembers_goes_on_with_what_it_knew(
         interpolate(source, tmp_path / "twice", report=stopped_at(at), **given)
     interpolate(source, tmp_path / "twice", resume=True, **given)
     assert bytes_of(tmp_path / "once") == bytes_of(tmp_path / "twice")
+
+
+def test_what_was_remembered_and_is_missing_is_named(tmp_path: Path) -> None:
+    save(tmp_path / "net.safetensors", "firenet", make("firenet"))
+    source = recording(tmp_path / "in", moving(4))
+    given: dict[str, Any] = {"multiple": 2, "network": tmp_path / "net.safetensors"}
+    with pytest.raises(Stopped):
+        interpolate(source, tmp_path / "out", report=stopped_at(5), **given)
+    (kept,) = (tmp_path / "out.partial").glob("memory-*.npz")
+    kept.unlink()
+    with pytest.raises(DataError, match=rf"{kept.name} cannot be read .*--overwrite starts again"):
+        interpolate(source, tmp_path / "out", resume=True, **given)
 
 
 def test_after_a_cut_nothing_is_remembered(tmp_path: Path) -> None:

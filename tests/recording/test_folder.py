@@ -11,8 +11,9 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.columns import EventColumns, column_files
+from vid2ev.recording.destination import partial_of
 from vid2ev.recording.disk import lock, unlock, whole
-from vid2ev.recording.folder import Folder, begun_job, check_free, partial_of
+from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
 

@@ -34,7 +34,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {
 @contextmanager
 def kept(directory: Path, again: bool = True) -> Iterator[None]:
     """What goes wrong within says so if it can be resumed; `again`: the source can be read again."""
-    from vid2ev.recording.folder import partial_of
+    from vid2ev.recording.destination import partial_of
 
     try:
         yield

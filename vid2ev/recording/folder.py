@@ -29,10 +29,11 @@ from typing import Any, Self
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.recording.destination import begun_at, check_folder, partial_of
 from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.stream.eager import EagerFile
-from vid2ev.untrusted import possible, read_arrays
+from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else
     r"events([_-]\w+)*\.\w+|frames(\.npz|\.mp4|\.csv)?|raw|preview\.mp4|frame_index\.csv|probe\.(csv|png)"
@@ -225,11 +226,6 @@ class Folder:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-def partial_of(directory: Path) -> Path:
-    """Where a recording is kept while it is made."""
-    return directory.parent / f"{directory.name}.partial"
-
-
 def begun_job(directory: Path) -> dict[str, Any]:
     """The job of a recording that was begun or finished; empty if there is none."""
     for path in (partial_of(directory) / "job.json", directory / "manifest.json"):
@@ -241,16 +237,7 @@ def begun_job(directory: Path) -> dict[str, Any]:
 def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
     """Raise UsageError unless a recording may be written to `directory`, DataError for a name that no folder can have;
     touches nothing."""
-    if not possible(str(directory)):
-        raise DataError(f"{str(directory)[:80]!r}: File name too long; give one that a folder can have with -o")
-    if directory.name in ("", "..") or directory.is_mount() or os.path.realpath(directory) == os.getcwd():
-        raise UsageError(
-            f"{directory} cannot be renamed into place; give a folder within it, such as {directory / 'events'}"
-        )
-    if directory.is_symlink():
-        raise UsageError(f"{directory} is a link, which would be replaced; give the folder it leads to, or another one")
-    if directory.exists() and not directory.is_dir():
-        raise UsageError(f"{directory} is a file; choose a folder with -o")
+    check_folder(directory)
     held = list(directory.iterdir()) if directory.is_dir() else []
     others = {path.name for path in held if not (_may_be_made(path) or _is_camera(path))}
     if others:
@@ -264,11 +251,7 @@ def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -
             f"{directory} has no manifest.json, as a recording has, and holds {held[0].name}; choose another folder"
             " with -o"
         )
-    partial = partial_of(directory)
-    begun = {path.name for path in partial.iterdir()} if partial.is_dir() else set()
-    if begun and not begun & {"job.json", "lock"}:
-        raise UsageError(f"{partial} is needed to work in, and holds other files; choose another folder with -o")
-    if "checkpoint.npz" in begun and not (overwrite or resume):
+    if "checkpoint.npz" in begun_at(directory) and not (overwrite or resume):
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")
 
 

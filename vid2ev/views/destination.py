@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError
+from vid2ev.recording.destination import check_folder
 from vid2ev.views.on_disk import SLICES
 
 
@@ -31,10 +31,7 @@ def check_free(output: Path, overwrite: bool = False) -> None:
 
 
 def _check_replaceable(folder: Path) -> None:
-    if folder.name in ("", "..") or folder.is_mount() or os.path.realpath(folder) == os.getcwd():
-        raise UsageError(f"{folder} cannot be renamed into place; give a folder within it, such as {folder / 'events'}")
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder} is a file; choose another name with -o")
+    check_folder(folder)
     held = {path.name for path in folder.iterdir()} if folder.exists() else set()
     others = {name for name in held if name != SLICES and not (name.endswith(".png") and name[:-4].isdigit())}
     if others:

@@ -1,0 +1,41 @@
+"""Where what is made is put when it is whole, and where it is kept until then; checked before anything is made."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from vid2ev.errors import DataError, UsageError
+from vid2ev.untrusted import possible
+
+
+def partial_of(path: Path) -> Path:
+    """Where a folder or a file is kept while it is made."""
+    return path.parent / f"{path.name}.partial"
+
+
+def check_destination(path: Path) -> None:
+    """Raise UsageError for a link and for a place that nothing can be renamed to, DataError for a name that no file can
+    have; touches nothing."""
+    if not possible(str(path)):
+        raise DataError(f"{str(path)[:80]!r}: File name too long; give one that a folder can have with -o")
+    if path.name in ("", "..") or path.is_mount() or os.path.realpath(path) == os.getcwd():
+        raise UsageError(f"{path} cannot be renamed into place; give a folder within it, such as {path / 'events'}")
+    if path.is_symlink():
+        raise UsageError(f"{path} is a link, which would be replaced; give what it leads to, or another place")
+
+
+def check_folder(folder: Path) -> None:
+    """`check_destination` of what becomes a folder, for which a file is in the way."""
+    check_destination(folder)
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is a file; choose a folder with -o")
+
+
+def begun_at(path: Path) -> set[str]:
+    """The names of what is there of something that was begun.  Raises UsageError where others have that folder."""
+    partial = partial_of(path)
+    begun = {each.name for each in partial.iterdir()} if partial.is_dir() else set()
+    if begun and not begun & {"job.json", "lock"}:
+        raise UsageError(f"{partial} is needed to work in, and holds other files; choose another folder with -o")
+    return begun
