@@ -23,6 +23,8 @@ SAME_US = 1
 FASTEST_HZ = 100_000
 MOST = 10_000
 FINEST = 1001  # denominators of rates
+LARGEST = 10**15
+LONGEST, FARTHEST = 100, 999  # characters of a number, and its exponent
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,11 +153,25 @@ class Rate:
 
 
 def parse_number(text: Number, option: str) -> Fraction:
-    """A number as people write it: 32, 2.5, 30000/1001.  Raises UsageError."""
+    """A number as people write it: 32, 2.5, 30000/1001.  Raises UsageError, also for one that nobody means."""
+    if isinstance(text, Fraction) and abs(text) <= LARGEST:
+        return text
+    said = str(text).strip()
     try:
-        return Fraction(str(text).strip())
+        number = Fraction(said) if _is_short(said) else None
     except (ValueError, ZeroDivisionError):
-        raise UsageError(f"{option} {text}: expected a number, such as 32, 2.5 or 30000/1001") from None
+        raise UsageError(f"{option} {said}: expected a number, such as 32, 2.5 or 30000/1001") from None
+    if number is None or abs(number) > LARGEST:
+        raise UsageError(
+            f"{option} {said[:LONGEST]}: expected a number from 1e-{FARTHEST} to {LARGEST:g}, such as 32, 2.5 or"
+            " 30000/1001"
+        )
+    return number
+
+
+def _is_short(said: str) -> bool:
+    """Whether a number has few digits, also as a fraction: 1e1000000000 has as many.  Raises ValueError for none."""
+    return len(said) <= LONGEST and abs(int(said.lower().partition("e")[2] or 0)) <= FARTHEST
 
 
 def rate_of(exact: Fraction) -> Fraction:

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from interp.interpolate.instants import SAME_US, Grid, Instant, Rate, Times, parse_number
+from interp.interpolate.instants import SAME_US, Grid, Instant, Number, Rate, Times, parse_number
 from vid2ev.errors import UsageError
 
 KEYS = [round(Fraction(10**6 * k, 30)) for k in range(61)]  # 2 s of 30 frames a second
@@ -54,6 +54,26 @@ def test_a_rate_is_kept_to_the_microsecond_and_meets_key_frames(rate: Fraction, 
 def test_frames_of_uneven_times_are_divided_gap_by_gap() -> None:
     found = all_of(Times(Fraction(2)), [0, 10, 1000, 1001 * 1000])
     assert [each.t_us for each in found] == [0, 5, 10, 505, 1000, 501000, 1001000]
+
+
+@pytest.mark.parametrize("text", ["1e400", "-1e400", "1e1000000000", "1E-1000000000", "9" * 5000, 10**400, 1e300])
+def test_numbers_beyond_all_meaning_are_refused_in_a_short_sentence(text: Number) -> None:
+    with pytest.raises(UsageError, match=r"--fps -?[19][\de.E+-]*: expected a number from 1e-999 to 1e\+15") as refused:
+        parse_number(text, "--fps")
+    assert len(str(refused.value)) < 250 and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["1e", "e5", "1e5e5", "one", "1/0", "", "nan", "-inf", "1e5/3"])
+def test_what_is_no_number_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="expected a number, such as 32"):
+        parse_number(text, "-x")
+
+
+def test_numbers_are_what_they_say() -> None:
+    small = Fraction(1, 10**400)
+    said = {"1e-400": small, small: small, " 2.5e1 ": 25, "30000/1001": Fraction(30000, 1001), "1_0E0_2": 1000}
+    assert {text: parse_number(text, "-x") for text in said} == said
+    assert parse_number(Fraction(0.1), "-x") == Fraction(0.1) and parse_number(29.97, "-x") == Fraction(2997, 100)
 
 
 def test_what_cannot_be_meant_is_refused() -> None:
