@@ -103,12 +103,12 @@ class OfSource:
 
 def _is_grey(about: dict[str, Any]) -> bool:
     if about.get("kind") == "images":
-        from vid2ev.light.picture_files import read_picture
+        from vid2ev.light.grey import is_grey
         from vid2ev.light.recognise import pictures_in
 
         path = Path(about["path"])
         pictures = pictures_in(path) if path.is_dir() else [path]
-        return all(read_picture(file).pixels.ndim == 2 for file in pictures)  # (the first one in colour ends it)
+        return all(map(is_grey, pictures))
     return str(about.get("pixel_format", "")).startswith("gray")
 
 

@@ -9,6 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -21,7 +22,7 @@ from interp.interpolate.choice import choice
 from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Instant
 from interp.interpolate.pictures import SLOWEST_HZ, Pictures
-from interp.interpolate.take import Options
+from interp.interpolate.take import Options, open_take
 from interp.networks import make
 from interp.own_codes import shown
 from interp.representation.carried import footprint_of
@@ -124,8 +125,6 @@ def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
 
 
 def test_a_part_begins_and_ends_at_frames(tmp_path: Path) -> None:
-    from interp.interpolate.take import Options
-
     frames = moving(6)
     for name, source in (("a", images(tmp_path / "a", frames)), ("b", recording(tmp_path / "b", frames))):
         options = Options(start_s=STEP_US / 1e6, stop_s=3.5 * STEP_US / 1e6)
@@ -372,6 +371,14 @@ def test_a_grey_picture_among_coloured_ones_takes_no_colours(tmp_path: Path, gre
     interpolate(source, tmp_path / "out", multiple=2, method="linear")
     for frame, found in zip(shown, made(tmp_path / "out")[::2], strict=True):
         np.testing.assert_array_equal(found, frame if frame.ndim == 3 else np.repeat(frame[..., None], 3, axis=2))
+
+
+def test_grey_pictures_are_not_read_to_know_that_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, read = images(tmp_path / "in", [frame[..., 0].copy() for frame in moving(5)]), cv2.imread
+    asked: list[str] = []
+    monkeypatch.setattr(cv2, "imread", lambda path, *rest: asked.append(path) or read(path, *rest))
+    assert open_take(folder, Options()).channels == 1
+    assert {Path(path).name for path in asked} == {"000000.png"}
 
 
 def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

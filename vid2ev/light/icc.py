@@ -6,6 +6,7 @@ JPEG); ICC.1:2001-04, 6.5.17 (texts before 2010).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -35,18 +36,24 @@ def remarks_on_profile(path: Path, name: str | None) -> list[str]:
     return [f"{path}: its ICC profile {name!r} is not read; its codes are taken for sRGB, {REMEDY}"]
 
 
-def _of_jpeg(file: BinaryIO) -> bytes:
-    """The first part of it."""
-    at = 2
+def jpeg_parts(file: BinaryIO) -> Iterator[tuple[int, int]]:
+    """The parts of a JPEG before its pixels: the mark, and where the part ends; the file is at its content."""
+    end = 2
     for _ in range(MANY):
-        file.seek(at)
+        file.seek(end)
         mark = file.read(4)
         if len(mark) < 4 or mark[0] != 0xFF or mark[1] in (0xD9, 0xDA):  # (pixels follow)
-            return b""
-        at += 2 + int.from_bytes(mark[2:])
-        if mark[1] == 0xE2 and file.read(len(IN_JPEG)) == IN_JPEG:
+            return
+        end += 2 + int.from_bytes(mark[2:])
+        yield mark[1], end
+
+
+def _of_jpeg(file: BinaryIO) -> bytes:
+    """The first part of it."""
+    for mark, end in jpeg_parts(file):
+        if mark == 0xE2 and file.read(len(IN_JPEG)) == IN_JPEG:
             file.read(2)
-            return file.read(min(max(at - file.tell(), 0), LARGEST))
+            return file.read(min(max(end - file.tell(), 0), LARGEST))
     return b""
 
 
