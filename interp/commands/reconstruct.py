@@ -29,7 +29,10 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
     help="A high-pass filter in place of a network: what changes more slowly fades to grey.  [default: 1]",
 )  # fmt: skip
 @click.option("--fps", metavar="RATE", help="Pictures per second of the scene's time.  [default: 30]")
-@click.option("--events-per-frame", type=int, metavar="N", help="A picture after each N events, instead.")
+@click.option(
+    "--events-per-frame", type=int, metavar="N",
+    help="A picture after each N events, instead; one of each microsecond at most.",
+)  # fmt: skip
 @click.option(
     "--format", type=click.Choice(["mp4", "png", "exr"]),
     help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",

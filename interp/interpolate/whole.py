@@ -75,7 +75,8 @@ def interpolate(
     cuts       hold: nothing is interpolated across a cut; keep: cuts are not looked for
     device     cpu, cuda or auto
     running    with how many bits a network is run, and whether torch compiles it
-    resume     go on where an interrupted run was, to the same bytes; what is finished is left as it is
+    resume     go on where an interrupted run was, on the same kind of device, to the same bytes; what is finished is
+               left as it is
     report     told how many frames are done, of how many
     told       told in one sentence which method was chosen, and why
 
@@ -95,6 +96,7 @@ def interpolate(
         "part": {"start_s": options.start_s, "stop_s": options.stop_s},
         "grid": grid.describe(),
         "interpolation": ready.about,
+        "device": where.type,
         "hdr": ready.after and ready.after.about,
         "tiles": fill.tiling.describe(),
         "cuts": cuts,

@@ -9,6 +9,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from interp import pretrained
 from interp.interpolate.choice import device_of
 from interp.interpolate.destination import kind_of, manifest_of
@@ -71,13 +73,14 @@ def reconstruct(
     network     weights (`interp.pretrained.path_of`) of E2VID or FireNet; by default those that come with vid2ev, if
                 any do, or else a high-pass
                 filter, which `cutoff_hz` asks for, too (`high_pass.py`)
-    fps         pictures per second, 30 by default; or `events_per_frame`
+    fps         pictures per second, 30 by default; or `events_per_frame`, which are more where that many fall into one
+                microsecond, of which there is one picture
     play        pictures per second of the film; by default in real time, or 30 where pictures are of so many events
     start_s, stop_s   the part to take [s after the beginning]; nothing is known of what was before
     contrast    what an OFF and an ON event stand for [nat]; by default what the recording says, or else 0.15
     refractory_us   how long a pixel is blind after an event, by default what the recording says; 0 for not at all.
                 What it missed then is made good (`made_good.py`)
-    resume      go on where an interrupted run was, to the same bytes
+    resume      go on where an interrupted run was, on the same kind of device, to the same bytes
     report      told how many events were taken in, of how many
 
     All of the file is read in blocks; memory depends on the sensor's size alone; with `events_per_frame` on that, and
@@ -133,16 +136,22 @@ def reconstruct(
 
 
 def slices(made_by: Reconstructor, recording: Recording, slicing: Slicing, skip: int = 0) -> Iterator[Seen]:
-    """Take in a recording, slice by slice; the first `skip` slices are only counted."""
-    number, count = 0, 0
+    """Take in a recording, slice by slice; the first `skip` slices are only counted.
+
+    Slices that end within one microsecond are one: pictures have times, and each is after the one before.
+    """
+    number, count, start_us, seen = 0, 0, recording.start_us, None
     for piece in slicing.pieces(recording):
+        if seen and piece.stop_us > seen.stop_us:
+            if number >= skip:
+                yield seen
+            number, start_us = number + 1, piece.start_us
         count += len(piece.events)
+        seen = Seen(piece.stop_us, count)
         if number >= skip:
-            made_by.add(piece.events, piece.start_us, piece.stop_us)
-        if piece.last:
-            number += 1
-            if number > skip:
-                yield Seen(piece.stop_us, count)
+            made_by.add(piece.events, start_us, piece.stop_us)
+    if seen and number >= skip:
+        yield seen
 
 
 def _make(
@@ -214,7 +223,7 @@ def _remarks(path: Path, file: EventFile, recording: Recording) -> list[str]:
 
 
 def _choice(
-    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], sensor: Sensor, device: Any
+    network: str | Path | None, cutoff_hz: float | None, size: tuple[int, int], sensor: Sensor, device: torch.device
 ) -> tuple[Reconstructor, str, dict[str, Any]]:
     """What makes the pictures, why, and what it is, for JSON."""
     if network and cutoff_hz is not None:
@@ -225,7 +234,8 @@ def _choice(
     about: dict[str, Any]
     if path:
         why = "as asked" if asked else "the network that comes with vid2ev"
-        made_by, about = OfNetwork(path, size, sensor.contrast, device), {"network": str(path), "sha256": sha256(path)}
+        made_by = OfNetwork(path, size, sensor.contrast, device)
+        about = {"network": str(path), "sha256": sha256(path), "device": device.type}
     else:
         why = "as asked" if asked else "the best that needs no training"
         cutoff = CUTOFF_HZ if cutoff_hz is None else cutoff_hz

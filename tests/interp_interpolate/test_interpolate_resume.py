@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -235,6 +236,16 @@ def test_what_was_remembered_and_is_missing_is_named(tmp_path: Path) -> None:
     kept.unlink()
     with pytest.raises(DataError, match=rf"{kept.name} cannot be read .*--overwrite starts again"):
         interpolate(source, tmp_path / "out", resume=True, **given)
+
+
+def test_what_was_begun_on_another_device_is_not_gone_on_with(tmp_path: Path) -> None:
+    source = images(tmp_path / "in", moving(4))
+    with pytest.raises(Stopped):
+        interpolate(source, tmp_path / "out", multiple=2, report=stopped_at(5))
+    job = tmp_path / "out.partial" / "job.json"
+    job.write_text(json.dumps(json.loads(job.read_text()) | {"device": "cuda"}))
+    with pytest.raises(UsageError, match='begun with device = "cuda", not "cpu"; --resume needs the options'):
+        interpolate(source, tmp_path / "out", multiple=2, resume=True)
 
 
 def test_after_a_cut_nothing_is_remembered(tmp_path: Path) -> None:

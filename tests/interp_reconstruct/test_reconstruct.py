@@ -219,6 +219,65 @@ def test_killed_it_goes_on_to_the_same_bytes(tmp_path: Path, network: str, at: i
             assert (tmp_path / "once" / file).read_bytes() == (tmp_path / "twice" / file).read_bytes()
 
 
+class Stopped(Exception):
+    pass
+
+
+def stopped_after(pictures: int) -> Any:
+    coming = iter(range(1, pictures))
+
+    def report(*_: object) -> None:
+        if next(coming, None) is None:
+            raise Stopped
+
+    return report
+
+
+def test_what_a_network_began_on_another_device_is_not_gone_on_with(tmp_path: Path) -> None:
+    save(tmp_path / "net.safetensors", "firenet", make("firenet"))
+    path = written(tmp_path / "a.npz", drawn())
+    given: dict[str, Any] = {"fps": 40, "network": tmp_path / "net.safetensors"}
+    with pytest.raises(Stopped):
+        reconstruct(path, tmp_path / "out", report=stopped_after(AT_ONCE + 1), **given)
+    kept = tmp_path / "out.partial" / "job.json"
+    job = json.loads(kept.read_text())
+    job["reconstruction"]["device"] = "cuda"
+    kept.write_text(json.dumps(job))
+    with pytest.raises(UsageError, match=r'begun with reconstruction\.device = "cuda", not "cpu"'):
+        reconstruct(path, tmp_path / "out", resume=True, **given)
+
+
+def crowded() -> Events:
+    """Fifty events in each of 40 microseconds, of which the first is that in which the recording begins."""
+    some = drawn(2000)
+    return Events(25_000 * (np.arange(2000) // 50).astype(np.int64), some.x, some.y, some.p)
+
+
+@pytest.mark.parametrize("blind_us", [0, 2000])
+@pytest.mark.parametrize("network", ["", "firenet"])
+def test_of_slices_that_end_in_one_microsecond_there_is_one_picture(
+    tmp_path: Path, network: str, blind_us: int
+) -> None:
+    weights = tmp_path / "some.safetensors" if network else None
+    if weights:
+        save(weights, network, make(network))
+    path = written(tmp_path / "a.npz", crowded(), us=975_000)
+    given: dict[str, Any] = {"network": weights, "cutoff_hz": None if network else 1, "refractory_us": blind_us}
+    made = reconstruct(path, tmp_path / "many", events_per_frame=10, **given)
+    times = [frame.t_ns // 1000 for frame in open_source(tmp_path / "many").frames()]
+    assert made["frames"] == len(times) == 40 and times == [25_000 * k for k in range(40)]
+    reconstruct(path, tmp_path / "once", events_per_frame=50, **given)
+    with pytest.raises(Stopped):
+        reconstruct(path, tmp_path / "on", events_per_frame=10, report=stopped_after(AT_ONCE + 2), **given)
+    told = reconstruct(path, tmp_path / "on", events_per_frame=10, resume=True, **given)
+    assert told["run"]["frames"] == 40 - AT_ONCE
+    for file in os.listdir(tmp_path / "many"):
+        if file != "frames.json":
+            content = (tmp_path / "many" / file).read_bytes()
+            assert content == (tmp_path / "on" / file).read_bytes()
+            assert content == (tmp_path / "once" / file).read_bytes()  # (slices of fifty have all of a microsecond)
+
+
 def test_the_size_that_is_said_is_that_of_what_was_made(tmp_path: Path) -> None:
     """Films have even sides."""
     path = written(tmp_path / "a.npz", drawn(), size=(41, 25))
