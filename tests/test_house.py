@@ -27,6 +27,7 @@ FLOORS = {
     "cores": 0,
     "toml_text": 0,
     "terminal": 0,
+    "stamps": 0,
     "cluster": 1,
     "requests": 1,
     "untrusted": 1,

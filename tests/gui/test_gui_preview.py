@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
@@ -123,6 +124,62 @@ def test_a_file_that_is_written_again_is_another_light(tmp_path: Path) -> None:
     again = table.light(setup, 0.0, 0.02)
     levels = [float(light.instants[0].frames[0].light.mean()) for light in (first, again)]
     assert levels == pytest.approx([0.2, 0.7]) and duration_s(setup) == pytest.approx(1.0, rel=0.05)
+
+
+def grey(path: Path, code: int) -> None:
+    assert cv2.imwrite(str(path), np.full((20, 30, 3), code, np.uint8))
+
+
+def levels_of(setup: Setup, again: Callable[[], Any]) -> tuple[float, float]:
+    """The mean light of a preview, before and after a change on disk."""
+    table = LightTable()
+    first = table.light(setup, 0.0, 0.02).instants[0].frames[0].light.mean()
+    again()
+    return float(first), float(table.light(setup, 0.0, 0.02).instants[0].frames[0].light.mean())
+
+
+def test_a_folder_whose_images_are_written_again_is_another_light(tmp_path: Path) -> None:
+    for k in range(3):
+        grey(tmp_path / f"{k}.png", 60)
+    setup = setup_of(str(tmp_path)).with_option("fps", 30.0)
+    first, then = levels_of(setup, lambda: [grey(tmp_path / f"{k}.png", 200) for k in range(3)])
+    assert then > 5 * first
+
+
+def test_maps_of_depth_that_are_written_again_are_another_light(tmp_path: Path) -> None:
+    clip, depth = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.1", tmp_path / "depth"
+    depth.mkdir()
+    np.save(depth / "0.npy", np.full((48, 64), 2.0, np.float32))
+    setup = Setup(clip, default_rig(), options={"depth": f"{depth},scale=1"})
+    setup = setup.with_camera_values(0, {"translation_mm": (30.0, 0.0, 0.0)})
+    first, then = levels_of(setup, lambda: np.save(depth / "0.npy", np.full((48, 64), 0.1, np.float32)))
+    assert first != then
+
+
+MESH = "mtllib m.mtl\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\n"
+MESH = f"{MESH}f 1/1 3/3 2/2\nf 1/1 4/4 3/3\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+
+
+@pytest.mark.parametrize(("what", "written"), [("plane", "a.png"), ("mesh", "b.png"), ("mesh", "m.mtl")])
+def test_what_a_scene_names_is_read_again_when_it_is_written_again(what: str, written: str, tmp_path: Path) -> None:
+    for name in "abc":
+        grey(tmp_path / f"{name}.png", 200 if name == "c" else 60)
+    (tmp_path / "m.obj").write_text(MESH)
+    (tmp_path / "m.mtl").write_text("newmtl m\nmap_Kd b.png\n")
+    look = {"plane": 'texture = "a.png"\nsize_m = 18.0', "mesh": 'file = "m.obj"'}[what]
+    text = f'[scene]\nduration_s = 0.1\nambient = 1.0\n[camera]\nsize = [16, 12]\n[[objects]]\nname = "it"\n{look}\n'
+    place = '[[objects.trajectory]]\nkind = "fixed"\nposition_m = [0, 0, 3]\n'
+    (tmp_path / "own.toml").write_text(f'{text}kind = "{what}"\n{place}')
+    setup = setup_of(f"scene:{tmp_path / 'own.toml'}")
+
+    def again() -> None:
+        if written == "m.mtl":
+            (tmp_path / written).write_text("newmtl m\nmap_Kd c.png\n#\n")
+        else:
+            grey(tmp_path / written, 200)
+
+    first, then = levels_of(setup, again)
+    assert then > 5 * first > 0
 
 
 def at(light: Light, t_ns: int) -> Instant:

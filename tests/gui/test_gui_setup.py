@@ -21,6 +21,7 @@ from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard, is_loopback
+from vid2ev.gui.light import duration_s
 from vid2ev.gui.loading import loaded, loaded_from
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
 from vid2ev.gui.session import Session
@@ -205,6 +206,34 @@ def test_a_file_is_taken_whatever_a_browser_calls_it(name: str, tmp_path: Path) 
     assert setup.spec(0).threshold_on == 0.33
     with pytest.raises(DataError, match="is not valid TOML"):
         loaded(setup, "[", name, tmp_path)
+
+
+def test_files_that_are_edited_are_read_again(tmp_path: Path) -> None:
+    scene, sensor, photos = tmp_path / "own.toml", tmp_path / "own_sensor.toml", tmp_path / "photos"
+    photos.mkdir()
+    cv2.imwrite(str(photos / "b.png"), np.full((8, 8, 3), 90, np.uint8))
+    wall = '[[objects]]\nname = "wall"\nkind = "plane"\ntexture = "photos"\n'
+
+    def write(duration_s: float, threshold: float) -> None:
+        scene.write_text(f"[scene]\nduration_s = {duration_s}\n[camera]\nsize = [16, 12]\n{wall}")
+        sensor.write_text(f"[dvs]\n# measured\nthreshold_on = {threshold}\n")
+
+    def read() -> tuple[float, float, Any]:
+        duration_s, values = setup.settled().scene.duration_s, setup.sensor(0).values
+        return duration_s, setup.spec(0).threshold_on, values["threshold_on"]
+
+    write(0.5, 0.25)
+    setup = setup_of(f"scene:{scene},seed=0").with_preset(0, str(sensor))
+    assert read() == (0.5, 0.25, 0.25) and setup.settled().objects[0].texture == str(photos / "b.png")
+    write(0.75, 0.375)
+    (photos / "b.png").rename(photos / "c.png")
+    assert read() == (0.75, 0.375, 0.375) and setup.settled().objects[0].texture == str(photos / "c.png")
+    assert duration_s(setup) == setup_of(setup.source).settled().scene.duration_s == 0.75
+    session = Session(setup)
+    sensor.write_text("[dvs]\nthreshold_on = -1.0\n")
+    assert "threshold_on = -1.0 in sensor" in str(session.change(lambda: setup.with_option("seed", 3)))
+    assert session.setup == setup
+    session.close()
 
 
 def test_a_changed_scene_keeps_photographs_of_its_own(tmp_path: Path) -> None:

@@ -9,14 +9,16 @@ what lies between its frames is made as for a conversion.  The light is kept as 
 from __future__ import annotations
 
 import math
-import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import UsageError
+from vid2ev.gui.files import stamp_of_scene
 from vid2ev.gui.scene_light import Film, finer_than, grid_hz, ticks_of
 from vid2ev.gui.scene_part import ScenePart, scene_part
 from vid2ev.gui.setup import Setup
@@ -32,6 +34,7 @@ from vid2ev.sight import taken_by
 from vid2ev.sources import OPTIONS, open_source
 from vid2ev.sources.framing import Framed, framing_of
 from vid2ev.sources.source import Source
+from vid2ev.stamps import Stamp, stamp
 
 SIDE = 346  # px
 LONGEST_S = 0.25
@@ -94,7 +97,7 @@ class LightTable:
 
     def _of_scene(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
         scene, sensors, part = setup.settled(), sensors_of(setup), scene_part(setup)
-        world = _world(scene, side)
+        world = _world(scene, side, stamp_of_scene(scene))
         lens = part.lens(scene.camera.intrinsics)
         whole = setup.rig.resolved(lens.size, lens)
         shown = lens.scaled_to(smaller(lens.size, side)) if part.framing else world.intrinsics
@@ -246,9 +249,11 @@ def _without_sensors(setup: Setup) -> Any:
     """What of a setup decides the light, comparable."""
     bare = tuple(camera.model_copy(update={"sensor": None, "set": {}}) for camera in setup.rig.cameras)
     scene = setup.settled() if setup.is_scene else None
+    depth = re.sub(r"(,\w+=[^,=]*)*$", "", str(setup.options.get("depth", "")))  # (without what its numbers mean)
     return (
         setup.source,
-        _stamp(setup.source),
+        _stamp(setup.source) if scene is None else stamp_of_scene(scene),
+        stamp(depth),
         Rig(source=setup.rig.source, cameras=bare),
         scene,
         tuple(setup.options.items()),
@@ -262,7 +267,7 @@ def _opened(setup: Setup) -> Source:
     return source
 
 
-def _opening(setup: Setup) -> tuple[str, tuple[int, ...], tuple[tuple[str, Any], ...]]:
+def _opening(setup: Setup) -> tuple[str, Stamp, tuple[tuple[str, Any], ...]]:
     known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
     return (
         setup.source,
@@ -271,28 +276,26 @@ def _opening(setup: Setup) -> tuple[str, tuple[int, ...], tuple[tuple[str, Any],
     )
 
 
-def _stamp(source: str) -> tuple[int, ...]:
-    """What becomes another when a file is written again; nothing for what is no file."""
-    try:
-        found = os.stat(source)
-    except (OSError, ValueError):
-        return ()
-    return found.st_ino, found.st_size, found.st_mtime_ns
+def _stamp(source: str) -> Stamp:
+    """That of a video, or of a folder of images, and of the times beside it."""
+    path = Path(source)
+    beside = (f"{path.stem}_timestamps{suffix}" for suffix in (".npy", ".txt"))
+    return stamp(path, *(path.parent / name for name in beside))
 
 
 @lru_cache(maxsize=4)
-def _source(path: str, stamp: tuple[int, ...], options: tuple[tuple[str, Any], ...]) -> Source:
+def _source(path: str, written: Stamp, options: tuple[tuple[str, Any], ...]) -> Source:
     return open_source(path, **dict(options))
 
 
 @lru_cache(maxsize=4)
-def _origin_s(path: str, stamp: tuple[int, ...], options: tuple[tuple[str, Any], ...]) -> float:
+def _origin_s(path: str, written: Stamp, options: tuple[tuple[str, Any], ...]) -> float:
     """When the first frame is [s]."""
-    return 1e-9 * next(frame.t_ns for frame in _source(path, stamp, options).frames())
+    return 1e-9 * next(frame.t_ns for frame in _source(path, written, options).frames())
 
 
 @lru_cache(maxsize=2)
-def _world(scene: Scene, side: int) -> World:
+def _world(scene: Scene, side: int, written: Stamp) -> World:
     lens = scene.camera.intrinsics.scaled_to(smaller(scene.camera.size, side))
     changes: dict[str, Any] = {"size": lens.size}
     if scene.camera.focal_px is not None:

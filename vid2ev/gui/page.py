@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import UsageError, Vid2evError
 from vid2ev.gui.pictures import Pictures
 from vid2ev.gui.result import Results
 from vid2ev.gui.session import Session
@@ -72,7 +72,13 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
         if not ui.context.client.has_socket_connection:
             return
         kept = app.storage.tab  # (of one tab of the browser: what was set up there is there again after a reload)
-        session = draw(kept.get("setup", setup), warming)
+        begun = kept.get("setup", setup)
+        try:
+            begun.check()
+        except Vid2evError as error:
+            ui.label(f"{error}; put that right and reload the page")
+            return
+        session = draw(begun, warming)
         session.on("setup", lambda changed: kept.update(setup=changed))
 
     app.add_middleware(Guard, host=host)

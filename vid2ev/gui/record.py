@@ -167,6 +167,7 @@ class Record:
         if why_not:
             ui.notify(why_not, type="negative", multi_line=True, timeout=0, close_button=True)
         else:
+            self._session.look()  # (the files that it names may be others by now)
             ui.notify(f"{name} is loaded", position="bottom-right")
 
     def _name(self, camera: int) -> str:

@@ -60,6 +60,7 @@ class Session:
         """Take up the setup that `make` makes; if that is refused, why."""
         try:
             setup = make()
+            setup.check()
         except (Vid2evError, ValueError) as error:
             return str(error)
         except OSError as error:

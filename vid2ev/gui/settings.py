@@ -100,6 +100,7 @@ class Settings:
         self._why.text = self._session.change(make) or ""
         if not self._why.text:
             self._session.look(start_s=0.0, pixel=None)
+            self.show()  # (its files may say something else by now)
 
     def _draw(self) -> None:
         setup = self._session.setup

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from vid2ev.errors import UsageError
+from vid2ev.gui import files
 from vid2ev.recipe import refuse_recordings
 from vid2ev.rig.camera import Camera, Rig, Source, default_rig
 from vid2ev.rig.rig_file import complaint, read_rig
 from vid2ev.scenes.scene import Scene
-from vid2ev.scenes.scene_file import read_scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
-from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile, load, read_sensor
+from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile
 from vid2ev.sources import CAMERA_PREFIX, SCENE_PREFIX, STANDARD_INPUT, check_there, is_scene
 from vid2ev.toml_text import toml_value
 
@@ -57,11 +56,18 @@ class Setup:
 
     def settled(self) -> Scene:
         """The scene with every number settled: as it was changed, or else as its file says."""
-        return self.scene or _settled(self.request.name, tuple(self.request.settings), self.request.seed)
+        return self.scene or files.settled(self.request)
 
     def sensor(self, camera: int) -> SensorFile:
         """The preset, or file, of a camera's sensor, with the source of each of its numbers."""
-        return _read(self.preset(camera), self.kind(camera))
+        return files.sensor_file(self.preset(camera), self.kind(camera))
+
+    def check(self) -> None:
+        """Raise UsageError, DataError, for files that are none by now."""
+        for camera in range(len(self.rig.cameras)):
+            self.spec(camera)
+        if self.is_scene:
+            self.with_scene(None).settled()
 
     def kind(self, camera: int) -> Kind:
         """Event sensor or frame sensor."""
@@ -159,22 +165,7 @@ def texts_of(changes: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 def spec_of(kind: Kind, name: str, changes: Mapping[str, Any]) -> Any:
     """The specification of a sensor and changes to it.  Raises UsageError, DataError."""
-    return _loaded(kind, name, tuple(texts_of(changes)))
-
-
-@lru_cache(maxsize=16)
-def _settled(name: str, settings: tuple[str, ...], seed: int) -> Scene:
-    return read_scene(name, settings).resolved(seed)
-
-
-@lru_cache(maxsize=64)
-def _loaded(kind: Kind, name: str, texts: tuple[str, ...]) -> Any:
-    return load(kind, name, texts)
-
-
-@lru_cache(maxsize=32)
-def _read(name: str, kind: Kind) -> SensorFile:
-    return read_sensor(name, kind)
+    return files.specification(kind, name, tuple(texts_of(changes)))
 
 
 def _made(model: type[BaseModel], table: Mapping[str, Any], where: str) -> Any:

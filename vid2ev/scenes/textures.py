@@ -21,6 +21,7 @@ from pydantic import Field, model_validator
 
 from vid2ev.errors import UsageError
 from vid2ev.scenes.part import Colour, Part
+from vid2ev.stamps import Stamp, stamp
 
 PHOTOGRAPHS = {
     "astronaut": "astronaut.png",
@@ -66,7 +67,10 @@ class Pattern(Part):
 
 def pixels_of(texture: str | Pattern) -> np.ndarray:
     """The linear light [H, W, 3] of a texture.  Raises UsageError, DataError for a file that cannot be read."""
-    return _computed(texture) if isinstance(texture, Pattern) else _photograph(texture)
+    if isinstance(texture, Pattern):
+        return _computed(texture)
+    path = photograph_file(texture) if texture in PHOTOGRAPHS else Path(texture)
+    return _photograph(path, stamp(path))
 
 
 def photograph_file(name: str) -> Path:
@@ -80,11 +84,11 @@ def photograph_file(name: str) -> Path:
 
 
 @lru_cache(maxsize=64)
-def _photograph(name: str) -> np.ndarray:
+def _photograph(path: Path, written: Stamp) -> np.ndarray:
     from vid2ev.light.picture_files import read_picture
     from vid2ev.light.pictures import PictureReader
 
-    pixels, primaries, tagged = read_picture(photograph_file(name) if name in PHOTOGRAPHS else Path(name))
+    pixels, primaries, tagged = read_picture(path)
     transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
     return np.maximum(PictureReader(transfer, "rgb").light(pixels, primaries), 0)
 
