@@ -30,7 +30,7 @@ from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
 from vid2ev.gui.worker import Refused, Worker, _serve
-from vid2ev.instants import Instant
+from vid2ev.instants import Instant, events_of
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
 from vid2ev.sensors.compiled import flags_of
@@ -331,6 +331,31 @@ def test_videos_are_seen_from_where_the_cameras_are(previewer: Previewer) -> Non
     assert straight.cameras[0].statistics is not None and straight.cameras[0].statistics.events > 50
     with pytest.raises(UsageError, match="how far the scene is was not said; add --depth"):
         previewer.answer(Request(setup.with_camera_values(0, {"translation_mm": (30.0, 0.0, 0.0)}), 0.3, 0.02, side=80))
+
+
+def test_in_the_middle_of_a_video_a_preview_has_the_events_of_its_conversion(
+    previewer: Previewer, tmp_path: Path
+) -> None:
+    """Light that goes back and forth: a sensor that has just been switched on sends more of it."""
+    phases, rates_hz = np.random.default_rng(0).uniform([[[0]], [[4]]], [[[2 * np.pi]], [[12]]], (2, 36, 48))
+    frames = [0.3 * np.exp(0.15 * np.sin(2 * np.pi * rates_hz * k / 30 + phases)) for k in range(40)]
+    np.savez(tmp_path / "film.npz", frames=np.array(frames, np.float32), fps=30)
+    setup = setup_of(str(tmp_path / "film.npz")).with_preset(0, "ideal").with_option("upsample", "linear")
+    answer = previewer.answer(Request(setup, 1.0, 0.03))
+    shown = answer.cameras[0].statistics
+    sent = Events.concatenate([*events_of(setup.source, "ideal", upsample="linear")])
+    there = np.sum((sent.t > 1e6 * answer.span_s[0]) & (sent.t <= 1e6 * answer.span_s[1]))
+    assert shown is not None and shown.events == pytest.approx(there, rel=0.1) and there > 500
+
+
+def test_sensors_of_a_preview_begin_afresh_after_a_cut(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    shots = [cv2.GaussianBlur(random.uniform(0, 1, (60, 120)), (0, 0), 3) for _ in range(2)]
+    frames = [np.clip(4 * shots[k >= 20][:, k : k + 80] - 1.5, 0.02, 1) for k in range(40)]
+    np.savez(tmp_path / "film.npz", frames=np.array(frames, np.float32), fps=30)
+    light = LightTable().light(setup_of(str(tmp_path / "film.npz")), 0.8, 0.03)
+    assert light.instants[0].t_ns == pytest.approx(20e9 / 30, abs=1e3) and light.instants[0].cut
+    assert light.instants[light.lead].t_ns <= 0.8e9 < light.instants[light.lead + 1].t_ns
 
 
 def test_a_refusal_is_told_from_a_plan_that_is_not_there(setup: Setup) -> None:

@@ -1,9 +1,10 @@
 """The light of a short part of a setup's source, as each of its cameras sees it, small enough to be looked at at once.
 
 A preview begins at an instant and takes as long as the slowest exposure asks for; what comes just before it is seen by
-its sensors, so that they remember something, but not shown.  Cameras and source have at most `side` pixels each way.
-Of a scene the reference camera is made smaller, and it is rendered at even intervals (`gui.scene_light`); of a video,
-what lies between its frames is made as for a conversion.  The light is kept as long as nothing changes that decides it.
+its sensors, so that they remember something (`gui.run_in`), but not shown.  Cameras and source have at most `side`
+pixels each way.  Of a scene the reference camera is made smaller, and it is rendered at even intervals
+(`gui.scene_light`); of a video, what lies between its frames is made as for a conversion.  The light is kept as long as
+nothing changes that decides it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.gui.files import stamp_of_scene
+from vid2ev.gui.run_in import RUN_IN_S, PartRecipe, since_cut
 from vid2ev.gui.scene_light import Film, finer_than, grid_hz, ticks_of
 from vid2ev.gui.scene_part import ScenePart, scene_part
 from vid2ev.gui.setup import Setup
@@ -127,7 +129,8 @@ class LightTable:
                 seen.append(instant)
                 if 1e-9 * instant.t_ns >= begin_s + length_s:
                     break
-        yield Light(recipe, tuple(seen), _lead(seen, begin_s), tuple(sizes), tuple(_notes(recipe.mounts, sizes)))
+        shown, lead = since_cut(seen, _lead(seen, begin_s))
+        yield Light(recipe, tuple(shown), lead, tuple(sizes), tuple(_notes(recipe.mounts, sizes)))
 
 
 def duration_s(setup: Setup) -> float | None:
@@ -160,7 +163,7 @@ def _part_of_video(
     setup: Setup, start_s: float, length_s: float, side: int
 ) -> tuple[Recipe, list[tuple[int, int]], float]:
     """What a part is made by, the sizes of its cameras, and where it begins on the recording's own clock [s]; before it
-    there is an interval at least."""
+    there is what its sensors see first, an interval at least."""
     source, options = _opened(setup), dict(setup.options)
     slower = float(options.get("slowdown") or 1)
     interval_s = _interval_s(source)
@@ -175,13 +178,14 @@ def _part_of_video(
     shaped = "motion" in options or ("size" in options and not str(options["size"]).endswith("!"))
     own = {"size": options["size"]} if "size" in options else {}
     options |= {
-        "start": slower * max(begin_s - 1.5 * interval_s, origin_s),
+        "start": slower * max(begin_s - max(RUN_IN_S, 1.5 * interval_s), origin_s),
         "stop": min(latest_s, options.get("stop") or latest_s),
         "size": f"{width}x{height}{'' if shaped else '!'}",
     }
     if source.size == (width, height) and "size" not in setup.options:
         options.pop("size")
-    recipe = Recipe.of(setup.source, rig=rig, **options)
+    since_ns = round(1e9 * (begin_s - 0.5 * interval_s))
+    recipe = PartRecipe.of(setup.source, rig=rig, since_ns=since_ns, **options)
     if "motion" in options:  # (which is told in pixels of the picture as it is converted)
         edits = {name: options[name] for name in OPTIONS if name in options and name != "size"} | own
         colour: Any = "rgb" if any(sensor.colour for sensor in sensors_of(setup)) else "luminance"
