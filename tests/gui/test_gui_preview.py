@@ -23,7 +23,7 @@ from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
 from vid2ev.gui.light import Light, LightTable, _part_of_video, duration_s, smaller
-from vid2ev.gui.preview import VIEWS, Answer, Previewer, Request
+from vid2ev.gui.preview import VIEWS, Answer, Previewer, Request, plans_of
 from vid2ev.gui.scene_edit import moved
 from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
@@ -295,6 +295,26 @@ def test_options_that_a_scene_cannot_have_are_refused_before_its_conversion(
         setup = setup.with_option(name, value)
     with pytest.raises(UsageError, match=re.escape(why)):
         LightTable().light(setup, 0.0, 0.02)
+
+
+@pytest.mark.parametrize(
+    "options", [{"stop": 0.0}, {"stop": 1e-9}, {"stop": 1e-310}, {"start": 2.0}, {"start": 0.5, "stop": 0.5}],
+    ids=str,
+)  # fmt: skip
+def test_a_part_of_a_scene_of_no_length_is_a_picture(
+    previewer: Previewer, setup: Setup, options: dict[str, float]
+) -> None:
+    request = Request(replace(setup, options=options), pixel=(0, 30, 20))
+    answer = previewer.answer(request)
+    assert [*plans_of(previewer.light(request), 0, lambda: None).plans] == ["dvs", "cis"]
+    assert answer.span_s == pytest.approx([options.get("start", 0.0)] * 2, abs=1e-8)
+    assert answer.cameras[0].caption.startswith("0 events") and answer.duration_s == pytest.approx(0, abs=1e-8)
+    assert "the scene is rendered" not in str(answer.notes)
+
+
+def test_a_video_that_stops_at_once_is_a_picture(previewer: Previewer) -> None:
+    setup = Setup("synthetic:moving-edge,size=64x48,fps=100,duration_s=0.1", default_rig(), options={"stop": 0.0})
+    assert previewer.answer(Request(setup.with_preset(0, "ideal"))).span_s == (0.0, 0.0)
 
 
 def test_a_photograph_in_motion_is_previewed(tmp_path: Path) -> None:

@@ -179,7 +179,7 @@ def _part_of_video(
     own = {"size": options["size"]} if "size" in options else {}
     options |= {
         "start": slower * max(begin_s - max(RUN_IN_S, 1.5 * interval_s), origin_s),
-        "stop": min(latest_s, options.get("stop") or latest_s),
+        "stop": min(latest_s, options.get("stop", latest_s)),
         "size": f"{width}x{height}{'' if shaped else '!'}",
     }
     if source.size == (width, height) and "size" not in setup.options:

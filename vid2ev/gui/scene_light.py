@@ -28,6 +28,7 @@ RUN_IN_S = 0.03  # before it
 SPARSER = 4  # is the grid there
 ROUGH_S = 0.25  # until what is there is shown
 ROUGH = 9  # pictures that come before the run-in
+FINEST_HZ = 2**29  # the next power of two is more than 10^9 (`scenes.instants.rate_of`)
 KNOT_S = 1 / 128  # from one look at motion to the next
 KEPT_BYTES = 200_000_000
 
@@ -98,15 +99,21 @@ class Film:
 
 
 def grid_hz(asked_hz: float, length_s: float) -> int:
-    """The power of two that is nearest to a rate, with two pictures in a part at least, and about `MOST` at most."""
-    wanted = min(max(asked_hz, 2 / length_s), MOST / length_s)
-    return 2 ** max(0, round(math.log2(wanted)))
+    """The power of two that is nearest to a rate, with two pictures in a part at least, and about `MOST` at most; no
+    more than a scene can be asked for, however short a part is."""
+    if length_s * FINEST_HZ > 2:
+        asked_hz = min(max(asked_hz, 2 / length_s), MOST / length_s)
+    elif length_s > 0:
+        asked_hz = FINEST_HZ
+    return 2 ** max(0, round(math.log2(min(asked_hz, FINEST_HZ))))
 
 
 def ticks_of(begin_s: float, end_s: float, fps: float, since_s: float = 0.0) -> list[int]:
     """The instants k / fps of a part: its ends first, those between ever closer, and among them the run-in, of which
     none is before `since_s`."""
     first, last = math.floor(begin_s * fps + 1e-9), math.ceil(end_s * fps - 1e-9)
+    if begin_s == end_s:  # (a picture, as in the recording of such a part)
+        last = first
     part = [first + k for k in coarse_first(last - first + 1)]
     earliest = math.ceil(max(begin_s - RUN_IN_S, since_s) * fps)
     before = [k for k in range(earliest, first) if k % SPARSER == 0]
