@@ -102,12 +102,15 @@ def test_a_refractory_period_is_the_floor_of_the_intervals() -> None:
     assert found.intervals[:, EDGES_US[1:] <= 500].sum() == 0
     median_us = found.interval_us(50)
     assert median_us is not None and 500 + 300 * math.log(2) < median_us < (500 + 300 * math.log(2)) * 10 ** (1 / 8)
+    assert found.about_us(50) == pytest.approx(500 + 300 * math.log(2), rel=0.03)
+    assert found.about_us(5) == pytest.approx(500 - 300 * math.log(0.95), rel=0.03)
 
 
 @pytest.mark.parametrize("gap_us", [9_999_999_999, 36_000_000_000])
 def test_intervals_of_hours_are_not_said_to_be_below_anything(gap_us: int) -> None:
     found = statistics_of([events_of(np.array([0, gap_us, 2 * gap_us]))], (1, 1))
     assert found.interval_us(5) is found.interval_us(50) is None and found.as_dict()["interval_us"]["95"] is None
+    assert found.about_us(50) is None
     assert f"intervals from {gap_us} us, half above {EDGES_US[-2]} us" in str(found)
 
 

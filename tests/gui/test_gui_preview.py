@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
+from vid2ev.compare.statistics import statistics_of
 from vid2ev.errors import UsageError
 from vid2ev.gui.charts import cost_chart, course_chart, interval_chart, statistics_rows
 from vid2ev.gui.jobs import Done, Job, Progress, Tell
@@ -252,6 +253,16 @@ def test_a_preview_shows_the_events_that_the_sensor_sends(previewer: Previewer, 
     assert interval_chart({"dvs": shown.statistics})["series"][0]["name"] == "dvs"
 
 
+def test_half_of_the_intervals_are_below_what_is_said_with_two_digits() -> None:
+    def said(t_us: np.ndarray) -> str:
+        none = np.zeros(len(t_us), np.uint16)
+        return statistics_rows({"it": statistics_of([Events(t_us, none, none, none.astype(np.uint8))], (1, 1))})[-1][1]
+
+    gaps_us = np.random.default_rng(0).exponential(1e4, 5000).astype(np.int64)
+    assert said(np.cumsum(gaps_us)) in ("6,700", "6,800", "6,900", "7,000", "7,100")  # 10^4 ln 2 = 6931
+    assert said(np.arange(9)) == "1.4" and said(np.zeros(1, np.int64)) == said(10**10 * np.arange(4)) == "–"
+
+
 @pytest.mark.parametrize(
     "options",
     [{"start": 0.5, "stop": 0.6}, {"slowdown": 4.0, "start": 0.3}, {"crop": "32x24+10+8"}, {"fps": 50.0, "start": 0.5}],
@@ -280,6 +291,7 @@ def test_a_scene_is_seen_by_the_options_of_its_conversion(setup: Setup, options:
         ({"start": 5.0}, "start 5 s: nothing is left of the scene, which goes from 0 s to 2 s"),
         ({"fps": 5.0, "start": 0.21, "stop": 0.39}, "fps 5: no picture of the scene from 0.21 s to 0.39 s"),
         ({"motion": "pan"}, "motion 'pan' is for a photograph"),
+        ({"upsample": "flwo"}, "upsampling 'flwo': expected one of none, linear, flow"),
         ({"depth": "plane:2"}, "depth 'plane:2' of a scene, which knows its own"),
         ({"seed": -3}, "seed -3: expected a whole number"),
         ({"slowdown": 0.0}, "slowdown 0.0: expected a number"),

@@ -91,6 +91,16 @@ class Statistics:
         bin_of = percentile(self.intervals.sum(axis=0), percent)
         return None if bin_of in (None, self.intervals.shape[1] - 1) else int(EDGES_US[bin_of + 1])
 
+    def about_us(self, percent: int) -> float | None:
+        """This percentile of the intervals, as if within their bin all logarithms of intervals came as often."""
+        counts = self.intervals.sum(axis=0)
+        high_us, bin_of = self.interval_us(percent), percentile(counts, percent)
+        if high_us is None or bin_of is None:
+            return None
+        low_us, before = max(int(EDGES_US[bin_of]), self.shortest_us or 1), int(counts[:bin_of].sum())
+        share = (int(counts.sum()) * percent / 100 - before) / int(counts[bin_of])
+        return float(low_us * (high_us / low_us) ** share)
+
     def __str__(self) -> str:
         if self.rate_hz is None or self.on_share is None:
             return f"{self.events} events"

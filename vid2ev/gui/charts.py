@@ -133,7 +133,7 @@ def statistics_rows(named: dict[str, Statistics]) -> list[list[str]]:
         ("shortest interval [us]", "interval_shortest_us", ""),
     ):
         rows.append([label, *(_shown(each[key], unit) for each in of)])
-    rows.append(["half of the intervals below [us]", *(_shown(each["interval_us"]["50"], "") for each in of)])
+    rows.append(["half of the intervals below about [us]", *(_about(found.about_us(50)) for found in named.values())])
     return rows
 
 
@@ -143,6 +143,14 @@ def _shown(value: Any, unit: str) -> str:
     if unit == "%":
         return f"{100 * value:.3g} %"
     return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
+
+
+def _about(value: float | None) -> str:
+    """Two digits: more are not known of what was counted in bins a third wide."""
+    if value is None:
+        return "–"
+    rounded = float(f"{value:.2g}")
+    return f"{rounded:,.0f}" if rounded >= 10 else f"{rounded:g}"
 
 
 def _pairs(x: np.ndarray, y: np.ndarray) -> list[list[float]]:

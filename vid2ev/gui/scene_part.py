@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from vid2ev.errors import UsageError
@@ -16,6 +17,7 @@ from vid2ev.sources import Source
 from vid2ev.sources.cut import Slowed, slowdown_of
 from vid2ev.sources.framing import Framed, framing_for
 from vid2ev.stream.frames import Colour
+from vid2ev.upsample import make_upsampler
 
 
 class ScenePart(NamedTuple):
@@ -63,6 +65,8 @@ def scene_part(setup: Setup) -> ScenePart:
     options, scene = setup.options, setup.settled()
     if "motion" in options:
         raise UsageError(f"motion '{options['motion']}' is for a photograph; leave it out of a scene")
+    if "upsample" in options:
+        _check_upsampling(options["upsample"])
     begin_s, end_s = _span_s(options, scene.scene.duration_s)
     fps = float(rate_of(options["fps"])) if "fps" in options else None
     if fps is not None and math.ceil(begin_s * fps - 1e-9) > end_s * fps + 1e-9:
@@ -71,6 +75,12 @@ def scene_part(setup: Setup) -> ScenePart:
     if "crop" in options or "size" in options:
         framing = framing_for(scene.camera.size, options.get("crop"), options.get("size"))
     return ScenePart(begin_s, end_s, float(slowdown_of(options.get("slowdown", 1.0))), fps, framing)
+
+
+@lru_cache(maxsize=4)
+def _check_upsampling(method: str) -> None:
+    """Raise UsageError for what is none: a conversion refuses it though a scene needs none."""
+    make_upsampler(method)
 
 
 def _span_s(options: Mapping[str, Any], whole_s: float) -> tuple[float, float]:
