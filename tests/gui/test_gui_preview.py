@@ -472,13 +472,18 @@ def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(
         assert not job.alive
 
 
-def test_a_session_keeps_the_last_good_setup_and_leaves_nothing_behind(setup: Setup) -> None:
+def test_a_session_keeps_the_last_good_setup_and_leaves_nothing_behind(
+    setup: Setup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even one that is never closed, as when the program is ended."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     one, other = Session(setup), Session(setup)
     assert one.change(lambda: setup.with_sensor_values(0, {"threshold_on": 0.0}))
     assert one.setup == setup
     assert one.change(lambda: setup.with_sensor_values(0, {"threshold_on": 0.5})) is None
     assert one.setup.spec(0).threshold_on == 0.5 and other.setup == setup
+    assert [*tmp_path.glob("vid2ev*")] == []
     job = one.start(counted, lambda said: None, lambda said: None, to=10**5, folder="/")
     one.close()
     other.close()
-    assert not job.alive and not os.path.exists(one.folder)
+    assert not job.alive

@@ -136,20 +136,22 @@ def test_a_name_that_no_disk_takes_is_refused_in_a_sentence() -> None:
     session.close()
 
 
-def test_files_that_are_saved_and_loaded_are_the_setup(tmp_path: Path) -> None:
+def test_files_that_are_saved_and_loaded_are_the_setup() -> None:
     setup = other_scene(setup_of(SMALL))
     other = setup_of(SMALL)
     for name, text in command_of(setup).files.items():
-        other = loaded(other, text, name, tmp_path)
+        other = loaded(other, text, name)
     assert [other.spec(k) for k in (0, 1)] == [setup.spec(k) for k in (0, 1)]
     assert other.rig == setup.rig and other.settled() == setup.settled()
-    with_sensor = loaded(setup_of(SMALL), sensor_text(setup, 0), "camera.toml", tmp_path)
+    with_sensor = loaded(setup_of(SMALL), sensor_text(setup, 0), "camera.toml")
     assert with_sensor.spec(0) == setup.spec(0) and with_sensor.spec(1) == setup_of(SMALL).spec(1)
     with pytest.raises(OSError, match=r"bad.toml is not valid TOML"):
-        loaded(setup, "[dvs", "bad.toml", tmp_path)
+        loaded(setup, "[dvs", "bad.toml")
 
 
-def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(tmp_path: Path) -> None:
+def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rig = '[[camera]]\nname = "own"\nkind = "dvs"\nsensor = "own.toml"\n'
     scene = '[scene]\nduration_s = 0.1\n[[objects]]\nname = "wall"\nkind = "plane"\ntexture = "wall.png"\n'
     (tmp_path / "own.toml").write_text("[dvs]\nthreshold_on = 0.44\n")
@@ -161,20 +163,22 @@ def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(
     assert loaded_from(setup, tmp_path / "own.toml").spec(0).threshold_on == 0.44
     assert loaded_from(setup, tmp_path / "scene.toml").settled().objects[0].texture == str(tmp_path / "wall.png")
     sent.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(sent))
     for text, name, lacking in ((rig, "rig.toml", "own.toml"), (scene, "scene.toml", "wall.png")):
         with pytest.raises(
             UsageError, match=f"{lacking}.* a browser sends no other files along: give the path of"
         ) as why:
-            loaded(setup, text, name, sent)
+            loaded(setup, text, name)
         assert str(tmp_path) not in str(why.value) and str(why.value).endswith(f"{name} instead")
+        assert [*sent.iterdir()] == []
     with pytest.raises(UsageError, match=r"missing.toml: no such file; give a TOML file of"):
         loaded_from(setup, tmp_path / "missing.toml")
 
 
 @pytest.mark.parametrize("text", ["", "# words\n", "x = 1\n", "[about]\n"])
-def test_what_is_no_sensor_rig_or_scene_is_told_so(text: str, tmp_path: Path) -> None:
+def test_what_is_no_sensor_rig_or_scene_is_told_so(text: str) -> None:
     with pytest.raises(DataError, match=r"none.toml has none of the tables dvs, cis, .*; give a TOML file of a sensor"):
-        loaded(setup_of(SMALL), text, "none.toml", tmp_path)
+        loaded(setup_of(SMALL), text, "none.toml")
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -201,11 +205,11 @@ def test_each_scene_can_be_converted_as_it_comes(name: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["n" * 300 + ".toml", "a\0b", "", "..", "/"])
-def test_a_file_is_taken_whatever_a_browser_calls_it(name: str, tmp_path: Path) -> None:
-    setup = loaded(setup_of(SMALL), "[dvs]\nthreshold_on = 0.33\n", name, tmp_path)
+def test_a_file_is_taken_whatever_a_browser_calls_it(name: str) -> None:
+    setup = loaded(setup_of(SMALL), "[dvs]\nthreshold_on = 0.33\n", name)
     assert setup.spec(0).threshold_on == 0.33
     with pytest.raises(DataError, match="is not valid TOML"):
-        loaded(setup, "[", name, tmp_path)
+        loaded(setup, "[", name)
 
 
 def test_files_that_are_edited_are_read_again(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
@@ -19,23 +20,24 @@ WANTED = "a TOML file of a sensor, a rig or a scene"
 TABLES = ("dvs", "cis", "source", "camera", "scene", "objects", "lights")
 
 
-def loaded(setup: Setup, text: str, name: str, folder: Path) -> Setup:
+def loaded(setup: Setup, text: str, name: str) -> Setup:
     """The setup with what a text says that a browser sends: its rig, the sensor of all cameras of its kind, or its
     scene.
 
-    The text is kept in `folder` while it is read.  Raises UsageError, DataError.
+    Raises UsageError, DataError.
     """
     tables = _tables(text, name)
-    path = folder / "given.toml"  # (what a browser calls it may be no name for a file here)
-    write_text(path, text, overwrite=True)
-    try:
-        return _taken(setup, path, tables)
-    except Vid2evError as error:  # (where it is kept is nobody's concern)
-        why = str(error).replace(str(path), name)
-        if str(folder) in why or "no such file" in why:
-            why = f"{why.replace(f'{folder}{os.sep}', '').rstrip('.')}; a browser sends no other files along: give"
-            why = f"{why} the path of {name} instead"
-        raise type(error)(why) from error
+    with TemporaryDirectory(prefix="vid2ev-gui-") as folder:
+        path = Path(folder) / "given.toml"  # (what a browser calls it may be no name for a file here)
+        write_text(path, text, overwrite=True)
+        try:
+            return _taken(setup, path, tables)
+        except Vid2evError as error:  # (where it is kept is nobody's concern)
+            why = str(error).replace(str(path), name)
+            if folder in why or "no such file" in why:
+                why = f"{why.replace(f'{folder}{os.sep}', '').rstrip('.')}; a browser sends no other files along: give"
+                why = f"{why} the path of {name} instead"
+            raise type(error)(why) from error
 
 
 def loaded_from(setup: Setup, path: Path) -> Setup:

@@ -155,7 +155,7 @@ class Record:
             self._loaded(name, f"{name} is not a text; give {WANTED}")
         else:
             session = self._session
-            self._loaded(name, session.change(lambda: loaded(session.setup, text, name, session.folder)))
+            self._loaded(name, session.change(lambda: loaded(session.setup, text, name)))
 
     def _named(self) -> None:
         path = Path(self._path.value.strip())

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import Vid2evError
@@ -38,7 +36,6 @@ class Session:
         self.plans: Plans | None = None
         self.status = ""
         self.refused = False  # what was asked for last, for the reason that the status gives
-        self.folder = Path(tempfile.mkdtemp(prefix="vid2ev-gui-"))
         self._told = ("", False)
         self._worker: Worker | None = None
         self._heard: dict[str, list[Hear]] = {"setup": [], "answer": [], "plans": [], "status": []}
@@ -116,9 +113,6 @@ class Session:
             self._worker.close()
             self._worker = None
         self._warming.leave()
-        for file in self.folder.glob("*"):
-            file.unlink(missing_ok=True)
-        self.folder.rmdir()
 
     def _take(self, reply: Answer | Plans | Refused) -> None:
         if isinstance(reply, Answer):
