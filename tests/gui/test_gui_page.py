@@ -9,11 +9,13 @@ import json
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +50,15 @@ pytestmark = [
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path, subprocess.Popen]]:
     folder = tmp_path_factory.mktemp("served")
     (folder / "given.toml").write_text(RIG)
+    with serving(folder) as found:
+        yield found
+
+
+@contextmanager
+def serving(folder: Path, **more: str) -> Iterator[tuple[str, Path, subprocess.Popen]]:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NICEGUI_STORAGE_PATH": str(folder / "storage")}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NICEGUI_STORAGE_PATH": str(folder / "storage"), **more}
     environment = {name: value for name, value in environment.items() if not name.startswith("PYTEST")}
     log = open(folder / "log", "w")  # noqa: SIM115
     program = [sys.executable, "-c", PROGRAM, SCENE, "--rig", "given.toml", "--port", str(port), "--no-browser"]
@@ -496,6 +504,20 @@ def test_work_is_cancelled_and_ends_with_its_page(browser: Any, address: Any) ->
     wait_for(lambda: " frames" in said.inner_text(), 120)
     page.context.close()
     wait_for(lambda: not children(address[2]))
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_page_that_is_open_when_the_program_ends_leaves_nothing_behind(
+    browser: Any, tmp_path: Path, how: signal.Signals
+) -> None:
+    (tmp_path / "given.toml").write_text(RIG)
+    (tmp_path / "tmp").mkdir()
+    with serving(tmp_path, TMPDIR=str(tmp_path / "tmp")) as served:
+        page, _ = opened(browser, served)
+        page.wait_for_selector("[data-camera] img")
+        served[2].send_signal(how)
+        served[2].wait(timeout=60)
+    assert [*(tmp_path / "tmp").glob("vid2ev*")] == []
 
 
 def test_statistics_stand_beside_those_of_a_recording(browser: Any, address: Any) -> None:
