@@ -64,7 +64,7 @@ class Film:
     """
 
     def __init__(self, video: str, protocol: Protocol, name: str, simulated: Simulated, limit: int | None = None):
-        self.name, self.video, self._protocol, self._limit = name, video, protocol, limit
+        self.name, self.video, self.protocol, self.limit = name, video, protocol, limit
         self.multiple, self.begin, self._simulated, self._told = protocol.multiple, 0, simulated, Told()
         source = simulated.opened(video)
         if not source.rewindable:
@@ -95,8 +95,8 @@ class Film:
         try:
             with closing(self._simulated.seen(self.video, source)) as coming:
                 for seen in coming:
-                    if told.groups == self._limit:
-                        told.remarks.append(f"limited to the first {self._limit} group{'s' * (self._limit != 1)}")
+                    if told.groups == self.limit:
+                        told.remarks.append(f"limited to the first {self.limit} group{'s' * (self.limit != 1)}")
                         break
                     told.see(seen.t_us)
                     part.append(seen)
@@ -132,7 +132,7 @@ class Film:
         }  # fmt: skip
 
     def _group(self, number: int, part: list[Seen], events: Events) -> Group:
-        protocol, spec = self._protocol, self._simulated.spec
+        protocol, spec = self.protocol, self._simulated.spec
         start_us, stop_us = part[0].t_us, part[-1].t_us
         contrast = spec.threshold_off, spec.threshold_on
         dead_time = DeadTime.of(spec.model_dump())

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from interp.evaluate import protocol as protocols
 from interp.representation.event_counts import EventCounts
 
 
@@ -63,6 +64,8 @@ class Footage(Protocol):
     expected    number of groups, for progress; may be an estimate
     multiple    frames per key frame
     begin       the first key frame
+    protocol    which frames are rebuilt
+    limit       gaps that are scored, from the first on; None for all
     identity    what tells it from another, ready for JSON
     """
 
@@ -70,6 +73,8 @@ class Footage(Protocol):
     expected: int
     multiple: int
     begin: int
+    protocol: protocols.Protocol
+    limit: int | None
     identity: dict[str, Any]
 
     @property

@@ -3,19 +3,11 @@
     DIR/SEQUENCE/*.png            one method, called like DIR
     DIR/SEQUENCE/METHOD/*.png     several; what is called GT is the truth, and is left alone
 
-Sorted by name they are paired with the frames of the sequence:
-
-    as many as frames             one for each, the first is a key frame
-    as many as are rebuilt        one for each of those; key frames are left out
-    else                          by the number that their names end in: 0 is the first frame, a key frame
-
-Pictures numbered by frame are taken so as well where some are missing and what is left happens to be as many as are
-rebuilt: numbers without a gap are counted, those with gaps are of frames.
+Which frames they are of, `pairing.py` says.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,6 +17,7 @@ import numpy as np
 
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.naming import plain
+from interp.evaluate.pairing import paired
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
 from vid2ev.light.recognise import natural
@@ -49,6 +42,7 @@ class Predictions:
     files: Mapping[int, Path] = field(default_factory=dict)  # by the number of the frame
     unpaired: str = ""
     unfit: dict[str, list[str]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
     sequential = True  # (looked at again after a kill, so that what cannot be used is known)
 
     def begin(self, footage: Footage) -> Self:
@@ -56,10 +50,10 @@ class Predictions:
         folder = self.folder / footage.name
         files = pictures_in(folder / self.within if self.within else folder)
         try:
-            known = by_frame(files, footage.frames, footage.multiple, footage.begin)
-            return replace(self, files=known, unpaired="", unfit={})
+            known, remark = paired(files, footage.frames, footage.protocol, footage.begin, footage.limit)
+            return replace(self, files=known, unpaired="", unfit={}, remarks=(remark,) if remark else ())
         except DataError as error:
-            return replace(self, files={}, unpaired=str(error), unfit={})
+            return replace(self, files={}, unpaired=str(error), unfit={}, remarks=())
 
     def frames(self, group: Group) -> Sequence[np.ndarray | None]:
         """See `interp.evaluate.rebuilders.Rebuilder`."""
@@ -91,31 +85,6 @@ def predictions_in(folder: str | Path) -> list[Predictions]:
             f"{folder}: no predictions in it; expected SEQUENCE/*{SUFFIX}, or SEQUENCE/METHOD/*{SUFFIX}, in it"
         )
     return found
-
-
-def by_frame(files: Sequence[Path], frames: int, multiple: int, begin: int = 0) -> dict[int, Path]:
-    """Pictures, in order of their names, by the number of the frame that each is of.
-
-    frames, multiple   how many the sequence has, and how many there are for each key frame
-    begin              the first key frame
-    Raises DataError where there is no telling.
-    """
-    ends = [re.search(r"(\d+)\D*$", path.stem) for path in files]
-    numbers = [int(end[1]) for end in ends if end]
-    known = len({*numbers}) == len(files)
-    gapless = known and max(numbers, default=0) - min(numbers, default=0) < len(files)
-    gaps = max(frames - 1 - begin, 0) // multiple
-    rebuilt = [begin + place for place in range(gaps * multiple) if place % multiple]
-    if len(files) == frames or not files:
-        return dict(enumerate(files))
-    if len(files) == len(rebuilt) and (gapless or not known or max(numbers) >= frames):
-        return dict(zip(rebuilt, files, strict=True))
-    if known and (not gapless or min(numbers) == 0 or {*numbers} <= {*rebuilt}):
-        return dict(zip(numbers, files, strict=True))
-    raise DataError(
-        f"{files[0].parent}: {len(files)} pictures for {frames} frames, of which {len(rebuilt)} are rebuilt; expected"
-        " as many as either, or names that end in the number of the frame, from 0"
-    )
 
 
 def pictures_in(folder: Path) -> list[Path]:

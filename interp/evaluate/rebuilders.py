@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import torch
@@ -47,6 +47,10 @@ class Rebuilder(Protocol):
     def unfit(self) -> Mapping[str, Sequence[str]]:
         """Why frames of the sequence that are there cannot be scored: reason, and which they are."""
 
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What has to be known of it on the sequence, a sentence each that goes on after its name."""
+
     def begin(self, footage: Footage) -> Self:
         """The same for a sequence."""
 
@@ -67,6 +71,7 @@ class OfMethod:
     protocol: protocols.Protocol
     device: str = "cpu"
     unfit = NOTHING
+    remarks: ClassVar[Sequence[str]] = ()
     _next: int = field(default=0, init=False)
 
     @property

@@ -28,7 +28,7 @@ class Recording:
     """
 
     def __init__(self, sequence: Sequence, protocol: Protocol, name: str, limit: int | None = None):
-        self.name, self._sequence, self._protocol = name, sequence, protocol
+        self.name, self._sequence, self.protocol, self.limit = name, sequence, protocol, limit
         self.multiple = multiple = protocol.multiple
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
         self.begin = self._own_keys[0] if self._own_keys else 0
@@ -68,7 +68,7 @@ class Recording:
         }  # fmt: skip
 
     def _group(self, first: int, cameras: CamerasOf | None) -> Group:
-        protocol, sequence = self._protocol, self._sequence
+        protocol, sequence = self.protocol, self._sequence
         last = first + protocol.multiple
         times_us = np.asarray(sequence.times_us[first : last + 1])
         keys = np.stack([sequence.key(k) for k in (first, last)])
@@ -85,7 +85,7 @@ class Recording:
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
 
     def _remarks(self) -> list[str]:
-        multiple, remarks = self._protocol.multiple, list[str]()
+        multiple, remarks = self.protocol.multiple, list[str]()
         if self.frames - self.begin < 2:
             remarks.append("a single frame from its first key frame on, with none after it to rebuild")
         if left := max(self.frames - 1 - self.begin, 0) % multiple:

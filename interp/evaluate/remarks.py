@@ -31,7 +31,8 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
     """Sentences: what cannot be used, what is peculiar about sequences, and frames without any error."""
     said: dict[str, list[str]] = {}
     for name, of in summary["sequences"].items():
-        for remark in of["remarks"]:
+        of_methods = (f"{method}: {remark}" for method, some in of["of_methods"].items() for remark in some)
+        for remark in (*of["remarks"], *of_methods):
             said.setdefault(remark, []).append(name)
     return [
         *(f"{name}: not used: {reason}" for name, reason in summary["unusable"].items()),

@@ -189,7 +189,8 @@ def _scored(
         about = _scored_sequence(each, methods, frames, kept, found, worst, seen)
         done += each.expected
         known[each.name] = about | {
-            key: {method.name: about[key][method.name] for method in methods} for key in ("missing", "unfit")
+            key: {method.name: of[method.name] for method in methods if method.name in of}
+            for key, of in ((key, about.get(key, {})) for key in ("missing", "unfit", "of_methods"))
         }
         rows += [row for method in methods for group in sorted(found[method.name]) for row in found[method.name][group]]
     if report:
@@ -221,8 +222,9 @@ def _scored_sequence(
         name: facts["groups"] * frames - sum(map(len, [*found[name].values(), *reasons.values()]))
         for name, reasons in unfit.items()
     }
-    lacking = {"missing": missing, "unfit": unfit}
-    about = facts | {key: (about[key] if about else {}) | of for key, of in lacking.items()}
+    said = {method.name: [*method.remarks] for method in running if method.remarks}
+    lacking: dict[str, dict[str, Any]] = {"missing": missing, "unfit": unfit, "of_methods": said}
+    about = facts | {key: (about or {}).get(key, {}) | of for key, of in lacking.items()}
     kept.finish(footage.name, about)
     return about
 

@@ -20,11 +20,12 @@ from interp.data.dataset_spec import DatasetSpec
 from interp.data.layouts import open_sequence, sequences_in
 from interp.data.layouts.own import Own
 from interp.evaluate.films import Film
-from interp.evaluate.predictions import by_frame, predictions_in
+from interp.evaluate.pairing import paired
+from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import methods_of
 from interp.evaluate.recordings import Recording
-from interp.evaluate.remarks import left_out
+from interp.evaluate.remarks import left_out, notes
 from interp.evaluate.run import evaluate
 from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
@@ -411,20 +412,93 @@ def test_numbered_predictions_of_which_some_are_missing_are_of_the_frames_of_the
 @pytest.mark.parametrize("numbers", [range(1, 4), range(2, 4), range(5, 8), [3]])
 def test_predictions_of_the_first_gaps_alone_are_known_by_their_numbers(numbers: Iterable[int]) -> None:
     files = {k: Path(f"{k:06d}.png") for k in numbers}
-    assert by_frame([*files.values()], 213, 4) == files
+    assert paired([*files.values()], 213, Protocol(3, 3)).files == files
 
 
 def test_predictions_are_of_the_frames_that_are_rebuilt_wherever_the_first_key_frame_is() -> None:
     files = [Path(f"{k}.png") for k in range(14)]
     for begin, frames in ((0, 17), (1, 18), (3, 25)):
         rebuilt = [begin + gap + place for gap in (0, 8) for place in range(1, 8)]
-        assert by_frame(files, frames, 8, begin) == dict(zip(rebuilt, files, strict=True))
+        assert paired(files, frames, Protocol(), begin).files == dict(zip(rebuilt, files, strict=True))
 
 
 @pytest.mark.parametrize("names", [["a", "b", "c"], ["1", "2", "3", "4"], ["7a7", "8b7", "9c7"]])
 def test_predictions_of_which_nobody_can_tell_what_they_are_of_are_refused(names: list[str]) -> None:
     with pytest.raises(DataError, match=r"\d pictures for 13 frames, of which 9 are rebuilt; expected as many as"):
-        by_frame([Path(f"{name}.png") for name in names], 13, 4)
+        paired([Path(f"{name}.png") for name in names], 13, Protocol(3, 3))
+
+
+SKIPPED = [k for k in range(16) if k % 8]
+FINER = [k for k in range(32) if k % 16]
+HALVES = [k // 2 if k % 2 == 0 else None for k in FINER]
+
+
+@pytest.mark.parametrize(
+    ("insert", "limit", "numbers", "frames"),
+    [
+        (3, None, range(6), [2, 4, 6, 10, 12, 14]),
+        (3, None, range(1, 7), [2, 4, 6, 10, 12, 14]),
+        (3, None, [1, 2, 3, 5, 6, 7], [2, 4, 6, 10, 12, 14]),
+        (3, None, [2, 4, 6, 10, 12, 14], [2, 4, 6, 10, 12, 14]),
+        (3, 1, range(3), [2, 4, 6]),
+        (3, 1, range(6), [2, 4, 6, 10, 12, 14]),
+        (3, None, range(14), SKIPPED),
+        (15, None, range(30), HALVES),
+        (15, None, FINER, HALVES),
+        (15, None, range(33), [k // 2 if k % 2 == 0 else None for k in range(33)]),
+        (15, None, range(14), SKIPPED),
+        (5, None, range(10), [None, None, 4, None, None, None, None, 12, None, None]),
+        (7, 1, range(7), range(1, 8)),
+        (7, 1, range(1, 8), range(1, 8)),
+        (7, 1, range(9, 16), range(9, 16)),
+        (7, 1, range(14), SKIPPED),
+        (7, 1, range(9), range(9)),
+        (7, None, range(17), range(17)),
+        (7, None, range(18), range(18)),
+        (3, None, range(19), range(19)),
+        (15, 1, range(19), range(19)),
+        (7, None, range(25), range(25)),
+    ],
+)
+def test_predictions_are_as_many_as_are_rebuilt_of_the_gaps_asked_for(
+    insert: int, limit: int | None, numbers: Iterable[int], frames: Iterable[int | None]
+) -> None:
+    files = [Path(f"{k:06d}.png") for k in numbers]
+    expected = {frame: path for frame, path in zip(frames, files, strict=True) if frame is not None}
+    assert paired(files, 19, Protocol(7, insert), limit=limit).files == expected
+
+
+@pytest.mark.parametrize(
+    ("insert", "limit", "numbers", "rebuilt"),
+    [
+        (7, None, range(7), 14),  # the first 7 frames, or those of the first gap
+        (3, None, range(9), 6),  # the first 9 frames, or those made and the key frames around
+        (3, 1, range(5), 3),
+        (3, None, range(1, 4), 6),
+        (15, None, range(10), 30),
+        (15, None, range(20, 40), 30),
+        (7, None, range(21), 14),
+        (7, None, range(10_000, 10_240, 40), 14),
+    ],
+)
+def test_predictions_that_may_be_of_frames_or_a_count_of_their_own_are_refused(
+    insert: int, limit: int | None, numbers: Iterable[int], rebuilt: int
+) -> None:
+    files = [Path(f"{k:06d}.png") for k in numbers]
+    with pytest.raises(DataError, match=rf"{len(files)} pictures for 19 frames, of which {rebuilt} are rebuilt"):
+        paired(files, 19, Protocol(7, insert), limit=limit)
+
+
+def test_where_pictures_were_paired_by_less_than_their_number_it_is_said(tmp_path: Path) -> None:
+    truth = pictures(9)
+    write_hsergb(tmp_path / "seq", truth)
+    write_predictions(tmp_path / "theirs" / "seq", truth[1:4])
+    options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    found = evaluate([str(tmp_path / "seq")], tmp_path / "report", limit=1, **options)
+    assert found.summary["methods"]["theirs"]["perfect"] == 3
+    assert "seq: theirs: 3 pictures are taken for those rebuilt in the first gap" in notes(found.summary)
+    again = evaluate([str(tmp_path / "seq")], tmp_path / "report", limit=1, resume=True, **options)
+    assert again.summary == found.summary
 
 
 def test_what_cannot_be_scored_is_said(tmp_path: Path) -> None:
