@@ -59,12 +59,22 @@ class Film:
     """A video, or `scene:NAME`, of which frames are dropped.
 
     name    by which it is called
+    called  what folders of others' pictures of it may be called; as it is if that is not known
     limit   groups that are scored, from the first on; None for all
     Raises UsageError for a source that is not there, or is a recording, DataError for one that cannot be read.
     """
 
-    def __init__(self, video: str, protocol: Protocol, name: str, simulated: Simulated, limit: int | None = None):
+    def __init__(
+        self,
+        video: str,
+        protocol: Protocol,
+        name: str,
+        simulated: Simulated,
+        limit: int | None = None,
+        called: tuple[str, ...] = (),
+    ):
         self.name, self.video, self.protocol, self.limit = name, video, protocol, limit
+        self.called = called or (name,)
         self.multiple, self.begin, self._simulated, self._told = protocol.multiple, 0, simulated, Told()
         source = simulated.opened(video)
         if not source.rewindable:

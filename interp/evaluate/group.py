@@ -61,6 +61,7 @@ class Footage(Protocol):
     """A sequence to be scored.
 
     name        by which it is called, and its files
+    called      what folders of others' pictures of it may be called, the likeliest first
     expected    number of groups, for progress; may be an estimate
     multiple    frames per key frame
     begin       the first key frame
@@ -70,6 +71,7 @@ class Footage(Protocol):
     """
 
     name: str
+    called: tuple[str, ...]
     expected: int
     multiple: int
     begin: int

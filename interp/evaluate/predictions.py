@@ -3,7 +3,7 @@
     DIR/SEQUENCE/*.png            one method, called like DIR
     DIR/SEQUENCE/METHOD/*.png     several; what is called GT is the truth, and is left alone
 
-Which frames they are of, `pairing.py` says.
+How folders are called, `prediction_folders.py` says, and `pairing.py` which frames the pictures are of.
 """
 
 from __future__ import annotations
@@ -18,13 +18,10 @@ import numpy as np
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.naming import plain
 from interp.evaluate.pairing import paired
+from interp.evaluate.prediction_folders import SUFFIX, TRUTH, other_pictures, pictures_in, sequence_folders
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
-from vid2ev.light.recognise import natural
 from vid2ev.recording.manifest import identity
-
-TRUTH = "gt"
-SUFFIX = ".png"
 
 
 @dataclass(frozen=True)
@@ -47,8 +44,11 @@ class Predictions:
 
     def begin(self, footage: Footage) -> Self:
         """See `interp.evaluate.rebuilders.Rebuilder`."""
-        folder = self.folder / footage.name
-        files = pictures_in(folder / self.within if self.within else folder)
+        places = [self.folder / name / (self.within or "") for name in footage.called]
+        if not any(place.is_dir() for place in places):
+            missing = f"no folder {' or '.join(map(str, places))}"
+            return replace(self, files={}, unpaired=missing, unfit={}, remarks=())
+        files = next(filter(None, map(pictures_in, places)), [])
         try:
             known, remark = paired(files, footage.frames, footage.protocol, footage.begin, footage.limit)
             return replace(self, files=known, unpaired="", unfit={}, remarks=(remark,) if remark else ())
@@ -71,29 +71,22 @@ class Predictions:
             return None
 
 
-def predictions_in(folder: str | Path) -> list[Predictions]:
-    """The methods whose pictures a folder holds, in order of their names.  Raises UsageError where there are none."""
+def predictions_in(folder: str | Path, footage: Sequence[Footage] = ()) -> list[Predictions]:
+    """The methods whose pictures of footage a folder holds, in order of their names.  Raises UsageError where there
+    are none."""
     folder = Path(folder)
-    children = sorted(each for each in folder.iterdir() if each.is_dir()) if folder.is_dir() else []
-    inner = sorted({each.name for child in children for each in child.iterdir() if each.is_dir() and pictures_in(each)})
-    known = identity(folder, copies=True, deep=True) if children else {}
+    sequences = sequence_folders(folder, footage)
+    inner = sorted({each.name for of in sequences for each in of.iterdir() if each.is_dir() and pictures_in(each)})
+    known = identity(folder, copies=True, deep=True) if sequences else {}
     found = [Predictions(plain(name), folder, name, known) for name in inner if name.lower() != TRUTH]
-    if any(pictures_in(child) for child in children):
+    if any(map(pictures_in, sequences)):
         found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known))
     if not found:
+        others = "".join(f"; {said}" for said in other_pictures(folder, sequences))
         raise UsageError(
-            f"{folder}: no predictions in it; expected SEQUENCE/*{SUFFIX}, or SEQUENCE/METHOD/*{SUFFIX}, in it"
+            f"{folder}: no predictions in it; expected SEQUENCE/*{SUFFIX}, or SEQUENCE/METHOD/*{SUFFIX}, in it{others}"
         )
     return found
-
-
-def pictures_in(folder: Path) -> list[Path]:
-    """The pictures in a folder, in natural order of their names; none where there is no folder.
-
-    Hidden files are none: macOS puts ._NAME.png beside NAME.png on disks of others.
-    """
-    found = (path for path in folder.iterdir() if not path.name.startswith(".")) if folder.is_dir() else ()
-    return sorted((path for path in found if path.suffix.lower() == SUFFIX), key=lambda path: natural(path.name))
 
 
 def _read(path: Path, shape: tuple[int, ...]) -> np.ndarray:

@@ -24,11 +24,15 @@ class Recording:
     """A sequence on disk.
 
     name    by which it is called
+    called  what folders of others' pictures of it may be called; as it is if that is not known
     limit   groups that are scored, from the first on; None for all
     """
 
-    def __init__(self, sequence: Sequence, protocol: Protocol, name: str, limit: int | None = None):
+    def __init__(
+        self, sequence: Sequence, protocol: Protocol, name: str, limit: int | None = None, called: tuple[str, ...] = ()
+    ):
         self.name, self._sequence, self.protocol, self.limit = name, sequence, protocol, limit
+        self.called = called or (name,)
         self.multiple = multiple = protocol.multiple
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
         self.begin = self._own_keys[0] if self._own_keys else 0

@@ -16,14 +16,13 @@ def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
         counts |= {f"frames that {method} lacks": count for method, count in of["missing"].items() if count}
         for method, reasons in of["unfit"].items():
             counts |= {
-                f"frames of {method}: {reason} ({_several(which)})": len(which) for reason, which in reasons.items()
+                f"frames of {method}: {reason} ({several(which)})": len(which) for reason, which in reasons.items()
             }
         for reason, count in counts.items():
             found.setdefault(reason, {})[name] = count
     alone = len(summary["sequences"]) == 1
     return {
-        reason if alone else f"{reason}, in {_several(counts)}": sum(counts.values())
-        for reason, counts in found.items()
+        reason if alone else f"{reason}, in {several(counts)}": sum(counts.values()) for reason, counts in found.items()
     }
 
 
@@ -36,7 +35,7 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
             said.setdefault(remark, []).append(name)
     return [
         *(f"{name}: not used: {reason}" for name, reason in summary["unusable"].items()),
-        *(f"{_several(names)}: {remark}" for remark, names in said.items()),
+        *(f"{several(names)}: {remark}" for remark, names in said.items()),
         *_decoded_otherwise(summary),
         *_perfect(summary["methods"]),
     ]
@@ -47,13 +46,20 @@ def notes(summary: Mapping[str, Any]) -> list[str]:
     return [*remarks(summary), *(f"not scored: {count} {reason}" for reason, count in left_out(summary).items())]
 
 
+def several(names: Iterable[str]) -> str:
+    """Names, the first of many."""
+    listed = list(names)
+    more = len(listed) - NAMED
+    return ", ".join(listed) if more <= 1 else f"{', '.join(listed[:NAMED])} and {more} more"
+
+
 def _decoded_otherwise(summary: Mapping[str, Any]) -> Iterator[str]:
     """Where others' pictures are of videos whose colours every decoder makes for itself."""
     others = [name for name, of in summary["identities"].items() if not {"closed_form", "weights_sha256"} & {*of}]
     videos = [name for name, of in summary["sequences"].items() if str(of.get("stored", "")).startswith("yuv")]
     if others and videos:
         yield (
-            f"{_several(others)} on {_several(videos)}: decoders make other RGB of YUV, by 40 to 50 dB; to compare"
+            f"{several(others)} on {several(videos)}: decoders make other RGB of YUV, by 40 to 50 dB; to compare"
             " methods finely, make PNG of the video, give these to all of them, and score the folder"
         )
 
@@ -62,9 +68,3 @@ def _perfect(methods: Mapping[str, Any]) -> Iterator[str]:
     for name, of in methods.items():
         if of["perfect"]:
             yield f"{name}: {of['perfect']} frames without any error count as 100 dB each"
-
-
-def _several(names: Iterable[str]) -> str:
-    listed = list(names)
-    more = len(listed) - NAMED
-    return ", ".join(listed) if more <= 1 else f"{', '.join(listed[:NAMED])} and {more} more"

@@ -19,6 +19,7 @@ from typing import Any
 from interp.evaluate.figures.of_evaluation import write_figures
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.kept import Kept, KeptRows
+from interp.evaluate.prediction_folders import passed_over
 from interp.evaluate.predictions import predictions_in
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.rebuilders import Rebuilder, methods_of
@@ -98,9 +99,14 @@ def evaluate(
     folder, protocol = Path(folder), protocol or Protocol()
     simulated = simulated or Simulated.of("clean")
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
-    methods += [made for place in predictions for made in predictions_in(place)]
-    _check(methods)
+    if not (methods or predictions):
+        raise UsageError("nothing to score: expected a baseline, a network or predictions")
     found = footage_of([*map(str, datasets)], protocol, simulated, limit)
+    for place in predictions:
+        methods += predictions_in(place, found.footage)
+        if said := passed_over(Path(place), found.footage):
+            found.unusable[str(place)] = said
+    _check(methods)
     job = {
         "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit, "device": device,
         "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},
@@ -137,8 +143,6 @@ def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
 
 def _check(methods: Sequence[Rebuilder]) -> None:
     names = [method.name for method in methods]
-    if not names:
-        raise UsageError("nothing to score: expected a baseline, a network or predictions")
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise UsageError(f"two methods are called '{twice}': expected names that differ; rename a file or folder")
 

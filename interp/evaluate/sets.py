@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ from interp.data.layouts import opened_in
 from interp.evaluate.films import Film
 from interp.evaluate.group import Footage
 from interp.evaluate.naming import apart, plain
+from interp.evaluate.prediction_folders import folder_names
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
 from interp.evaluate.simulated import Simulated
@@ -39,9 +40,10 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
         unusable |= broken
     footage, sets, called = list[Footage](), dict[str, list[str]](), set_names([*dict.fromkeys(datasets)])
     names = apart([_called(place) for _, place in places])
-    for (dataset, place), name in zip(places, names, strict=True):
+    folders = _folders_of(places, names, called)
+    for (dataset, place), name, folder in zip(places, names, folders, strict=True):
         try:
-            made = _opened(place, protocol, name, simulated, limit)
+            made = _opened(place, protocol, name, simulated, limit, folder)
         except DataError as error:
             unusable[place if isinstance(place, str) else str(place.folder)] = str(error)
             continue
@@ -54,17 +56,49 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
 
 def set_names(datasets: Sequence[str]) -> dict[str, str]:
     """What data sets are called: by the ends of their paths, as long as it takes to tell them apart."""
+    return dict(zip(datasets, apart(_ends_of(datasets)), strict=True))
+
+
+def _ends_of(datasets: Sequence[str]) -> list[str]:
     parts = [(each,) if is_scene(each) else Path(each).resolve().parts for each in datasets]
     longest = max(map(len, parts))
     ends = (["/".join(each[-length:]) for each in parts] for length in range(1, longest + 1))
-    told = next((names for names in ends if len({*map(plain, names)}) == len(names)), list(datasets))
-    return dict(zip(datasets, apart(told), strict=True))
+    return next((names for names in ends if len({*map(plain, names)}) == len(names)), list(datasets))
 
 
-def _opened(place: str | Recorded, protocol: Protocol, name: str, simulated: Simulated, limit: int | None) -> Footage:
+def _folders_of(
+    places: Sequence[tuple[str, str | Recorded]], names: Sequence[str], called: Mapping[str, str]
+) -> list[tuple[str, ...]]:
+    """What folders of others' pictures may be called, of each place."""
+    on_disk, several = [_on_disk(place) for _, place in places], len(called) > 1
+    ends = dict(zip(called, _ends_of([*called]), strict=True))
+    below = [
+        [*_below((ends[dataset], called[dataset]), own, dataset, place)] if several else []
+        for (dataset, place), own in zip(places, on_disk, strict=True)
+    ]
+    return folder_names(on_disk, names, below)
+
+
+def _below(sets: Sequence[str], own: Sequence[str], dataset: str, place: str | Recorded) -> Iterator[str]:
+    """The paths of a place below the names of its data set; a data set that is a recording may be its own."""
+    for each in sets:
+        if not Path(each).is_absolute():
+            if "/" in each and Path(dataset) == (Path(place) if isinstance(place, str) else place.folder):
+                yield each
+            yield from (f"{each}/{name}" for name in own)
+
+
+def _opened(
+    place: str | Recorded,
+    protocol: Protocol,
+    name: str,
+    simulated: Simulated,
+    limit: int | None,
+    called: tuple[str, ...],
+) -> Footage:
     if isinstance(place, str):
-        return Film(place, protocol, name, simulated, limit)
-    return Recording(place, protocol, name, limit)
+        return Film(place, protocol, name, simulated, limit, called)
+    return Recording(place, protocol, name, limit, called)
 
 
 def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
@@ -75,6 +109,8 @@ def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
         found, unusable = opened_in(dataset)
     except UsageError:
         return [*sources_in(dataset)], {}
+    if any(each.folder == Path(dataset) for each in found):  # (its pictures are no data beside it)
+        return [*found], unusable
     recordings = {Path(dataset), *(each.folder for each in found), *map(Path, unusable)}
     beside = [each for each in sources_in(dataset) if Path(each) not in recordings]
     return [*found], unusable | dict.fromkeys(beside, "no recording, in a folder of such; give it by itself")
@@ -84,3 +120,11 @@ def _called(place: str | Recorded) -> str:
     if not isinstance(place, str):
         return place.folder.resolve().name
     return place.removeprefix(SCENE_PREFIX) if is_scene(place) else Path(place).stem
+
+
+def _on_disk(place: str | Recorded) -> list[str]:
+    """What a place is called on disk: a folder of pictures by the whole of its name, too."""
+    folder = isinstance(place, str) and not is_scene(place) and Path(place).is_dir()
+    whole = [Path(str(place)).resolve().name] if folder else []
+    names = [*whole, _called(place).rpartition("/")[2]]
+    return [each for each in dict.fromkeys(names) if each not in ("", ".", "..")]

@@ -537,8 +537,10 @@ def test_predictions_that_are_missing_or_cannot_be_used_are_named_and_counted(tm
     write_predictions(tmp_path / "theirs" / "a", truth[:7])
     options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
     found = evaluate([str(tmp_path / "data")], tmp_path / "report", **options)
-    assert {name: of["missing"]["theirs"] for name, of in found.summary["sequences"].items()} == {"a": 4, "b": 9}
+    assert {name: of["missing"]["theirs"] for name, of in found.summary["sequences"].items()} == {"a": 4, "b": 0}
     assert len(found.rows) == 5
+    nowhere = f"not scored: 9 frames of theirs: no folder {tmp_path / 'theirs' / 'b'} ("
+    assert any(each.startswith(nowhere) for each in notes(found.summary))
     for name in ("a", "b"):
         write_predictions(tmp_path / "odd" / name, truth)
     for k in (2, 3):
@@ -564,6 +566,52 @@ def test_predictions_that_are_missing_or_cannot_be_used_are_named_and_counted(tm
         evaluate([str(tmp_path / "data")], tmp_path / "third", **options)
     with pytest.raises(UsageError, match="no predictions in it"):
         predictions_in(tmp_path / "data" / "a" / "events_aligned")
+
+
+@pytest.mark.parametrize("folder", ["my seq (1)", "my-seq-1"])
+def test_predictions_are_found_by_what_sequences_are_called_on_disk(tmp_path: Path, folder: str) -> None:
+    write_hsergb(tmp_path / "my seq (1)", pictures(5))
+    write_predictions(tmp_path / "theirs" / folder, pictures(5))
+    options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    found = evaluate([str(tmp_path / "my seq (1)")], tmp_path / "report", **options)
+    assert found.summary["methods"]["theirs"]["perfect"] == 3 and not found.summary["unusable"]
+
+
+def test_predictions_are_found_below_their_data_set(tmp_path: Path) -> None:
+    truths = {name: pictures(5, seed) for seed, name in enumerate(("close", "far"))}
+    for name, truth in truths.items():
+        write_hsergb(tmp_path / name / "x", truth)
+        write_predictions(tmp_path / "theirs" / name / "x" / "ours", truth)
+    options: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    for below in ("", "x"):  # (the sets, and the sequences themselves)
+        asked = [str(tmp_path / name / below) for name in truths]
+        found = evaluate(asked, tmp_path / f"report{below}", **options)
+        assert list(found.summary["methods"]) == ["ours"] and found.summary["methods"]["ours"]["perfect"] == 6
+        assert not found.summary["unusable"]
+
+
+def test_folders_of_predictions_that_fit_no_sequence_and_pictures_that_are_no_png_are_named(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "my seq", pictures(5))
+    write_predictions(tmp_path / "theirs" / "other", pictures(5))
+    (tmp_path / "theirs" / "notes").mkdir()
+    options: dict[str, Any] = {"baselines": ("linear",), "predictions": [tmp_path / "theirs"]}
+    options["protocol"] = Protocol(3, 3)
+    found = evaluate([str(tmp_path / "my seq")], tmp_path / "report", **options)
+    where = tmp_path / "theirs"
+    said = notes(found.summary)
+    assert f"{where}: not used: folders of no sequence that is scored: other" in said
+    assert any(f"3 frames of theirs: no folder {where / 'my seq'} or {where / 'my-seq'} (" in each for each in said)
+    write_predictions(where / "my seq" / "ours", pictures(5))
+    (where / "my seq" / "ours" / "frame9.jpg").write_bytes(b"")
+    (where / "my seq" / "soft").mkdir()
+    (where / "my seq" / "soft" / "0.jpg").write_bytes(b"")
+    found = evaluate([str(tmp_path / "my seq")], tmp_path / "other", **options)
+    assert any("pictures that are no PNG: 2 in my seq/ours, my seq/soft (frame9.jpg, 0.jpg); save" in each
+               for each in notes(found.summary))  # fmt: skip
+    shutil.rmtree(where / "other")
+    shutil.rmtree(where / "my seq" / "ours")
+    with pytest.raises(UsageError, match=r"no predictions in it; .*; pictures that are no PNG: 1 in my seq/soft"):
+        evaluate([str(tmp_path / "my seq")], tmp_path / "third", **options)
 
 
 def test_data_sets_of_all_kinds_have_names_that_differ(tmp_path: Path) -> None:
