@@ -95,6 +95,7 @@ def evaluate(
     from interp.evaluate.protocol import Protocol
     from interp.evaluate.remarks import notes
     from interp.evaluate.report import PAGE
+    from interp.evaluate.report.coverage import uneven
     from interp.evaluate.report.markdown import aligned
     from interp.evaluate.report.overview import full_scale_table, protocol_table
     from interp.evaluate.run import evaluate as evaluated
@@ -133,7 +134,7 @@ def evaluate(
         for table in (protocol_table(found.rows), full_scale_table(found.rows)):
             click.echo(f"{table.title}\n\n{aligned(table)}\n")
         click.echo(f"{folder / PAGE}: {len(found.rows)} rows of {len(found.summary['sequences'])} sequences")
-    for note in notes(found.summary):
+    for note in (*notes(found.summary), *filter(None, (uneven(found.rows),))):
         click.echo(f"note: {note}", err=True)
 
 

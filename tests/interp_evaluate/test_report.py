@@ -15,8 +15,17 @@ from scored import METHODS, SEQUENCES, row, scored
 from interp.evaluate.conditions import varying
 from interp.evaluate.published import of_gap
 from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_report
+from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
+from interp.evaluate.report.coverage import uneven
 from interp.evaluate.report.markdown import escaped, markdown
+from interp.evaluate.report.overview import (
+    best_method,
+    full_scale_table,
+    position_table,
+    protocol_table,
+    sequence_table,
+)
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError
 
@@ -191,6 +200,26 @@ def test_methods_with_other_frames_are_compared_over_those_that_all_have() -> No
     said = markdown(document(rows, {}))
     assert "2 frames have those of all" in said and "| a | 21.50 ± 0.50 |" in said
     assert "have those of all" not in markdown(document(rows[:3], {}))
+
+
+def test_a_method_with_few_frames_is_not_the_best() -> None:
+    rows = [row(method="all", position=p, psnr=28.0 + p, ssim=0.9, psnr_255=28.0, motion_px=p) for p in range(1, 8)]
+    rows += [row(method="worse", position=p, psnr=20.0, ssim=0.8, psnr_255=20.0, motion_px=p) for p in range(1, 8)]
+    rows += [row(method="easy", position=1, psnr=40.0, ssim=0.99, psnr_255=40.0, motion_px=1)]
+    assert best_method(rows) == "all"
+    for table in (protocol_table(rows), full_scale_table(rows), sequence_table(rows, "psnr", "")):
+        for line in table.lines:
+            of = dict(zip(table.head[1:], line.cells, strict=True))
+            assert not of.get("easy", Cell("")).best
+            assert line.name not in ("easy", "worse") or not any(cell.best for cell in line.cells)
+        assert any(cell.best for line in table.lines for cell in line.cells)
+    assert any(cell.best for cell in position_table(rows, "psnr", "").lines[0].cells[2:]), "the only frame that it has"
+    said = markdown(document(rows, {}))
+    assert "all, 7 of 7 frames, has 32.00 ± 2.00 dB and SSIM 0.900 ± 0.000, worse, 7 of 7 frames, 20.00" in said
+    assert "dB; over fewer frames, and not to be compared: easy, 1 of 7 frames, 40.00 dB." in said
+    warning = "Not all methods have scores of all frames: easy has 1 of 7 frames; 1 frame has those of all; only"
+    assert said.index(warning) < said.index("Time Lens protocol")
+    assert uneven(rows).startswith(warning) and not uneven(rows[:14])
 
 
 def test_gaps_of_two_lengths_have_chapters_of_their_own(tmp_path: Path) -> None:

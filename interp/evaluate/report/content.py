@@ -6,12 +6,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from interp.evaluate.conditions import varying
+from interp.evaluate.remarks import several
 from interp.evaluate.report.about import About
 from interp.evaluate.report.beside_paper import comparison_table, quality_table
 from interp.evaluate.report.blocks import Block, Cell, Document, Items, Line, Plot, Section, Table, Text
+from interp.evaluate.report.coverage import fullest, many, shares, uneven
 from interp.evaluate.report.frame_plots import distribution_plot, over_time_plot
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
-from interp.evaluate.report.numbers import PSNR_DIGITS, SCORES, SSIM_DIGITS, number, spread
+from interp.evaluate.report.numbers import PSNR_DIGITS, SCORES, SSIM_DIGITS, spread
 from interp.evaluate.report.overview import (
     breaking_points,
     by_method,
@@ -52,20 +54,26 @@ def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()
 
 
 def _answer(rows: Sequence[Row]) -> str:
-    """The best method and the second, in one sentence."""
-    means = {method: pooled(part, "psnr") for method, part in by_method(rows).items()}
-    ordered = sorted((name for name in means if means[name].count), key=lambda name: -means[name].mean)
+    """The best method and the second, in one sentence; and those that have fewer frames, which are neither."""
+    parts, full, share = by_method(rows), fullest(rows), shares(rows)
+    means = {method: pooled(part, "psnr") for method, part in parts.items()}
+    scored = sorted((name for name in means if means[name].count), key=lambda name: -means[name].mean)
     frames = len({(row.sequence, row.group, row.position) for row in rows})
     sequences = len({row.sequence for row in rows})
     said = (
-        f"{_many(frames, 'frame')} of {_many(sequences, 'sequence')}, {rows[0].multiple - 1} skipped between key frames"
+        f"{many(frames, 'frame')} of {many(sequences, 'sequence')}, {rows[0].multiple - 1} skipped between key frames"
     )
-    if not ordered:
+    if not scored:
         return f"{said}; no score is known."
-    best, *others = ordered
-    ssim = pooled(by_method(rows)[best], "ssim")
-    said += f": {best} has {spread(means[best], PSNR_DIGITS)} dB and SSIM {spread(ssim, SSIM_DIGITS)}"
-    return f"{said}, {others[0]} {spread(means[others[0]], PSNR_DIGITS)} dB." if others else f"{said}."
+    named = {name: f"{name}, {share[name]}," if share else name for name in scored}
+    psnr = {name: f"{spread(means[name], PSNR_DIGITS)} dB" for name in scored}
+    ranked = [name for name in scored if name in full] or scored
+    best, *others = ranked
+    ssim = pooled(parts[best], "ssim")
+    said += f": {named[best]} has {psnr[best]} and SSIM {spread(ssim, SSIM_DIGITS)}"
+    said += f", {named[others[0]]} {psnr[others[0]]}" if others else ""
+    fewer = several(f"{named[name]} {psnr[name]}" for name in scored if name not in ranked)
+    return f"{said}; over fewer frames, and not to be compared: {fewer}." if fewer else f"{said}."
 
 
 def _from_truth(rows: Sequence[Row], simulated: Sequence[str]) -> Iterator[Block]:
@@ -78,7 +86,7 @@ def _from_truth(rows: Sequence[Row], simulated: Sequence[str]) -> Iterator[Block
 def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str, list[Block]]:
     conditions = varying(rows)
     chapter: dict[str, list[Block]] = {
-        "All methods": [protocol_table(rows), full_scale_table(rows), *_uneven(rows)],
+        "All methods": [*_warned(uneven(rows)), protocol_table(rows), full_scale_table(rows), *_uneven(rows)],
         "By data set": [set_table(rows, sets, field, name) for field, name in SCORES.items() if len(sets) > 1],
         "By sequence": [
             *_drawn(distribution_plot(rows), "PSNR of the frames of each sequence: middle half, all but 5 % on either"
@@ -111,10 +119,7 @@ def _uneven(rows: Sequence[Row]) -> Iterator[Block]:
         for method, part in by_method(rows).items()
     }
     common = set.intersection(*map(set, parts.values()))
-    if all(set(part) == common for part in parts.values()):
-        return
-    yield Text(f"Not all methods have scores of all frames; {_many(len(common), 'frame')} have those of all.", True)
-    if common:
+    if common and uneven(rows):
         yield Table(
             ("method", "PSNR, pooled", "SSIM, pooled"),
             tuple(_common_line(method, [part[key] for key in sorted(common)]) for method, part in parts.items()),
@@ -125,6 +130,10 @@ def _uneven(rows: Sequence[Row]) -> Iterator[Block]:
 def _common_line(method: str, rows: Sequence[Row]) -> Line:
     psnr, ssim = pooled(rows, "psnr"), pooled(rows, "ssim")
     return Line(method, (Cell(spread(psnr, PSNR_DIGITS)), Cell(spread(ssim, SSIM_DIGITS))))
+
+
+def _warned(said: str) -> list[Block]:
+    return [Text(said, warning=True)] if said else []
 
 
 def _drawn(svg: str | None, caption: str) -> list[Block]:
@@ -159,7 +168,7 @@ def _unknown_motion(rows: Sequence[Row]) -> Iterator[str]:
     frames = {(row.sequence, row.group, row.position): row.motion_px for row in rows}
     if unknown := sum(map(math.isnan, frames.values())):
         yield (
-            f"the motion between the key frames is not known of {unknown} of {_many(len(frames), 'frame')}, which are"
+            f"the motion between the key frames is not known of {unknown} of {many(len(frames), 'frame')}, which are"
             " not among those against motion, speed and blur: optical flow does not follow what changes, as where it"
             " moves far, flickers or is noise"
         )
@@ -171,7 +180,3 @@ def _value(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(_value, value))
     return str(value)
-
-
-def _many(count: int, name: str) -> str:
-    return f"{number(count, 0)} {name}{'s' * (count != 1)}"

@@ -39,19 +39,21 @@ def spread(mean: Mean, digits: int) -> str:
     return f"{number(mean.mean, digits)} ± {number(mean.std, digits)}"
 
 
-def cells(values: Sequence[float], shown: Callable[[float], str]) -> tuple[Cell, ...]:
-    """Cells of scores of which one is the best; those that look the same are so together."""
-    texts = [shown(value) for value in values]
-    known = [value for value in values if not math.isnan(value)]
+def cells(means: Sequence[Mean], shown: Callable[[float], str]) -> tuple[Cell, ...]:
+    """Cells of means of which one is the best, of those over the most frames; those that look the same are so
+    together."""
+    most = max((mean.count for mean in means), default=0)
+    texts = [shown(mean.mean) for mean in means]
+    known = [mean.mean for mean in means if mean.count == most and not math.isnan(mean.mean)]
     best = shown(max(known)) if len(known) > 1 else None
-    return tuple(Cell(text, text == best) for text in texts)
+    return tuple(Cell(text, text == best and mean.count == most) for text, mean in zip(texts, means, strict=True))
 
 
-def marked(columns: Iterable[Sequence[tuple[float, str]]]) -> list[tuple[Cell, ...]]:
-    """Lines of cells from columns of (value, text), with the best of each column marked."""
+def marked(columns: Iterable[Sequence[tuple[float, str]]], can_be: Sequence[bool]) -> list[tuple[Cell, ...]]:
+    """Lines of cells from columns of (value, text), with the best of each column marked, of those that can be."""
     done = []
     for column in columns:
-        known = [value for value, _ in column if not math.isnan(value)]
+        known = [value for (value, _), can in zip(column, can_be, strict=True) if can and not math.isnan(value)]
         best = max(known) if len(known) > 1 else math.nan
-        done.append([Cell(text, value == best) for value, text in column])
+        done.append([Cell(text, can and value == best) for (value, text), can in zip(column, can_be, strict=True)])
     return list(zip(*done, strict=True))

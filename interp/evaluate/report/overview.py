@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 from interp.evaluate.conditions import Condition
 from interp.evaluate.report.blocks import Cell, Line, Table
+from interp.evaluate.report.coverage import fullest
 from interp.evaluate.report.numbers import cells, digits_of, marked, number, short, spread
 from interp.evaluate.row import Row
 from interp.evaluate.tables import Bin, Mean, binned, breaks_at, by_position, least, per_sequence, pooled, split
 
 CLEARLY_DB = 3.0  # by which a score has broken down
+NOTHING = Mean(math.nan, math.nan, 0)
 PROTOCOL = "Each frame against the range of its own truth, key frames not scored."
 FULL_SCALE = (
     "Against 255. Moving pixels are those whose truth is more than 10 codes away from either key frame."
@@ -25,8 +27,9 @@ def by_method(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def best_method(rows: Sequence[Row]) -> str | None:
-    """The method of the highest mean PSNR; None if none has a score."""
-    means = {method: pooled(part, "psnr") for method, part in by_method(rows).items()}
+    """The method of the highest mean PSNR, of those that have the most frames; None if none has a score."""
+    full = fullest(rows)
+    means = {method: pooled(part, "psnr") for method, part in by_method(rows).items() if method in full}
     return max((name for name in means if means[name].count), key=lambda name: means[name].mean, default=None)
 
 
@@ -38,13 +41,13 @@ def protocol_table(rows: Sequence[Row]) -> Table:
         ("PSNR, of sequences", per_sequence, "psnr"),
         ("SSIM, of sequences", per_sequence, "ssim"),
     ]
-    parts = by_method(rows)
+    parts, full = by_method(rows), fullest(rows)
     columns = [
         [(found.mean, spread(found, digits_of(field))) for found in (mean(part, field) for part in parts.values())]
         for _, mean, field in means
     ]
     counts = [Cell(f"{len(part):,}") for part in parts.values()]
-    lines = zip(parts, counts, marked(columns), strict=True)
+    lines = zip(parts, counts, marked(columns, [method in full for method in parts]), strict=True)
     return Table(
         ("method", "frames", *(name for name, _, _ in means)),
         tuple(Line(method, (count, *line)) for method, count, line in lines),
@@ -63,10 +66,10 @@ def full_scale_table(rows: Sequence[Row]) -> Table:
         "worst patch, PSNR": "patch_psnr",
         "worst patch, SSIM": "patch_ssim",
     }
-    parts = by_method(rows)
+    parts, full = by_method(rows), fullest(rows)
     columns = [[_plain(pooled(part, field).mean, field) for part in parts.values()] for field in means.values()]
     columns += [[_plain(least(part, field), field) for part in parts.values()] for field in worst.values()]
-    lines = zip(parts, marked(columns), strict=True)
+    lines = zip(parts, marked(columns, [method in full for method in parts]), strict=True)
     return Table(
         ("method", *means, *worst),
         tuple(Line(method, line) for method, line in lines),
@@ -82,7 +85,7 @@ def set_table(rows: Sequence[Row], sets: Mapping[str, Sequence[str]], field: str
         Line(
             name,
             cells(
-                [pooled([row for row in part if row.sequence in of], field).mean for part in parts.values()],
+                [pooled([row for row in part if row.sequence in of], field) for part in parts.values()],
                 _shown(field),
             ),
         )
@@ -97,9 +100,9 @@ def sequence_table(rows: Sequence[Row], field: str, title: str) -> Table:
     lines = []
     for sequence, scored in split(rows, lambda row: row.sequence).items():
         own = by_method(scored)
-        found = [pooled(own.get(method, []), field).mean for method in parts]
+        found = [pooled(own.get(method, []), field) for method in parts]
         lines.append(Line(sequence, cells(found, _shown(field))))
-    everything = [pooled(part, field).mean for part in parts.values()]
+    everything = [pooled(part, field) for part in parts.values()]
     lines.append(Line("all frames", cells(everything, _shown(field))))
     return Table(("sequence", *parts), tuple(lines), title)
 
@@ -107,10 +110,9 @@ def sequence_table(rows: Sequence[Row], field: str, title: str) -> Table:
 def position_table(rows: Sequence[Row], field: str, title: str) -> Table:
     """A line for each place between the key frames."""
     parts = {method: by_position(part, field) for method, part in by_method(rows).items()}
-    nothing = Mean(float("nan"), float("nan"), 0)
     lines = []
     for position in sorted({row.position for row in rows}):
-        found = [places.get(position, nothing).mean for places in parts.values()]
+        found = [places.get(position, NOTHING) for places in parts.values()]
         lines.append(Line(f"{position}/{rows[0].multiple}", cells(found, _shown(field))))
     return Table(("place in the gap", *parts), tuple(lines), title, folded=True)
 
@@ -126,7 +128,7 @@ def condition_table(rows: Sequence[Row], condition: Condition, edges: Sequence[f
         here = [bins.get(low) for bins in parts.values()]
         some = next(one for one in here if one is not None)
         frames = max(one.score.count for one in here if one is not None)
-        found = [float("nan") if one is None else one.score.mean for one in here]
+        found = [NOTHING if one is None else one.score for one in here]
         lines.append(Line(_span(some, edges), (Cell(f"{frames:,}"), *cells(found, _shown(field)))))
     return Table((f"{condition.axis} [{condition.unit}]", "frames", *parts), tuple(lines), title, folded=True)
 
