@@ -15,12 +15,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from interp.data.picture_codes import codes_in
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.naming import plain
 from interp.evaluate.pairing import paired
 from interp.evaluate.prediction_folders import SUFFIX, TRUTH, other_pictures, pictures_in, sequence_folders
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.picture_files import decoded
 from vid2ev.recording.manifest import identity
 
 
@@ -91,17 +91,11 @@ def predictions_in(folder: str | Path, footage: Sequence[Footage] = ()) -> list[
 
 def _read(path: Path, shape: tuple[int, ...]) -> np.ndarray:
     """A picture of a shape.  Raises DataError, which does not name it, for what is none."""
-    import cv2
-
     try:
-        picture = next(iter(decoded(path, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)), None)
+        picture = codes_in(path)
     except DataError as error:
         raise DataError(str(error).removeprefix(f"{path}: ")) from error
     if picture is None or picture.shape != shape:
         size = "no picture" if picture is None else f"{picture.shape[1]}x{picture.shape[0]} pixels"
         raise DataError(f"{size}, expected a picture of {shape[1]}x{shape[0]}")
-    if picture.dtype == np.uint16:
-        picture = np.rint(picture / 257).astype(np.uint8)
-    if picture.dtype != np.uint8:
-        raise DataError(f"{picture.dtype} pixels, expected codes of 8 or 16 bits")
-    return picture[..., ::-1]
+    return picture

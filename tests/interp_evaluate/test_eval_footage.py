@@ -377,6 +377,20 @@ def test_predictions_of_16_bits_are_brought_to_the_nearest_of_8(tmp_path: Path) 
         np.testing.assert_array_equal(np.stack(ours.begin(recording).frames(group)), group.truth)
 
 
+def test_truth_of_16_bits_is_read_as_predictions_are(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "seq", pictures(5))
+    draw = np.random.default_rng(0)
+    deep = draw.integers(0, 65536, (5, 24, 40, 3)).astype(np.uint16)
+    for k, frame in enumerate(deep):
+        write_codes(tmp_path / "seq" / "images_corrected" / f"{k:06d}.png", frame)
+    shutil.copytree(tmp_path / "seq" / "images_corrected", tmp_path / "results" / "seq")
+    (ours,) = predictions_in(tmp_path / "results")
+    recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
+    (group,) = recording.groups()
+    np.testing.assert_array_equal(group.truth, np.rint(deep[1:4] / 257))
+    np.testing.assert_array_equal(np.stack(ours.begin(recording).frames(group)), group.truth)
+
+
 def test_hidden_files_are_no_predictions(tmp_path: Path) -> None:
     # (macOS puts them beside those that it writes to disks of others)
     truth = pictures(13)

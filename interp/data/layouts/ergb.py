@@ -23,9 +23,9 @@ import numpy as np
 
 from interp.data.layouts.event_parts import EventParts, numbered
 from interp.data.layouts.sequence import Placed
+from interp.data.picture_codes import codes_in
 from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
-from vid2ev.light.picture_files import decoded
 
 
 class Names(NamedTuple):
@@ -112,12 +112,10 @@ class Ergb:
         return self._parts.between(start_us, stop_us)
 
     def _picture(self, k: int) -> np.ndarray:
-        import cv2
-
-        found = decoded(self._images[k], cv2.IMREAD_COLOR)
-        if not found:
+        found = codes_in(self._images[k])
+        if found is None:
             raise DataError(f"{self._images[k]} is no picture that can be read; leave it out with its time")
-        return found[0][..., ::-1]
+        return found
 
     def _paired(self, pictures: int, stamps: list[int | None]) -> list[int | None]:
         """The first times for as many pictures; the last ones where only these increase: lines above them are wrong."""
