@@ -19,6 +19,7 @@ from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
 from interp.evaluate.report.coverage import uneven
 from interp.evaluate.report.markdown import escaped, markdown
+from interp.evaluate.report.mean_plots import condition_plot
 from interp.evaluate.report.overview import (
     best_method,
     full_scale_table,
@@ -173,6 +174,14 @@ def test_a_column_that_is_not_known_is_not_drawn() -> None:
     assert [s.title for s in document(rows, {}).sections if s.title.startswith("Against")] == [
         "Against motion between the key frames"
     ]
+
+
+@pytest.mark.parametrize("most_px", [50.0, 250.0])
+def test_a_line_is_spoken_of_where_there_is_one(most_px: float) -> None:
+    rows = [row(position=p, psnr=30.0, ssim=0.9, motion_px=most_px * p / 5) for p in (1, 2, 3, 4, 5)]
+    ((condition, edges),) = varying(rows)
+    plot = condition_plot(rows, condition, edges)
+    assert plot and ("paper: 100" in plot.svg) == ("The line at 100 is" in plot.caption) == (most_px > 100)
 
 
 def test_where_methods_break_down_is_said() -> None:

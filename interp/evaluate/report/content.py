@@ -100,11 +100,9 @@ def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str
         "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
     }  # fmt: skip
     for condition, edges in conditions:
-        caption = f"Mean score in bins of {condition.axis} [{condition.unit}]; below, how many frames are in each."
-        if condition.limit is not None:
-            caption += f" The line at {condition.limit:g} is where the paper's network ends."
+        plot = condition_plot(rows, condition, edges)
         chapter[f"Against {condition.title}"] = [
-            *_drawn(condition_plot(rows, condition, edges), caption),
+            *([plot] if plot else []),
             *([Text(breaking_points(rows, condition, edges))] if condition.harder else []),
             *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
         ]

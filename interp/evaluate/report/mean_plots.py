@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from interp.evaluate.conditions import Condition
+from interp.evaluate.report.blocks import Plot
 from interp.evaluate.report.drawing import SOFT, WIDTH_IN, figure, legend, look, styles, svg_of
 from interp.evaluate.report.numbers import SCORES
 from interp.evaluate.report.overview import best_method, by_method
@@ -34,8 +35,9 @@ def position_plot(rows: Sequence[Row]) -> str | None:
         return svg_of(made, f"position-{multiple}", "Scores at each place in the gap")
 
 
-def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[float]) -> str | None:
+def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[float]) -> Plot | None:
     """Mean scores against a condition, and how many frames they are of; None without any."""
+    caption = f"Mean score in bins of {condition.axis} [{condition.unit}]; below, how many frames are in each."
     parts, multiple = by_method(rows), rows[0].multiple
     found = {
         field: {method: binned(part, condition.field, field, edges) for method, part in parts.items()}
@@ -43,6 +45,7 @@ def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[fl
     }
     if not any(any(bins.values()) for bins in found.values()):
         return None
+    limited = False
     with look():
         made, panels = _two_panels()
         for field, axes in panels.items():
@@ -50,9 +53,12 @@ def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[fl
                 bins = found[field][method]
                 axes.plot([one.at for one in bins], [one.score.mean for one in bins], label=method, **style)
             _scale(axes, edges, condition)
+            limited |= _draw_limit(axes, condition)
             _count(axes, max(found[field].values(), key=len))
         legend(made, panels["psnr"])
-        return svg_of(made, f"{condition.field}-{multiple}", f"Scores against {condition.title}")
+        svg = svg_of(made, f"{condition.field}-{multiple}", f"Scores against {condition.title}")
+    where = f" The line at {condition.limit:g} is where the paper's network ends." if limited else ""
+    return Plot(svg, f"{caption}{where}")
 
 
 def _two_panels() -> tuple[Any, dict[str, Any]]:
@@ -71,13 +77,19 @@ def _scale(axes: Any, edges: Sequence[float], condition: Condition) -> None:
         axes.set_xlim(left=0)
         marks = [edge for edge in edges if f"{edge:e}"[0] in "015"]
         axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+
+
+def _draw_limit(axes: Any, condition: Condition) -> bool:
+    """Draw where the paper's network ends, if the axis reaches it; whether it does."""
     left, right = axes.get_xlim()
-    if condition.limit is not None and left < condition.limit < right:
+    reached = condition.limit is not None and left < condition.limit < right
+    if reached:
         axes.axvline(condition.limit, color=SOFT, linewidth=0.8, linestyle=":")
         axes.annotate(
             f"paper: {condition.limit:g}", (condition.limit, 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
             textcoords="offset points", fontsize=7, ha="center", va="bottom", color=SOFT,
         )  # fmt: skip
+    return reached
 
 
 def _count(axes: Any, bins: Sequence[Bin]) -> None:
