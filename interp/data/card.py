@@ -23,7 +23,7 @@ def card_text(facts: dict[str, Any]) -> str:
     """The card of a data set's facts, in Markdown."""
     spec, videos = facts["spec"], facts["spec"]["videos"]
     rows = {
-        "Source": f"{len(videos)} videos, {spec['slowdown']:g} times slower than the world" if videos else "simulator",
+        "Source": f"{_used(facts)}, {spec['slowdown']:g} times slower than the world" if videos else "simulator",
         "Scenes": facts["scenes"],
         "CIS fps": f"{facts['cis_fps']:g}",
         "Interpolated fps": f"{facts['interpolated_fps']:g}",
@@ -52,3 +52,10 @@ def sensors_of(spec: dict[str, Any]) -> str:
     if spec["preset"] == "paper":
         return "those of the paper"
     return f"drawn anew for every {'video' if spec['videos'] else 'scene'}"
+
+
+def _used(facts: dict[str, Any]) -> str:
+    """How many of the videos that were given there are scenes of, by the beginnings of their names."""
+    given = len(facts["spec"]["videos"])
+    used = len({name.rpartition("-")[0] for name in facts["of_scenes"]})
+    return f"{given} video{'s' * (given != 1)}" if used == given else f"{used} of {given} videos"

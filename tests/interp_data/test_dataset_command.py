@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from interp.commands.dataset import dataset
+from interp.data.card import card_text
 from interp.data.dataset import make_scene, write_dataset
 from interp.data.dataset_spec import DatasetSpec, scenes_of
 from interp.data.layouts import open_sequence, windows
@@ -131,6 +132,19 @@ def test_what_cannot_be_used_of_several_films_is_left_out(film: Path, tmp_path: 
     assert list(unusable) == [str(short), str(broken)] and "expected at least" in unusable[str(short)]
     with pytest.raises(UsageError, match=r"short\.npz: 0\.0667 s, expected at least"):
         scenes_of(DatasetSpec(videos=(str(short), str(broken)), frames=2))
+
+
+@pytest.mark.parametrize(("count", "said"), [(None, "2 of 3 videos, 2 times"), (1, "1 of 3 videos, 2 times")])
+def test_the_card_counts_the_videos_that_there_are_scenes_of(film: Path, count: int | None, said: str) -> None:
+    videos = (str(film), str(film.with_name("none.mp4")), str(film))
+    spec = DatasetSpec(videos=videos, slowdown=2, frames=4, count=count)
+    scenes, unusable = scenes_of(spec)
+    facts = {
+        "spec": spec.model_dump(mode="json"), "versions": {"vid2ev": "1"}, "scenes": len(scenes), "samples": 0,
+        "cis_fps": 30.0, "interpolated_fps": 240.0, "events": 0, "disparity_mm": 0.0, "left_out": unusable,
+        "of_scenes": {scene.name: {} for scene in scenes},
+    }  # fmt: skip
+    assert f"| Source | {said}" in card_text(facts)
 
 
 def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
