@@ -1,19 +1,22 @@
 """Events of a camera that stands elsewhere, brought to where the frames have seen the same change.
 
     d(x) = ln Y1 - ln Y0       between the key frames, of light over a pixel of the event camera
-    E(x) = c_ON n_ON - c_OFF n_OFF       of all events between them, laid over the frames edge on edge
+    E(x) = c_ON n_ON - c_OFF n_OFF       of all events between them, laid over the frames: as calibration says, for what
+                                         is far away or on a plane, or edge on edge
     F    = DIS(d -> E)         counts at x are those at x + F(x)
 
 Both pictures are of one and the same change, so how far they are apart is what the cameras are apart, pixel by pixel,
-without calibration or depth.  Motion between the frames does not count: both are of the whole gap.  F is taken where
-it makes the pictures agree better than edge on edge does, by two codes of 255, of which 127 are as much as nearly all
-pixels change; and only if it explains, over the picture, three tenths of the variance that is not explained without:
-noise is matched with noise somewhere, always.  (Of sensors 15 mm beside it explained 0.7 to 0.8, of sensors in the
-same place 0.02 to 0.17.)
+or what calibration without depth leaves of it.  Motion between the frames does not count: both are of the whole gap.  F
+is taken where it makes the pictures agree better than they do already, by two codes of 255, of which 127 are as much as
+nearly all pixels change; and only if it explains, over the picture, three tenths of the variance that is not explained
+without: noise is matched with noise somewhere, always.  (Of sensors 15 mm beside it explained 0.7 to 0.8, of sensors in
+the same place 0.02 to 0.17.)
 
 Measured with a sensor of 9 pixels of the frame per pixel, 15 mm beside it, near things (disparity 7.6 px in the mean,
 more than 20 at the most), x8, the bridge: 28.6 dB edge on edge, 29.9 brought, for 30.0 of a sensor in the same place;
-in three such scenes together 29.77 for 29.86.  Nothing is gained by it for a sensor that is in the same place.
+in three such scenes together 29.77 for 29.86.  Nothing is gained by it for a sensor that is in the same place.  Beside
+a camera that is turned by 6 degrees, too, and sees 52 degrees of the frames' 60, calibration is what counts: in two
+scenes at 320x240 22.8 and 23.6 dB without, 24.5 and 24.7 with it, for 26.5 and 26.9 in the same place and way.
 """
 
 from __future__ import annotations
@@ -39,7 +42,10 @@ LEAST_NATS = 0.3  # that these stand for
 def registered(
     frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer = "srgb"
 ) -> EventCounts:
-    """Counts [B, 2, S, h, w] between frames [B, C, H, W], and where pixels of these look at them."""
+    """Counts [B, 2, S, h, w] between frames [B, C, H, W], and where pixels of these look at them.
+
+    They are looked for around the places that the counts know (`at_places`), or else edge on edge.
+    """
     height, width = frame_0.shape[-2:]
     if min(height, width) < SMALLEST:
         return events
@@ -47,9 +53,16 @@ def registered(
     moved = [
         _moved(*pictures) for pictures in zip(_change(frame_0, frame_1, whole, transfer), _net(whole), strict=True)
     ]
-    places = places_over(events, (height, width))
-    per_pixel = places.new_tensor([events.off_on.shape[-1] / width, events.off_on.shape[-2] / height])
-    return at_places(events, torch.stack([places + per_pixel * flow.to(places) for flow in moved]))
+    around = events.places.where if events.places else [places_over(events, (height, width))] * len(moved)
+    where = [_beyond(places, flow.to(places)) for places, flow in zip(around, moved, strict=True)]
+    return at_places(events, torch.stack(where))
+
+
+def _beyond(places: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
+    """Where pixels look that lie F [H, W, 2] px beside those of which the places [H, W, 2] are: these go on as they do
+    from pixel to pixel."""
+    down, across = torch.gradient(places, dim=(0, 1))
+    return places + across * flow[..., :1] + down * flow[..., 1:]
 
 
 def _change(frame_0: torch.Tensor, frame_1: torch.Tensor, events: EventCounts, transfer: Transfer) -> torch.Tensor:

@@ -79,6 +79,7 @@ class OfEventFile:
     curve = coded = "srgb"
     bits = 8
     apart = False  # one sensor
+    places = None
 
     def __init__(self, path: Path, options: Options):
         refuse_edits(path, options)

@@ -36,6 +36,7 @@ class OfSequence:
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
+        self.places = sequence.places
         self.dead_time = options.dead_time(sequence.dead_time)
         self.remarks = sequence.remarks
         self._numbers = self._part(options)

@@ -28,6 +28,7 @@ class OfSource:
     contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
     apart = False
+    places = None
 
     def __init__(self, path: str, options: Options, has_events: bool = False):
         of_events = {"--contrast": options.contrast, "--refractory": options.refractory_us}

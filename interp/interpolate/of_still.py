@@ -41,6 +41,7 @@ class OfStill:
 
     curve = coded = "srgb"
     apart = False
+    places = None
 
     def __init__(self, picture: Path, events: Path, options: Options):
         unfit = {

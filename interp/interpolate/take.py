@@ -9,13 +9,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events
 from vid2ev.errors import UsageError
+
+if TYPE_CHECKING:
+    import torch
 
 __all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take", "refuse_edits"]
 
@@ -49,6 +52,7 @@ class Take(Protocol):
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
     dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera
+    places       where pixels of the frames look in it, as far as is known: [H, W, 2] px; None: edge on edge
     remarks      what a person should know, one sentence each; more may come while it is read
     """
 
@@ -76,6 +80,8 @@ class Take(Protocol):
     def dead_time(self) -> DeadTime | None: ...
     @property
     def apart(self) -> bool: ...
+    @property
+    def places(self) -> torch.Tensor | None: ...
     @property
     def remarks(self) -> list[str]: ...
 

@@ -95,6 +95,21 @@ def test_thresholds_that_nobody_knows_are_fitted_where_the_events_belong(shift: 
     assert known.contrast.tolist() == [pytest.approx([0.2, 0.3])] and torch.equal(known.off_on, counts.off_on)
 
 
+@pytest.mark.parametrize("contrast", [(C, C), None])
+def test_places_that_are_known_are_where_it_is_looked_from(contrast: tuple[float, float] | None) -> None:
+    """A camera that is turned upside down, and stands a little beside: no flow finds that by itself."""
+    first, last, beside = seen(2, (6, 0))
+    turned = replace(beside, off_on=beside.off_on.flip(-1, -2))
+    rows, columns = torch.meshgrid(*(torch.arange(side - 1.0, -1.0, -1.0) for side in SIZE), indexing="ij")
+    places = torch.stack([columns, rows], -1)
+    here = seen(2, (0, 0))[2]
+    frames, found = (first[0], last[0]), []
+    for known in (None, places):
+        found.append(apart(over(calibrated(frames, turned, contrast, True, known), SIZE), here))
+    assert found[1] < 0.35 * apart(beside, here) and found[1] < 0.5 * found[0], found
+    assert torch.equal(calibrated(frames, beside, (C, C), False, places).off_on, beside.off_on)  # (nothing is apart)
+
+
 def test_noise_is_not_matched_with_noise() -> None:
     frames = torch.rand(2, 1, 3, *SIZE)
     noise = EventCounts(torch.poisson(torch.full((1, 2, 4, *SIZE), 0.05)), torch.full((1, 2), C))

@@ -31,6 +31,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import format_named
 from vid2ev.formats.event_file import Picture, Recording
 from vid2ev.recording.exposures import read_codes, write_codes
+from vid2ev.rig.intrinsics import Intrinsics
 
 
 def drawn(count: int = 3000, us: int = 3 * STEP_US) -> Events:
@@ -285,9 +286,31 @@ def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_pat
     )  # fmt: skip
     told = interpolate(tmp_path / "apart", tmp_path / "out", multiple=2)
     assert told["source"]["event_size"] == [32, 24] and read_codes(tmp_path / "out" / "000001.png").shape[1] == SIZE[0]
-    assert any("stand apart" in remark for remark in told["remarks"])
+    assert any("stand apart" in remark and "calibration" in remark for remark in told["remarks"])
+    lens = Intrinsics.of_field(SIZE, 60.0)
+    places = open_sequence(tmp_path / "apart").places
+    assert places is not None and places.shape == (SIZE[1], SIZE[0], 2)
+    x, y = np.meshgrid(*(np.arange(side) for side in SIZE))  # at 2 m 15 mm are so many pixels, of half as many
+    moved = x - lens.focal_px[0] * 0.015 / 2
+    np.testing.assert_allclose(places, np.stack([(moved + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5], -1), atol=1e-3)
     told = interpolate(tmp_path / "apart", tmp_path / "flow", multiple=2, method="flow")
     assert not any("stand apart" in remark for remark in told["remarks"])  # (it asks for no events)
+
+
+def test_a_calibration_that_does_not_fit_its_pictures_is_said(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    cameras = [f'[[camera]]\nname = "{name}"\nkind = "{kind}"\n' for name, kind in (("a", "dvs"), ("b", "cis"))]
+    rig.write_text(f"{cameras[0]}translation_mm = [80, 0, 0]\n{cameras[1]}")
+    made = tmp_path / "made"
+    source = images(tmp_path / "in", moving(5))
+    convert(source, made, rig=rig, depth="plane:2", pictures="png", preview=False, threads=1)
+    said = json.loads((made / "manifest.json").read_text())
+    lens = next(each for each in said["rig"]["cameras"] if each["name"] == "b")["intrinsics"]
+    for wrong in ([60_000, 60_000], [8], "large"):
+        text = json.dumps(said).replace(json.dumps(lens), json.dumps(lens | {"size": wrong}))
+        (made / "manifest.json").write_text(text)
+        with pytest.raises(DataError, match=r"manifest.json does not say what it should"):
+            open_sequence(made)
 
 
 def still_and_events() -> tuple[np.ndarray, Events, np.ndarray]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from interp.data.layouts.sequence import Placed
 from interp.data.picture_codes import codes_in
 from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
+
+if TYPE_CHECKING:
+    import torch
 
 
 class Names(NamedTuple):
@@ -56,6 +59,7 @@ class Ergb:
     contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
     apart = True  # two cameras, brought together for one distance
+    places: torch.Tensor | None = None
 
     def __init__(self, folder: Path, layout: str):
         names = LAYOUTS[layout]

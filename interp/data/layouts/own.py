@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from interp.data.layouts.calibration import Calibration
 from interp.data.layouts.sequence import Placed
 from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DataError, UsageError, read_events
@@ -36,14 +37,18 @@ class Own:
 
     def __init__(self, folder: Path):
         self.name, self.folder, self.remarks = folder.name, folder, list[str]()
-        cameras = _cameras(folder)
+        cameras, calibration = _cameras(folder), Calibration(folder / MANIFEST)
         frames = sorted((each for each in cameras if each["kind"] == "cis"), key=lambda each: each["rate_hz"])
         events = [each for each in cameras if each["kind"] == "dvs"]
         if not events or not frames:
             raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
         keys = frames[0]
-        alike = [each for each in frames if each["size"] == keys["size"] and not _apart(folder, keys, each)]
-        sent = next((each for each in events if not _apart(folder, keys, each)), events[0])
+        alike = [
+            each
+            for each in frames
+            if each["size"] == keys["size"] and not calibration.apart(keys["name"], each["name"])
+        ]
+        sent = next((each for each in events if not calibration.apart(keys["name"], each["name"])), events[0])
         self.remarks += [
             f"its camera {each['name']} is left out: it sees other pictures than {keys['name']}"
             for each in frames
@@ -62,7 +67,8 @@ class Own:
         self.size, self.grey = first.shape[1::-1], first.ndim == 2
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
-        self.apart = _apart(folder, keys, sent)
+        self.apart = calibration.apart(keys["name"], sent["name"])
+        self.places = calibration.places(keys["name"], self.size, sent["name"]) if self.apart else None
         self._span_us = sent["span_us"]
 
     @property
@@ -142,25 +148,6 @@ def _whole(said: Any, least: int, most: int) -> int:
     if not least <= int(said) <= most:
         raise ValueError(f"{said}, not {least} ... {most}")
     return int(said)
-
-
-def _apart(folder: Path, *cameras: dict[str, Any]) -> bool:
-    """Whether two cameras of a recording look from different places, or through different lenses."""
-    said = read_manifest(folder / MANIFEST)
-    with as_stated(folder / MANIFEST):
-        placed = {each["name"]: each for each in said.get("rig", {}).get("cameras", [])}
-        one, other = (placed.get(each["name"]) for each in cameras)
-        return one is not None and other is not None and not np.allclose(_sight(one), _sight(other), atol=1e-6)
-
-
-def _sight(camera: dict[str, Any]) -> np.ndarray:
-    """Place, direction and lens as numbers: those of the lens in widths of the picture."""
-    lens = camera["intrinsics"]
-    across = _whole(lens["size"][0], 1, MOST_PIXELS)
-    edge = (np.array(lens["centre_px"]) + 0.5, lens["focal_px"])
-    bent = np.zeros(8)
-    bent[: len(lens["distortion"])] = lens["distortion"]
-    return np.concatenate([camera["translation_m"], *camera["rotation"], np.ravel(edge) / across, bent])
 
 
 class _Pictures:

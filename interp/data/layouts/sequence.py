@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events
+
+if TYPE_CHECKING:
+    import torch
 
 EVEN = 0.25  # of a step, that a frame may be off its place; where one is lost, some are off by 0.4 or more
 
@@ -41,6 +44,7 @@ class Sequence(Protocol):
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
     dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera, or sees through another lens
+    places       where pixels of the frames look in it, as far as is known: [H, W, 2] px float32; None: edge on edge
     remarks      what cannot be used, with numbers, one sentence each; more may come while events are read
     """
 
@@ -52,6 +56,7 @@ class Sequence(Protocol):
     contrast: tuple[float, float] | None
     dead_time: DeadTime | None
     apart: bool
+    places: torch.Tensor | None
     remarks: list[str]
 
     @property
