@@ -37,7 +37,6 @@ from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
 from vid2ev.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
 
-KINDS = ("tiles", "cuts", "approximate")
 PART = re.compile(r"\d+-of-\d+(\.partial)?")  # the folder of a part
 
 ShareOut = Callable[[Sequence[Task]], object]  # does all tasks; raises what one ends with

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -152,11 +152,3 @@ def _region(draw: np.random.Generator, side: int) -> np.ndarray:
     centre, radius = draw.uniform(-0.4, 0.4, 2), draw.uniform(0.15, 0.5)
     inside = np.hypot(x - centre[0], y - centre[1]) < radius
     return inside if draw.random() < 0.5 else ~inside
-
-
-def describe(pool: Pool, settings: SampleSettings) -> dict[str, Any]:
-    """All that decides the samples, ready for JSON."""
-    window = {"begin": pool.begin, "most": pool.most, "fresh": pool.fresh}
-    return {
-        "clips": pool.settings.model_dump(mode="json"), "samples": settings.model_dump(mode="json"), "seed": pool.seed
-    } | {"window": window}  # fmt: skip

@@ -114,10 +114,6 @@ class EventCounts:
         """All of the time as one sub-interval, in float32."""
         return replace(self, off_on=by_rows(lambda counts: counts.float().sum(2, keepdim=True), self.off_on))
 
-    def reversed(self) -> EventCounts:
-        """With time running backwards: the last sub-interval first, ON for OFF."""
-        return replace(self, off_on=self.off_on.flip(1, 2), contrast=self.contrast.flip(1))
-
     def to(self, device: torch.device | str) -> EventCounts:
         """The same on a device."""
         places = self.places and replace(self.places, where=self.places.where.to(device))
