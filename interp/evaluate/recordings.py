@@ -83,7 +83,7 @@ class Recording:
         counts = count_events(seen, size, start_us, stop_us, protocol.steps, dead_time=dead_time)
         number = (first - self.begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
-        events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart, sequence.places)
+        events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart, sequence.places(start_us))
         if events.places is not None:
             events = over(events, (keys.shape[1], keys.shape[2]))
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)

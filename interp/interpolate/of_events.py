@@ -79,7 +79,6 @@ class OfEventFile:
     curve = coded = "srgb"
     bits = 8
     apart = False  # one sensor
-    places = None
 
     def __init__(self, path: Path, options: Options):
         refuse_edits(path, options)
@@ -110,6 +109,9 @@ class OfEventFile:
     def remarks(self) -> list[str]:
         """Those of the file."""
         return self._cursor.file.warnings
+
+    def places(self, t_us: int) -> None:
+        """Nobody says so."""
 
     def describe(self) -> dict[str, Any]:
         """Path and sizes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
+
+if TYPE_CHECKING:
+    import torch
 
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
@@ -36,7 +39,6 @@ class OfSequence:
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
-        self.places = sequence.places
         self.dead_time = options.dead_time(sequence.dead_time)
         self.remarks = sequence.remarks
         self._numbers = self._part(options)
@@ -49,6 +51,10 @@ class OfSequence:
     def gaps_expected(self) -> int:
         """Known."""
         return len(self._numbers) - 1
+
+    def places(self, t_us: int) -> torch.Tensor | None:
+        """See `Take`."""
+        return self._sequence.places(t_us)
 
     def describe(self) -> dict[str, Any]:
         """Folder and sizes."""

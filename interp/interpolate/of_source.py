@@ -28,7 +28,6 @@ class OfSource:
     contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
     apart = False
-    places = None
 
     def __init__(self, path: str, options: Options, has_events: bool = False):
         of_events = {"--contrast": options.contrast, "--refractory": options.refractory_us}
@@ -72,6 +71,9 @@ class OfSource:
         """By the header of the file."""
         count = self._source.frames_expected
         return None if count is None else max(count - 1, 0)
+
+    def places(self, t_us: int) -> None:
+        """Nobody says so."""
 
     def describe(self) -> dict[str, Any]:
         """What the source says."""

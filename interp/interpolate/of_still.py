@@ -41,7 +41,6 @@ class OfStill:
 
     curve = coded = "srgb"
     apart = False
-    places = None
 
     def __init__(self, picture: Path, events: Path, options: Options):
         unfit = {
@@ -79,6 +78,9 @@ class OfStill:
     def rate(self) -> Fraction:
         """Frames in a second, if each took as long as this one."""
         return Fraction(10**6, self._span_us)
+
+    def places(self, t_us: int) -> None:
+        """Nobody says so."""
 
     def describe(self) -> dict[str, Any]:
         """What both files are."""

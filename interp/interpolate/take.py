@@ -52,7 +52,6 @@ class Take(Protocol):
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
     dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera
-    places       where pixels of the frames look in it, as far as is known: [H, W, 2] px; None: edge on edge
     remarks      what a person should know, one sentence each; more may come while it is read
     """
 
@@ -81,9 +80,11 @@ class Take(Protocol):
     @property
     def apart(self) -> bool: ...
     @property
-    def places(self) -> torch.Tensor | None: ...
-    @property
     def remarks(self) -> list[str]: ...
+
+    def places(self, t_us: int) -> torch.Tensor | None:
+        """Where pixels of a key frame look in the event camera, as far as is known: [H, W, 2] px; None: edge on edge.
+        Raises DataError."""
 
     def describe(self) -> dict[str, Any]:
         """What it is, for JSON."""

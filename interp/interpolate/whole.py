@@ -255,8 +255,7 @@ def _brought(ready: Ready) -> list[str]:
     wanted = ready.fill.events or ready.fill.method.needs_events
     if not (wanted and isinstance(ready.take, OfSequence) and ready.take.apart):
         return []
-    known = "" if ready.take.places is None else ", around the places that its calibration says"
-    return [f"its cameras stand apart: events are brought to where the frames saw the same change{known}"]
+    return ["its cameras stand apart: events are brought to where the frames saw the same change"]
 
 
 def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:

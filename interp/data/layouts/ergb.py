@@ -28,7 +28,7 @@ from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
 
 if TYPE_CHECKING:
-    import torch
+    pass
 
 
 class Names(NamedTuple):
@@ -59,7 +59,6 @@ class Ergb:
     contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
     apart = True  # two cameras, brought together for one distance
-    places: torch.Tensor | None = None
 
     def __init__(self, folder: Path, layout: str):
         names = LAYOUTS[layout]
@@ -110,6 +109,9 @@ class Ergb:
     def key(self, k: int) -> np.ndarray:
         """Picture k."""
         return self.frame(k)
+
+    def places(self, t_us: int) -> None:
+        """Nobody says so."""
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""

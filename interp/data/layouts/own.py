@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from interp.data.layouts.calibration import Calibration
+from interp.data.layouts.maps import Maps
 from interp.data.layouts.sequence import Placed
 from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DataError, UsageError, read_events
@@ -20,7 +22,7 @@ from vid2ev.formats import open_events
 from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 
-MANIFEST = "manifest.json"
+MANIFEST, TRUTH = "manifest.json", "truth"
 MOST_PIXELS = 1 << 16  # of a side of a sensor
 LATEST_US = 1 << 60
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
@@ -68,7 +70,8 @@ class Own:
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
         self.apart = calibration.apart(keys["name"], sent["name"])
-        self.places = calibration.places(keys["name"], self.size, sent["name"]) if self.apart else None
+        self._calibrated = calibration.places(keys["name"], self.size, sent["name"]) if self.apart else None
+        self._maps = Maps(self.keys_folder.parent / TRUTH, sent["name"], self.size)
         self._span_us = sent["span_us"]
 
     @property
@@ -97,6 +100,13 @@ class Own:
     def exposure_us(self, k: int) -> float:
         """How long the camera that took key frame k exposes a frame."""
         return (self._keys if k in self._key_of else self._frames).exposure_us
+
+    def places(self, t_us: int) -> torch.Tensor | None:
+        """By the map that was recorded then (`--truth map`), or else by how the cameras stand, if they stand apart."""
+        found = self._calibrated
+        if found is None or (seen := self._maps.near(t_us)) is None:
+            return found
+        return torch.where(seen.isnan(), found, seen)
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""

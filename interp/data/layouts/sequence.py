@@ -44,7 +44,6 @@ class Sequence(Protocol):
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
     dead_time    how long a pixel is blind after an event; None where nobody knows
     apart        whether the event camera stands elsewhere than the frame camera, or sees through another lens
-    places       where pixels of the frames look in it, as far as is known: [H, W, 2] px float32; None: edge on edge
     remarks      what cannot be used, with numbers, one sentence each; more may come while events are read
     """
 
@@ -56,7 +55,6 @@ class Sequence(Protocol):
     contrast: tuple[float, float] | None
     dead_time: DeadTime | None
     apart: bool
-    places: torch.Tensor | None
     remarks: list[str]
 
     @property
@@ -73,6 +71,10 @@ class Sequence(Protocol):
     def key(self, k: int) -> np.ndarray:
         """Frame k as a frame camera gave it that is not as fast as the frames; frame k where there is no such camera.
         Raises DataError."""
+
+    def places(self, t_us: int) -> torch.Tensor | None:
+        """Where pixels of a frame look in the event camera, as far as is known: [H, W, 2] px float32; None: edge on
+        edge.  Raises DataError."""
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us].  Raises DataError for files that cannot be read."""
