@@ -60,7 +60,7 @@ class OfSequence:
         """Folder and sizes."""
         about = {"kind": type(self._sequence).__name__.lower(), "path": str(self.folder), "size": list(self.size)}
         sent = {"event_size": list(self._sequence.event_size), "contrast": self.contrast}
-        return about | sent | {"dead_time": stated(self.dead_time)} | self._identity()
+        return about | sent | {"dead_time": stated(self.dead_time), "identity": identity(self.folder, deep=True)}
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""
@@ -97,7 +97,3 @@ class OfSequence:
             last_s = 1e-6 * (int(times[rising[-1]]) - int(times[rising[0]]))
             raise UsageError(f"{self.folder}: no frame {start}; expected a part of its {last_s:.6g} s")
         return found
-
-    def _identity(self) -> dict[str, Any]:
-        inner = sorted(each for each in self.folder.iterdir() if each.is_dir())  # (images and events, each in its own)
-        return {"identity": identity(self.folder), "folders": {each.name: identity(each) for each in inner}}
