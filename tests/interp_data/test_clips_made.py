@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from interp.data import alter
 from interp.data.cameras import Cameras, cameras_of, steps_for
 from interp.data.clip import Clip
+from interp.data.inputs import known_by
 from interp.data.making import looked_at, made, wanted
 from interp.data.sensor_ranges import SENSORS, SensorRanges, frame_sensor
 from interp.data.settings import PRESETS, ClipSettings
@@ -238,8 +239,8 @@ def test_settings_that_do_not_go_together_are_refused(wrong: dict) -> None:
 
 
 def test_settings_that_differ_have_other_names() -> None:
-    assert ClipSettings().name == ClipSettings().name
-    assert ClipSettings().name != ClipSettings(step_px=1.0).name
+    assert known_by(ClipSettings()) == known_by(ClipSettings())
+    assert known_by(ClipSettings()) != known_by(ClipSettings(step_px=1.0))
 
 
 def test_what_dead_time_hid_is_missed_by_less(monkeypatch: pytest.MonkeyPatch) -> None:
