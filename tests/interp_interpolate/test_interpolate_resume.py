@@ -83,7 +83,7 @@ def test_what_is_another_sequence_by_now_is_not_gone_on_with(tmp_path: Path) -> 
     source = recording(tmp_path / "in", moving(3))
     interpolate(source, tmp_path / "out", multiple=2, method="linear")
     write_codes(source / "images_corrected" / "000001.png", moving(3, seed=1)[1])
-    with pytest.raises(UsageError, match="source.identity"):
+    with pytest.raises(UsageError, match=r"source\.identity"):
         interpolate(source, tmp_path / "out", multiple=2, method="linear", resume=True)
 
 
