@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from interp.data.layouts.sequence import Placed
 from interp.data.picture_codes import codes_in
 from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
-
-if TYPE_CHECKING:
-    pass
 
 
 class Names(NamedTuple):

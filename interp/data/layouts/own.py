@@ -45,12 +45,9 @@ class Own:
         if not events or not frames:
             raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
         keys = frames[0]
-        alike = [
-            each
-            for each in frames
-            if each["size"] == keys["size"] and not calibration.apart(keys["name"], each["name"])
-        ]
-        sent = next((each for each in events if not calibration.apart(keys["name"], each["name"])), events[0])
+        beside = {each["name"]: calibration.apart(keys["name"], each["name"]) for each in cameras}
+        alike = [each for each in frames if each["size"] == keys["size"] and not beside[each["name"]]]
+        sent = next((each for each in events if not beside[each["name"]]), events[0])
         self.remarks += [
             f"its camera {each['name']} is left out: it sees other pictures than {keys['name']}"
             for each in frames
@@ -69,7 +66,7 @@ class Own:
         self.size, self.grey = first.shape[1::-1], first.ndim == 2
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
-        self.apart = calibration.apart(keys["name"], sent["name"])
+        self.apart = beside[sent["name"]]
         self._calibrated = calibration.places(keys["name"], self.size, sent["name"]) if self.apart else None
         self._maps = Maps(self.keys_folder.parent / TRUTH, sent["name"], self.size)
         self._span_us = sent["span_us"]
