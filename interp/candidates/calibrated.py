@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import torch
 
 from interp.candidates.contrast import with_fitted_contrast
-from interp.candidates.registered import registered
-from interp.representation.carried import at_places, over
+from interp.candidates.registered import registered, unexplained
+from interp.representation.carried import Look, at_places, over
 from interp.representation.event_counts import EventCounts
 
 
@@ -18,24 +18,36 @@ def calibrated(
     counts: EventCounts,
     contrast: tuple[float, float] | None,
     apart: bool,
-    places: torch.Tensor | None = None,
+    looks: Sequence[Look] = (),
 ) -> EventCounts:
     """Counts [1, 2, S, h, w] between two frames [C, H, W], ready for methods.
 
     contrast   what an OFF and an ON event stand for [nat]; fitted where nobody knows
     apart      whether the event camera stands elsewhere: then counts are found where pixels of the frames look
-    places     there, as far as the cameras are calibrated: [H, W, 2] px (x, y) of the event camera
+    looks      where that may be, as calibration says: what explains the frames best is taken; none: edge on edge
     """
     first, last = (frame[None] for frame in frames)
-    if apart and places is not None:
-        counts = at_places(counts, places.to(counts.contrast)[None])
-    if contrast is not None:
-        known = replace(counts, contrast=counts.contrast.new_tensor([contrast]))
-        return registered(first, last, known) if apart else known
-    size = first.shape[-2], first.shape[-1]
-    found = with_fitted_contrast(first, last, over(counts.summed(), size))
-    known = replace(counts, contrast=found.contrast)
     if not apart:
-        return known
-    brought = registered(first, last, known)
-    return replace(brought, contrast=with_fitted_contrast(first, last, over(brought.summed(), size)).contrast)
+        return _with_contrast(first, last, counts, contrast)
+    starts = [(counts, False)] * (not looks)
+    starts += [(at_places(counts, look.where.to(counts.contrast)[None]), look.exact) for look in looks]
+    found = [_brought(first, last, start, contrast, exact) for start, exact in starts]
+    return found[0] if len(found) == 1 else min(found, key=lambda each: unexplained(first, last, each))
+
+
+def _brought(
+    first: torch.Tensor, last: torch.Tensor, counts: EventCounts, contrast: tuple[float, float] | None, exact: bool
+) -> EventCounts:
+    """Counts whose places are those where the frames have seen the same change, unless they are exact already."""
+    known = _with_contrast(first, last, counts, contrast)
+    return known if exact else _with_contrast(first, last, registered(first, last, known), contrast)
+
+
+def _with_contrast(
+    first: torch.Tensor, last: torch.Tensor, counts: EventCounts, contrast: tuple[float, float] | None
+) -> EventCounts:
+    """Counts with thresholds that are known, or else fitted to the frames."""
+    if contrast is not None:
+        return replace(counts, contrast=counts.contrast.new_tensor([contrast]))
+    laid = over(counts.summed(), (first.shape[-2], first.shape[-1]))
+    return replace(counts, contrast=with_fitted_contrast(first, last, laid).contrast)

@@ -94,6 +94,7 @@ def train(
     from interp.data.samples import check_fits
     from interp.data.usable import unusable
     from interp.train.machines import Machines, check_installed
+    from interp.train.run_folder import with_others
     from interp.train.starts import parsed
 
     session_s = _seconds(session, "--session") if session else None
@@ -117,6 +118,8 @@ def train(
         begin(learner_of(job), starts)
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
+    if resume and machines.first and (changed := with_others(path)):
+        click.echo(f"note: trained until now with {changed}: it goes on, but not to the same bits", err=True)
     device = _device(clips_on, machines)
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts, device)
     if machines.first:

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from interp.candidates.contrast import with_fitted_contrast
+from interp.data.between import events_between
 from interp.data.chance import chance
 from interp.data.clip import Clip
 from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
 from interp.data.settings import ClipSettings
 from interp.data.simulate import kept_counts
-from interp.data.tensors import as_tensor
 from interp.representation.carried import over
-from interp.representation.event_counts import EventCounts, count_events
 from vid2ev.errors import DataError, UsageError
 
 
@@ -58,41 +56,37 @@ def clip_of(
 ) -> Clip:
     """The clip of a window of a sequence; `part` is left, top, width and height of the picture, all of it by default.
 
-    Where nobody knows the thresholds, `contrast` is fitted to the key frames.  Of a sequence whose event camera has
-    another size, left and top move to whole pixels of it; the sizes must be whole multiples of each other.
+    Where nobody knows the thresholds, `contrast` is fitted to the key frames.  Events of a camera that stands
+    elsewhere, or whose pixels are not squares of whole pixels of the frames, are carried into the geometry of the
+    frames, as `interpolate` does it.  Of one with larger pixels, left and top move to whole ones.
     """
     left, top, width, height = part or (0, 0, *sequence.size)
     coarser = _coarser(sequence)
     left, top, width, height = (value - value % coarser for value in (left, top, width, height))
     rows, columns = slice(top, top + height), slice(left, left + width)
     truth = np.stack([sequence.frame(first + k)[rows, columns] for k in range(multiple + 1)])
-    keys = np.stack([sequence.key(k)[rows, columns] for k in (first, first + multiple)])
-    start_us, stop_us = (int(sequence.times_us[k]) for k in (first, first + multiple))
-    placed = sequence.events(start_us, stop_us)
-    shifted = placed._replace(x=placed.x - left // coarser, y=placed.y - top // coarser)
-    size = width // coarser, height // coarser
-    events, _ = shifted.within(size)
-    counted = count_events(events, size, start_us, stop_us, bins, dead_time=sequence.dead_time)
-    contrast = sequence.contrast or _fitted(keys, counted, coarser)
+    keys = np.stack([sequence.key(k) for k in (first, first + multiple)])
+    times_us = int(sequence.times_us[first]), int(sequence.times_us[first + multiple])
+    if _edge_on_edge(sequence):
+        below = left // coarser, top // coarser, width // coarser, height // coarser
+        counted = events_between(sequence, keys[:, rows, columns], times_us, bins, below)
+    else:
+        counted = over(events_between(sequence, keys, times_us, bins), sequence.size[::-1], (rows, columns))
+    off, on = counted.contrast[0].tolist()
     about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
-    return Clip(truth, keys, kept_counts(counted), contrast, stop_us - start_us, about | {"coarser": coarser})
+    about |= {"coarser": coarser}
+    return Clip(truth, keys[:, rows, columns], kept_counts(counted), (off, on), times_us[1] - times_us[0], about)
 
 
-def _fitted(keys: np.ndarray, counted: EventCounts, coarser: int) -> tuple[float, float]:
-    """OFF and ON thresholds that explain the key frames best."""
-    frames = as_tensor(keys)[:, None]
-    laid = counted if coarser == 1 else over(counted, (keys.shape[1], keys.shape[2]))
-    off, on = with_fitted_contrast(frames[0], frames[1], laid).contrast[0].tolist()
-    return off, on
+def _edge_on_edge(sequence: Sequence) -> bool:
+    """Whether pixels of the event camera are squares of whole pixels of the frames."""
+    (width, height), (across, down) = sequence.size, sequence.event_size
+    return not (sequence.apart or width % across or height % down or width // across != height // down)
 
 
 def _coarser(sequence: Sequence) -> int:
-    (width, height), (across, down) = sequence.size, sequence.event_size
-    if width % across or height % down or width // across != height // down:
-        raise UsageError(
-            f"{sequence.name}: events of {across}x{down} and frames of {width}x{height}; expected whole multiples"
-        )
-    return width // across
+    """How many pixels of the frames there are, across, to one of the counts in a clip."""
+    return sequence.size[0] // sequence.event_size[0] if _edge_on_edge(sequence) else 1
 
 
 @lru_cache(maxsize=32)
@@ -133,7 +127,6 @@ def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.nd
             f"{path}: frames of {wide}x{high} are smaller than clips, {width}x{height}; give --set clips.size=[W,H] and"
             " --set samples.size=N"
         )
-    _coarser(sequence)
     window = windows(sequence, multiple, even=True)
     reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
     too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"

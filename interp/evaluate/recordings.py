@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from interp.candidates.calibrated import calibrated
+from interp.data.between import events_between
 from interp.data.layouts import Sequence, windows
 from interp.data.layouts.own import Own
-from interp.data.tensors import as_tensor
 from interp.evaluate.cameras import CamerasOf
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.protocol import Protocol
 from interp.representation.carried import over
-from interp.representation.event_counts import count_events
 from vid2ev.errors import DataError
 from vid2ev.recording.manifest import identity
 
@@ -78,12 +76,9 @@ class Recording:
         keys = np.stack([sequence.key(k) for k in (first, last)])
         truth = np.stack([sequence.frame(first + k) for k in protocol.positions])
         start_us, stop_us = int(times_us[0]), int(times_us[-1])
-        seen, _ = sequence.events(start_us, stop_us).within(sequence.event_size)
-        size, dead_time = sequence.event_size, sequence.dead_time
-        counts = count_events(seen, size, start_us, stop_us, protocol.steps, dead_time=dead_time)
+        events = events_between(sequence, keys, (start_us, stop_us), protocol.steps)
         number = (first - self.begin) // protocol.multiple
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
-        events = calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart, sequence.places(start_us))
         if events.places is not None:
             events = over(events, (keys.shape[1], keys.shape[2]))
         return Group(number, first, keys, protocol.positions, truth, times_us, events, known)

@@ -150,7 +150,8 @@ class Fill:
             return None
         steps, dead_time = steps_for(self.parts), self.take.dead_time
         counts = count_events(events, size, first.t_us, second.t_us, steps, dead_time=dead_time).to(self.device)
-        return calibrated(frames, counts, self.take.contrast, self.take.apart, self.take.places(first.t_us))
+        looks = self.take.looks((first.t_us + second.t_us) // 2)
+        return calibrated(frames, counts, self.take.contrast, self.take.apart, looks)
 
 
 def steps_for(parts: int | None) -> int:

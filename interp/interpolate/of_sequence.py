@@ -18,7 +18,7 @@ from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
 
 if TYPE_CHECKING:
-    import torch
+    from interp.representation.carried import Look
 
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
@@ -52,9 +52,9 @@ class OfSequence:
         """Known."""
         return len(self._numbers) - 1
 
-    def places(self, t_us: int) -> torch.Tensor | None:
+    def looks(self, t_us: int) -> tuple[Look, ...]:
         """See `Take`."""
-        return self._sequence.places(t_us)
+        return self._sequence.looks(t_us)
 
     def describe(self) -> dict[str, Any]:
         """Folder and sizes."""

@@ -72,8 +72,9 @@ class OfSource:
         count = self._source.frames_expected
         return None if count is None else max(count - 1, 0)
 
-    def places(self, t_us: int) -> None:
+    def looks(self, t_us: int) -> tuple[()]:
         """Nobody says so."""
+        return ()
 
     def describe(self) -> dict[str, Any]:
         """What the source says."""

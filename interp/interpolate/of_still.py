@@ -79,8 +79,9 @@ class OfStill:
         """Frames in a second, if each took as long as this one."""
         return Fraction(10**6, self._span_us)
 
-    def places(self, t_us: int) -> None:
+    def looks(self, t_us: int) -> tuple[()]:
         """Nobody says so."""
+        return ()
 
     def describe(self) -> dict[str, Any]:
         """What both files are."""

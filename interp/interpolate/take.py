@@ -18,7 +18,7 @@ from vid2ev import Events
 from vid2ev.errors import UsageError
 
 if TYPE_CHECKING:
-    import torch
+    from interp.representation.carried import Look
 
 __all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take", "refuse_edits"]
 
@@ -82,9 +82,8 @@ class Take(Protocol):
     @property
     def remarks(self) -> list[str]: ...
 
-    def places(self, t_us: int) -> torch.Tensor | None:
-        """Where pixels of a key frame look in the event camera, as far as is known: [H, W, 2] px; None: edge on edge.
-        Raises DataError."""
+    def looks(self, t_us: int) -> tuple[Look, ...]:
+        """Where pixels of a key frame may look in the event camera, as far as is known.  Raises DataError."""
 
     def describe(self) -> dict[str, Any]:
         """What it is, for JSON."""

@@ -13,7 +13,7 @@ the rest.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import torch
@@ -24,6 +24,18 @@ from interp.warp import sample_part
 if TYPE_CHECKING:
     from vid2ev.rig.intrinsics import Intrinsics
     from vid2ev.rig.pose import Pose
+
+
+class Look(NamedTuple):
+    """Where pixels of frames look at an event camera.
+
+    where  [H, W, 2] px (x, y) of the event camera; NaN is a place that is not known
+    exact  whether that is so of all that they see, and not of what is far away alone
+    """
+
+    where: torch.Tensor
+    exact: bool
+
 
 Part = tuple[slice, slice]
 ALL: Part = slice(None), slice(None)

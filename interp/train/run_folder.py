@@ -1,6 +1,6 @@
 """The folder of a training run: all that it needs to go on, and all that it has to show.
 
-    run.json              what is trained, with what, how; versions, machine
+    run.json              what is trained, with what, how; versions and machine, also of others that it went on with
     start*.safetensors    weights that it began with, if it did
     steps.json            how many steps, once that is known
     checkpoint.ckpt       where training goes on
@@ -35,7 +35,7 @@ from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
-FINISHED = "finished.json"
+FINISHED, WENT_ON = "finished.json", "went_on_with"
 MOST_STEPS = 1 << 40
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
 OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end
@@ -171,12 +171,16 @@ class RunFolder:
         for left in self.path.rglob("*.new"):
             if self.clips not in left.parents:  # (those of another machine may be being written now)
                 left.unlink(missing_ok=True)
+        made_with = {"versions": versions(LIBRARIES), "machine": machine()}
         if resume:
+            if with_others(self.path):
+                said = read_json(self.path / "run.json")
+                self._write("run.json", said | {WENT_ON: [*said.get(WENT_ON, []), made_with]})
             return
         for part, copy in self.starts(starts).items():
             with whole_file(copy) as file:
                 file.write(starts[part].read_bytes())
-        self._write("run.json", {"job": job, "versions": versions(LIBRARIES), "machine": machine()})
+        self._write("run.json", {"job": job, **made_with})
 
     def _check(self, job: Mapping[str, Any], resume: bool) -> None:
         if self.path.exists() and not self.path.is_dir():
@@ -218,6 +222,17 @@ def begun_job(path: Path) -> dict[str, Any]:
     if not isinstance(job, dict):
         raise DataError(f"{path / 'run.json'} does not say what is trained; copy the run again, or start another")
     return job
+
+
+def with_others(path: Path) -> str:
+    """Which version of a library a run was last trained with that is another one now; empty if all are the same, and of
+    a run that is done."""
+    if (path / FINISHED).exists():
+        return ""
+    said = read_json(path / "run.json")
+    with as_stated(path / "run.json"):
+        last = [said, *said.get(WENT_ON, [])][-1]
+        return difference(dict(last["versions"]), versions(LIBRARIES))
 
 
 def read_json(path: Path) -> dict[str, Any]:

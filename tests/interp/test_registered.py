@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from interp.candidates.calibrated import calibrated
 from interp.candidates.registered import registered
-from interp.representation.carried import over
+from interp.representation.carried import Look, over
 from interp.representation.event_counts import EventCounts
 
 SIZE = 96, 128  # height, width
@@ -104,10 +104,17 @@ def test_places_that_are_known_are_where_it_is_looked_from(contrast: tuple[float
     places = torch.stack([columns, rows], -1)
     here = seen(2, (0, 0))[2]
     frames, found = (first[0], last[0]), []
-    for known in (None, places):
+    for known in ([], [Look(places, exact=False)]):
         found.append(apart(over(calibrated(frames, turned, contrast, True, known), SIZE), here))
     assert found[1] < 0.35 * apart(beside, here) and found[1] < 0.5 * found[0], found
-    assert torch.equal(calibrated(frames, beside, (C, C), False, places).off_on, beside.off_on)  # (nothing is apart)
+    wrong = Look(places.roll(13, 1), exact=False)
+    for looks in ([wrong, Look(places, exact=False)], [Look(places, exact=False), wrong]):
+        assert apart(over(calibrated(frames, turned, contrast, True, looks), SIZE), here) == found[1]
+    exact = calibrated(frames, turned, contrast, True, [Look(places, exact=True)])
+    assert torch.equal(over(exact, SIZE).off_on, beside.off_on)  # (nobody doubts them, whatever the frames show)
+    assert torch.equal(
+        calibrated(frames, beside, (C, C), False, [Look(places, exact=True)]).off_on, beside.off_on
+    )  # (nothing is apart)
 
 
 def test_noise_is_not_matched_with_noise() -> None:

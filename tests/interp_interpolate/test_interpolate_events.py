@@ -289,11 +289,11 @@ def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_pat
     assert told["source"]["event_size"] == [32, 24] and read_codes(tmp_path / "out" / "000001.png").shape[1] == SIZE[0]
     assert any("stand apart" in remark for remark in told["remarks"])
     lens = Intrinsics.of_field(SIZE, 60.0)
-    places = open_sequence(tmp_path / "apart").places(0)
-    assert places is not None and places.shape == (SIZE[1], SIZE[0], 2)
+    (look,) = open_sequence(tmp_path / "apart").looks(0)
+    assert look.exact and look.where.shape == (SIZE[1], SIZE[0], 2)
     x, y = np.meshgrid(*(np.arange(side) for side in SIZE))  # at 2 m 15 mm are so many pixels, of half as many
     moved = x - lens.focal_px[0] * 0.015 / 2
-    np.testing.assert_allclose(places, np.stack([(moved + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5], -1), atol=1e-3)
+    np.testing.assert_allclose(look.where, np.stack([(moved + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5], -1), atol=1e-3)
     told = interpolate(tmp_path / "apart", tmp_path / "flow", multiple=2, method="flow")
     assert not any("stand apart" in remark for remark in told["remarks"])  # (it asks for no events)
 
@@ -309,16 +309,16 @@ def test_events_are_looked_for_where_a_map_of_that_instant_says(tmp_path: Path) 
     times_us = [int(line) for line in (made / "b" / "truth" / "timestamps.txt").read_text().split()]
     assert len(maps) == len(times_us) > 2
     for path, t_us in zip(maps, times_us, strict=True):
-        places = sequence.places(t_us + 3)
-        assert places is not None
+        stands, look = sequence.looks(t_us + 3)
+        assert not stands.exact and not look.exact
         known = read_pixel_map(path)
         seen = ~np.isnan(known)
-        np.testing.assert_array_equal(places.numpy()[seen], known[seen])
-    far = sequence.places(times_us[-1] + 60_000)
-    assert far is not None and np.abs(far.numpy() - places.numpy()).max() > 1
+        np.testing.assert_array_equal(look.where.numpy()[seen], known[seen])
+    (far,) = sequence.looks(times_us[-1] + 60_000)
+    assert torch.equal(far.where, stands.where) and np.abs(far.where.numpy() - look.where.numpy()).max() > 1
     write_pixel_map(maps[0], np.zeros((5, 4, 2), np.float32))
     with pytest.raises(DataError, match="4x5 pixels, expected 48x32 as frames have"):
-        sequence.places(times_us[0])
+        sequence.looks(times_us[0])
     (made / "b" / "truth" / "timestamps.txt").write_text("soon\n")
     with pytest.raises(DataError, match="does not say what it should"):
         open_sequence(made)

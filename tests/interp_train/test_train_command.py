@@ -57,6 +57,20 @@ def test_a_run_in_two_sessions_ends_with_a_table() -> None:
     assert json.loads(same.output)["scores"]["scenes"].keys() >= {"network", "bridge"}
 
 
+def test_a_run_that_goes_on_with_other_libraries_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run(*FEW, "-o", "run", "--session", "0.001s").exit_code == 0
+    begun = json.loads(Path("run/run.json").read_text())
+    Path("run/run.json").write_text(json.dumps(begun | {"versions": begun["versions"] | {"torch": "1.0"}}))
+    on = ("-o", "run", "--resume", "--workers", "0", "--cpu")
+    other = run(*on, "--session", "0.001s")
+    assert other.exit_code == 0 and 'note: trained until now with torch = "1.0", not "2.' in other.output
+    said = json.loads(Path("run/run.json").read_text())
+    assert said["versions"]["torch"] == "1.0" and [each["versions"] for each in said["went_on_with"]] == [
+        begun["versions"]
+    ]
+    assert "note:" not in run(*on).output and json.loads(Path("run/run.json").read_text()) == said
+
+
 def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(*FEW, "-o", "run", "--json")
     before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}

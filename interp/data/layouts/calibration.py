@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
-from interp.representation.carried import places_of
+from interp.representation.carried import Look, places_of
 from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.rig.depth import plane_of
 from vid2ev.rig.intrinsics import Intrinsics
@@ -34,11 +33,12 @@ class Calibration:
             placed = [_sight(self._cameras[name]) for name in (one, other) if name in self._cameras]
             return len(placed) == 2 and not np.allclose(placed[0], placed[1], atol=1e-6)
 
-    def places(self, one: str, size: tuple[int, int], other: str) -> torch.Tensor | None:
-        """Where pixels of a camera with pictures of a size (width, height) look in another: [H, W, 2] px float32, NaN
-        where they look at nothing; None of cameras that are not those of a rig.
+    def look(self, one: str, size: tuple[int, int], other: str) -> Look | None:
+        """Where pixels of a camera with pictures of a size (width, height) look in another; None of cameras that are
+        not those of a rig.
 
-        By the plane that the recording was made with, or of what is far away, which is rectification.
+        By the plane that the recording was made with, or of what is far away, which is rectification: of cameras in one
+        place, it says all.
         """
         with as_stated(self._manifest):
             if one not in self._cameras or other not in self._cameras:
@@ -47,7 +47,8 @@ class Calibration:
             if lens.size != size:
                 raise ValueError(f"a lens for {lens.size} pixels, and pictures of {size}")
         depth_m = np.inf if self._plane_m is None else depth_of_plane(lens, pose, self._plane_m)
-        return places_of(lens, pose, other_lens, other_pose, depth_m)
+        known = self._plane_m is not None or np.allclose(pose.translation_m, other_pose.translation_m, atol=1e-9)
+        return Look(places_of(lens, pose, other_lens, other_pose, depth_m), known)
 
 
 def _placed(camera: dict[str, Any]) -> tuple[Intrinsics, Pose]:

@@ -107,8 +107,9 @@ class Ergb:
         """Picture k."""
         return self.frame(k)
 
-    def places(self, t_us: int) -> None:
+    def looks(self, t_us: int) -> tuple[()]:
         """Nobody says so."""
+        return ()
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""

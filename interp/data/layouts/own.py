@@ -16,6 +16,7 @@ import torch
 from interp.data.layouts.calibration import Calibration
 from interp.data.layouts.maps import Maps
 from interp.data.layouts.sequence import Placed
+from interp.representation.carried import Look
 from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DataError, UsageError, read_events
 from vid2ev.formats import open_events
@@ -67,7 +68,7 @@ class Own:
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
         self.apart = beside[sent["name"]]
-        self._calibrated = calibration.places(keys["name"], self.size, sent["name"]) if self.apart else None
+        self._calibrated = calibration.look(keys["name"], self.size, sent["name"]) if self.apart else None
         self._maps = Maps(self.keys_folder.parent / TRUTH, sent["name"], self.size)
         self._span_us = sent["span_us"]
 
@@ -98,12 +99,15 @@ class Own:
         """How long the camera that took key frame k exposes a frame."""
         return (self._keys if k in self._key_of else self._frames).exposure_us
 
-    def places(self, t_us: int) -> torch.Tensor | None:
-        """By the map that was recorded then (`--truth map`), or else by how the cameras stand, if they stand apart."""
-        found = self._calibrated
-        if found is None or (seen := self._maps.near(t_us)) is None:
-            return found
-        return torch.where(seen.isnan(), found, seen)
+    def looks(self, t_us: int) -> tuple[Look, ...]:
+        """As the cameras stand, if they stand apart; by the map that was recorded then (`--truth map`), too, where that
+        is not all there is to know."""
+        stand = self._calibrated
+        if stand is None:
+            return ()
+        if stand.exact or (seen := self._maps.near(t_us)) is None:
+            return (stand,)
+        return stand, Look(torch.where(seen.isnan(), stand.where, seen), exact=False)
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us]."""

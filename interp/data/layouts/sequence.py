@@ -12,7 +12,7 @@ from interp.representation.dead_time import DeadTime
 from vid2ev import Events
 
 if TYPE_CHECKING:
-    import torch
+    from interp.representation.carried import Look
 
 EVEN = 0.25  # of a step, that a frame may be off its place; where one is lost, some are off by 0.4 or more
 
@@ -72,9 +72,8 @@ class Sequence(Protocol):
         """Frame k as a frame camera gave it that is not as fast as the frames; frame k where there is no such camera.
         Raises DataError."""
 
-    def places(self, t_us: int) -> torch.Tensor | None:
-        """Where pixels of a frame look in the event camera, as far as is known: [H, W, 2] px float32; None: edge on
-        edge.  Raises DataError."""
+    def looks(self, t_us: int) -> tuple[Look, ...]:
+        """Where pixels of a frame may look in the event camera, as far as is known.  Raises DataError."""
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us].  Raises DataError for files that cannot be read."""
