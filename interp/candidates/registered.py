@@ -16,8 +16,8 @@ Measured with a sensor of 9 pixels of the frame per pixel, 15 mm beside it, near
 more than 20 at the most), x8, the bridge: 28.6 dB edge on edge, 29.9 brought, for 30.0 of a sensor in the same place;
 in three such scenes together 29.77 for 29.86.  Nothing is gained by it for a sensor that is in the same place.  Beside
 a camera that is turned by 6 degrees, too, and sees 52 degrees of the frames' 60, calibration is what counts: in two
-scenes at 320x240 22.8 and 23.6 dB without, 24.5 and 24.7 with it for 26.5 and 26.9 in the same place and way.  Maps of what
-each pixel sees at an instant are no better where things move: in `parallax` 23.2 dB of middle frames, for 24.6.
+scenes at 320x240 22.8 and 23.6 dB without, 24.5 and 24.7 with it, for 26.5 and 26.9 in the same place and way.  Maps of
+what each pixel sees at an instant are no better where things move: in `parallax` 23.2 dB of middle frames, for 24.6.
 """
 
 from __future__ import annotations
