@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.recording.disk import whole_file
+from vid2ev.recording.exposures import LATEST_US
 from vid2ev.recording.manifest import as_stated
 from vid2ev.untrusted import json_of
 
 Line = dict[str, Any]
-LATEST_US = 1 << 60
 
 
 def read_lines(path: Path, wanted: Mapping[str, type]) -> list[Line]:

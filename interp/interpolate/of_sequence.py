@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from interp.data.layouts import open_sequence
+from interp.data.layouts.own import ROUNDED_US
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
 from interp.representation.dead_time import stated
@@ -19,8 +20,6 @@ from vid2ev.recording.manifest import identity
 
 if TYPE_CHECKING:
     from interp.representation.carried import Look
-
-ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
 
 class OfSequence:

@@ -26,6 +26,7 @@ from interp.data.layouts.sequence import Placed
 from interp.data.picture_codes import codes_in
 from interp.representation.dead_time import DeadTime
 from vid2ev.errors import DataError
+from vid2ev.recording.exposures import LATEST_US
 
 
 class Names(NamedTuple):
@@ -42,7 +43,6 @@ LAYOUTS = {
     "hsergb": Names("images_corrected", "events_aligned", ("x", "y", "t", "p"), False, False),
     "bsergb": Names("images", "events", ("x", "y", "timestamp", "polarity"), True, True),
 }
-LATEST_US = 1 << 60
 MOMENT = 0.25  # of the time between pictures
 STAMPS = ("timestamp.txt", "timestamps.txt")
 

@@ -20,12 +20,11 @@ from interp.representation.carried import Look
 from interp.representation.dead_time import DeadTime
 from vid2ev import CisSpec, DataError, UsageError, read_events
 from vid2ev.formats import open_events
-from vid2ev.recording.exposures import KINDS, TIMESTAMPS, read_codes, read_spans
+from vid2ev.recording.exposures import KINDS, LATEST_US, TIMESTAMPS, read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 
 MANIFEST, TRUTH = "manifest.json", "truth"
 MOST_PIXELS = 1 << 16  # of a side of a sensor
-LATEST_US = 1 << 60
 ROUNDED_US = 2  # that two instants which are the same may be apart in files
 
 
