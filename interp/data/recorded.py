@@ -11,6 +11,7 @@ from interp.data.between import events_between
 from interp.data.chance import chance
 from interp.data.clip import Clip
 from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
+from interp.data.layouts.own import Own
 from interp.data.settings import ClipSettings
 from interp.data.simulate import kept_counts
 from interp.representation.carried import over
@@ -109,17 +110,15 @@ def _places(
                 first, reason = _windows_of(path, multiple, size)
             except (DataError, UsageError) as error:
                 first, reason = np.empty(0, np.int64), str(error)
-            if len(first):
-                found.append((str(path), first))
-            else:
-                unfit.append(reason)
+            found += [(str(path), first)] * bool(len(first))
+            unfit += [reason] * bool(reason)
     if not found:
         raise UsageError(f"no window of {multiple + 1} frames in {', '.join(folders)}: {'; '.join(unfit[:3])}")
     return found, unfit
 
 
 def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.ndarray, str]:
-    """The first frames of a sequence's windows; and why there are none."""
+    """The first frames of a sequence's windows; and why there are none, or what is not used of it."""
     sequence = _opened(str(path))
     if min(have - want for have, want in zip(sequence.size, size, strict=True)) < 0:
         (wide, high), (width, height) = sequence.size, size
@@ -128,6 +127,22 @@ def _windows_of(path: Path, multiple: int, size: tuple[int, int]) -> tuple[np.nd
             " --set samples.size=N"
         )
     window = windows(sequence, multiple, even=True)
+    if len(window.first) and isinstance(sequence, Own):
+        return _between_pictures(sequence, window.first, multiple)
     reasons = [f"{count} windows: {reason}" for reason, count in window.unusable.items()]
     too_few = f"{len(sequence.times_us)} frames, expected {multiple + 1} or more"
-    return window.first, f"{path}: {', '.join(reasons) or too_few}"
+    return window.first, "" if len(window.first) else f"{path}: {', '.join(reasons) or too_few}"
+
+
+def _between_pictures(sequence: Own, first: np.ndarray, multiple: int) -> tuple[np.ndarray, str]:
+    """Those windows that go from one picture of the slow camera to another, if it took some so far apart: with its
+    noise and blur, which frames of the truth in their place are without."""
+    taken = np.array(sequence.key_frames)
+    between = np.isin(first, taken) & np.isin(first + multiple, taken)
+    if between.any():
+        return first[between], ""
+    step = int(np.median(np.diff(taken))) if len(taken) > 1 else len(sequence.times_us)
+    return first, (
+        f"{sequence.folder}: the pictures of its slow camera, one in {step}: key frames of x{multiple} are of the fast"
+        f" one; --set clips.multiples=[{step}] uses them"
+    )

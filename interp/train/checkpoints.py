@@ -62,11 +62,15 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 class Saves(Checkpoint):
-    """Writes the checkpoint after a step, every `every_s` seconds and after the last step of a session."""
+    """Writes the checkpoint after a step, every `every_s` seconds and after the last step of a session.
+
+    Where a validation follows the step, it is written after that, with what was best: a checkpoint from before would
+    go on without it.
+    """
 
     def __init__(self, path: Path, every_s: float):
         self.path, self.every_s = path, every_s
-        self._last_s = 0.0
+        self._last_s, self._waits = 0.0, False
 
     def on_train_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Time counts from here."""
@@ -76,5 +80,21 @@ class Saves(Checkpoint):
         """Write it if it is time."""
         due = time.monotonic() - self._last_s > self.every_s or trainer.global_step == trainer.max_steps
         if trainer.strategy.broadcast(due):
-            trainer.save_checkpoint(self.path)
-            self._last_s = time.monotonic()
+            if validation_follows(trainer):
+                self._waits = True
+            else:
+                self._write(trainer)
+
+    def on_validation_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
+        """Write it if it was time before this validation."""
+        if self._waits:
+            self._write(trainer)
+
+    def _write(self, trainer: Trainer) -> None:
+        trainer.save_checkpoint(self.path)
+        self._last_s, self._waits = time.monotonic(), False
+
+
+def validation_follows(trainer: Trainer) -> bool:
+    """Whether the trainer validates after the step that it has just done."""
+    return trainer.global_step % int(trainer.val_check_batch or 1) == 0

@@ -19,7 +19,8 @@ from interp.data.dataset_spec import DatasetSpec, scenes_of
 from interp.data.layouts import open_sequence, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.own import Own
-from interp.data.recorded import clip_of
+from interp.data.recorded import clip_of, left_out, recorded
+from interp.data.settings import ClipSettings
 from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
@@ -76,6 +77,19 @@ def test_key_frames_have_their_middles_where_there_is_truth(made: Path) -> None:
         # The key frame is the truth at its instant but for noise, blur and what it clips.
         apart = np.abs(clip.keys.astype(int) - clip.truth[[0, -1]])
         assert np.median(apart) <= 6
+
+
+def test_clips_to_train_with_begin_and_end_with_pictures_of_the_slow_camera(made: Path) -> None:
+    """Whose noise and blur networks are to know; where none are so far apart, that is said."""
+    settings = ClipSettings(
+        size=(16, 16), multiples=(8,), recordings=1, scenes=0, photographs=0, recording_folders=(str(made),)
+    )
+    clips = [recorded(settings, 0, number, 8) for number in range(8)]
+    assert all((clip.keys != clip.truth[[0, -1]]).any() for clip in clips) and not left_out(settings, 8)
+    assert {int(clip.about["first"]) % 8 for clip in clips} == {0}
+    assert recorded(settings, 0, 0, 4).truth.shape[0] == 5
+    said = left_out(settings, 4)
+    assert len(said) == 2 and all("one in 8: key frames of x4 are of the fast one" in each for each in said)
 
 
 def test_the_papers_set_is_that_of_table_i() -> None:

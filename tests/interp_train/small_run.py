@@ -1,13 +1,14 @@
 """A small run, of samples that are quick to make; as a program it is one session of it.
 
-    python small_run.py FOLDER resume=1 devices=2 killed_at=7 ...
+    python small_run.py FOLDER resume=1 devices=2 killed_at_step=7 ...
 
-`killed_at` is the step after which, or the thing that lasts (a file brought to the disk or renamed) at which,
-`killed` says, it is killed as by `kill -9`.
+`killed_at_step` is the step after which it is killed as by `kill -9`, `killed_at_write` the thing that lasts (a file
+brought to the disk or renamed) at which, `killed_at_validation` the step whose validation does not end.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -89,7 +90,7 @@ def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range 
         place.close()
 
 
-def in_a_process(folder: Path, **options: int) -> subprocess.CompletedProcess[str]:
+def in_a_process(folder: Path, **options: float) -> subprocess.CompletedProcess[str]:
     """A session in a process of its own."""
     arguments = [f"{name}={value}" for name, value in options.items()]
     return subprocess.run([sys.executable, __file__, str(folder), *arguments], capture_output=True, text=True)
@@ -109,8 +110,12 @@ def _die() -> None:
 
 
 def _program() -> None:
-    options = {name: int(value) for name, value in (text.split("=") for text in sys.argv[2:])}
-    last_step, last_write = options.pop("killed_at_step", 0), options.pop("killed_at_write", 0)
+    from interp.train.learner import Learner
+
+    options = {name: json.loads(value) for name, value in (text.split("=") for text in sys.argv[2:])}
+    last_step, last_write, last_validation = (
+        options.pop(f"killed_at_{name}", 0) for name in ("step", "write", "validation")
+    )
     done = {"steps": 0, "writes": 0}
 
     def counted(function: Any) -> Any:
@@ -128,6 +133,13 @@ def _program() -> None:
             _die()
         return False
 
+    def concluded(learner: Any, conclude: Any = Learner.conclude_validation) -> None:
+        if learner.trainer.global_step == last_validation:
+            _die()
+        conclude(learner)
+
+    if last_validation:
+        Learner.conclude_validation = concluded  # type: ignore[method-assign]
     os.fsync, Path.replace = counted(os.fsync), counted(Path.replace)  # type: ignore[method-assign]
     torch.set_num_threads(1)
     outcome = session(Path(sys.argv[1]), bool(options.pop("resume", 0)), stop=stop, **options)

@@ -15,6 +15,8 @@ from small_run import STEPS_OF_RUN, in_a_process, kept, session
 
 from interp.train.curves import read_curve
 
+TOO_FAST, BEST = {"rate": 2e-4, "warm_up": 0, "clip": 100.0, "validations": STEPS_OF_RUN}, 3
+
 pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
 
@@ -62,6 +64,34 @@ def test_samples_may_be_made_by_others(undisturbed: Path, tmp_path: Path) -> Non
     session(tmp_path / "run", workers=2, session_s=1e-9)
     session(tmp_path / "run", workers=1, resume=True)
     assert same(tmp_path / "run", undisturbed)
+
+
+@pytest.fixture(scope="module")
+def best_early(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that validates after each step and is best at one in the middle."""
+    torch.set_num_threads(1)
+    folder = tmp_path_factory.mktemp("best_early") / "run"
+    assert session(folder, **TOO_FAST).best == BEST
+    return folder
+
+
+@pytest.mark.parametrize("step", [BEST - 1, BEST])
+@pytest.mark.parametrize("killed", [False, True])
+def test_what_was_best_stays_so_where_a_session_ends_with_a_validation(
+    best_early: Path, tmp_path: Path, step: int, killed: bool
+) -> None:
+    """Stopped after its step, which it is the validation of, or killed in the midst of it."""
+    folder = tmp_path / "run"
+    if killed:
+        died = in_a_process(folder, killed_at_validation=step, **TOO_FAST)
+        assert died.returncode == -signal.SIGKILL, died.stderr
+    else:
+        stop = iter([*[False] * (step - 1), True]).__next__
+        assert session(folder, stop=stop, **TOO_FAST).step == step
+    assert session(folder, resume=True, **TOO_FAST).best == BEST
+    assert same(folder, best_early)
+    for name in ("weights.safetensors", "validation.csv"):
+        assert (folder / name).read_bytes() == (best_early / name).read_bytes(), name
 
 
 @pytest.mark.slow
