@@ -6,6 +6,7 @@ import numpy as np
 
 from interp.candidates.calibrated import calibrated
 from interp.data.layouts import Sequence
+from interp.data.layouts.sequence import matter_from_us
 from interp.data.tensors import as_tensor
 from interp.representation.event_counts import EventCounts, count_events
 
@@ -25,8 +26,9 @@ def events_between(
     Raises DataError for files that cannot be read.
     """
     left, top, *size = part or (0, 0, *sequence.event_size)
-    placed = sequence.events(*between_us)
+    start_us, stop_us = between_us
+    placed = sequence.events(matter_from_us(sequence, start_us, sequence.dead_time), stop_us)
     seen, _ = placed._replace(x=placed.x - left, y=placed.y - top).within((size[0], size[1]))
-    counts = count_events(seen, (size[0], size[1]), *between_us, steps, dead_time=sequence.dead_time)
-    looks = sequence.looks(sum(between_us) // 2)
+    counts = count_events(seen, (size[0], size[1]), start_us, stop_us, steps, dead_time=sequence.dead_time)
+    looks = sequence.looks((start_us + stop_us) // 2)
     return calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart, looks)

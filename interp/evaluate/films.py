@@ -22,7 +22,7 @@ from interp.evaluate.group import Cameras, Group
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
 from interp.own_codes import curve_of
-from interp.representation.dead_time import DeadTime
+from interp.representation.dead_time import DeadTime, look_back_us
 from interp.representation.event_counts import count_events
 from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
@@ -100,7 +100,8 @@ class Film:
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; groups across a cut are counted."""
         told = self._told = Told()
-        part, late, number = list[Seen](), Events.empty(), 0
+        part, known, number = list[Seen](), Events.empty(), 0
+        back_us = look_back_us(DeadTime.of(self._simulated.spec.model_dump()))
         source = self._simulated.opened(self.video)
         try:
             with closing(self._simulated.seen(self.video, source)) as coming:
@@ -112,13 +113,13 @@ class Film:
                     part.append(seen)
                     if len(part) <= self.multiple:
                         continue
-                    events = Events.concatenate([late, *(each.events for each in part[1:])])
+                    events = Events.concatenate([known, *(each.events for each in part[1:])])
                     if any(each.shot for each in part[1:]):
                         told.not_scored[CUT] = told.not_scored.get(CUT, 0) + 1
                     else:
                         yield self._group(number, part, events)
                         told.groups += 1
-                    late, part, number = _after(events, seen.t_us), [seen], number + 1
+                    known, part, number = _after(events, seen.t_us - back_us), [seen], number + 1
         except DataError as error:
             told.remarks.append(f"ended early: {error}")
         told.remarks += source.warnings
@@ -165,5 +166,4 @@ def _identity(video: str, about: Mapping[str, Any]) -> dict[str, Any]:
 
 def _after(events: Events, t_us: int) -> Events:
     """Those later than a time: sensors of a fixed rate may put an event after the light that it is of."""
-    later = events.t > t_us
-    return Events(events.t[later], events.x[later], events.y[later], events.p[later])
+    return events.select(events.t > t_us)

@@ -13,6 +13,7 @@ from vid2ev.formats.event_file import EventFile
 class EventCursor:
     """Reads forwards; what lies before the last stretch is read again from the beginning.
 
+    back_us       how long before a stretch its events begin
     size          width and height of the sensor [px]; where the file does not state it, the smallest that holds all
     covered_us    from where the file begins, 0 if it does not say, to its last event, or as it says
     seen_us       from the first event to the end; None without events
@@ -20,8 +21,9 @@ class EventCursor:
     Raises UsageError for a path where nothing is, DataError for what is no event file.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, back_us: int = 0):
         self.file: EventFile = open_events(path)
+        self._back_us = back_us
         self._recording = survey(self.file)
         self.size = self._recording.size
         self.count = self._recording.count
@@ -34,19 +36,16 @@ class EventCursor:
         self._held, self._from_us = Events.empty(), None if self.count else begin_us
 
     def between(self, start_us: int, stop_us: int) -> Events:
-        """The events in (start_us, stop_us]."""
+        """The events in (start_us - back_us, stop_us]."""
+        start_us -= self._back_us
         if self._from_us is None or start_us < self._from_us:
             self._blocks, self._held = self._recording.blocks(), Events.empty()
-        parts = []
-        while True:
-            inside = (self._held.t > start_us) & (self._held.t <= stop_us)
-            parts.append(self._held.select(inside))
-            if len(self._held) and self._held.t[-1] > stop_us:
+        read = [self._held]
+        while not len(read[-1]) or read[-1].t[-1] <= stop_us:
+            if (following := next(self._blocks, None)) is None:
                 break
-            following = next(self._blocks, None)
-            if following is None:
-                self._held = Events.empty()
-                break
-            self._held = following
-        self._from_us = stop_us
-        return Events.concatenate(parts)
+            read.append(following)
+        events = Events.concatenate(read)
+        self._from_us = stop_us - self._back_us
+        self._held = events.select(events.t > self._from_us)
+        return events.select((events.t > start_us) & (events.t <= stop_us))

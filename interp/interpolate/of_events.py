@@ -13,7 +13,7 @@ from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
 from interp.interpolate.take import Key, Options, refuse_edits
-from interp.representation.dead_time import stated
+from interp.representation.dead_time import look_back_us, stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
@@ -29,8 +29,8 @@ class FramesBesideEvents(OfSource):
 
     def __init__(self, path: str, options: Options, events: Path):
         super().__init__(path, options, has_events=True)
-        self._cursor, self._events_path = EventCursor(events), events
         self.contrast, self.dead_time = options.contrast, options.dead_time()
+        self._cursor, self._events_path = EventCursor(events, look_back_us(self.dead_time)), events
         corner, self._guessed = self._cursor.size, self._cursor.file.size is None
         within = corner[0] <= self.size[0] and corner[1] <= self.size[1]
         self.event_size: tuple[int, int] = self.size if self._guessed and within else corner
@@ -82,7 +82,8 @@ class OfEventFile:
 
     def __init__(self, path: Path, options: Options):
         refuse_edits(path, options)
-        self._cursor, self._path = EventCursor(path), path
+        self.contrast, self.dead_time = options.contrast, options.dead_time()
+        self._cursor, self._path = EventCursor(path, look_back_us(self.dead_time)), path
         if not self._cursor.file.has_frames:
             raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")
         self._part: tuple[int, int] | None = None
@@ -101,7 +102,6 @@ class OfEventFile:
         self.name, self.size = path.stem, (first.pixels.shape[1], first.pixels.shape[0])
         self.channels = 1 if first.pixels.ndim == 2 else 3
         self.event_size = self._cursor.size
-        self.contrast, self.dead_time = options.contrast, options.dead_time()
         span_us = self._last_us - self._first_us
         self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from interp.data.layouts import open_sequence
 from interp.data.layouts.own import ROUNDED_US
+from interp.data.layouts.sequence import matter_from_us
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
 from interp.representation.dead_time import stated
@@ -74,7 +75,8 @@ class OfSequence:
             return None
         if any(since < stop_us and until > start_us for since, until in self._sequence.unknown_us):
             return None
-        return self._sequence.events(start_us, stop_us).within(self._sequence.event_size)[0]
+        since_us = matter_from_us(self._sequence, start_us, self.dead_time)
+        return self._sequence.events(since_us, stop_us).within(self._sequence.event_size)[0]
 
     def _part(self, options: Options) -> list[int]:
         """The frames to take, in order of time."""

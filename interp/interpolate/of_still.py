@@ -20,7 +20,7 @@ import torch
 
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
-from interp.representation.dead_time import stated
+from interp.representation.dead_time import look_back_us, stated
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
@@ -97,7 +97,8 @@ class OfStill:
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
-        return self._events.select((self._events.t > start_us) & (self._events.t <= stop_us))
+        since_us = start_us - look_back_us(self.dead_time)
+        return self._events.select((self._events.t > since_us) & (self._events.t <= stop_us))
 
     @property
     def _span_us(self) -> int:

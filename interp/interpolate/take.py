@@ -92,8 +92,9 @@ class Take(Protocol):
         """The key frames from index `start` on, their times strictly increasing.  Raises DataError."""
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
-        """The events in (start_us, stop_us], within `event_size`; None where they are not known.  Quick if each begins
-        where the one before ended.  Raises DataError for files that cannot be read."""
+        """The events in (start_us, stop_us], within `event_size`, and of a dead time those before that matter to what
+        they stand for; None where they are not known.  Quick if each begins where the one before ended.  Raises
+        DataError for files that cannot be read."""
 
 
 def check_second(second: float | None, option: str) -> None:

@@ -32,6 +32,7 @@ from vid2ev.kernel_cache import cached
 LEAST = 0.03  # R: 0.01 and 0.1 are the same to 0.02 dB
 SHORTEST_US = 1.0  # less is no dead time: times are of whole microseconds
 LONGEST_US = 1e9
+LOOK_BACK, LONGEST_LOOK_BACK_US = 16, 200_000  # R: an event so long after another one stands for 16 / 15 crossings
 
 Law = Literal["track", "quantised"]
 
@@ -82,6 +83,11 @@ class DeadTime:
         pixels = int(pixel.max(initial=-1)) + 1
         counted = _tracked if self.law == "track" else crossings_in_runs
         return counted(t_us, pixel, p, pixels, float(self.refractory_us))  # type: ignore[no-any-return]
+
+
+def look_back_us(dead_time: DeadTime | None) -> int:
+    """How long before a stretch of time events still matter to what those within it stand for."""
+    return min(math.ceil(LOOK_BACK * dead_time.refractory_us), LONGEST_LOOK_BACK_US) if dead_time else 0
 
 
 def stated(dead_time: DeadTime | None) -> dict[str, Any] | None:

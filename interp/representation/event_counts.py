@@ -147,6 +147,7 @@ def count_events(
 ) -> EventCounts:
     """Counts, B = 1, of the events in (start_us, stop_us] on a sensor of `size` (width, height).
 
+    events     in order of time; of a dead time with those before that matter to it (`look_back_us`)
     steps      S; an event at the edge of two sub-intervals is in the earlier one
     contrast   nats that an OFF and an ON event stand for
     dead_time  of the pixels: an event counts for the crossings that it hides, too; None if that is not known
@@ -155,14 +156,16 @@ def count_events(
     if not is_whole(steps, 1):
         raise UsageError(f"{steps} sub-intervals between frames: expected at least 1; choose for example 32")
     width, height = size
-    t = np.asarray(events.t).astype(np.int64)
-    kept = (t > start_us) & (t <= stop_us)
-    x, y, p = (np.asarray(each)[kept].astype(np.int64) for each in (events.x, events.y, events.p))
+    known = np.asarray(events.t) <= stop_us
+    t, x, y, p = (np.asarray(each)[known].astype(np.int64) for each in (events.t, events.x, events.y, events.p))
     if len(x) and (min(x.min(), y.min()) < 0 or x.max() >= width or y.max() >= height):
         raise UsageError(f"events outside of the {width}x{height} sensor; give the size of the sensor that sent them")
-    step = ((t[kept] - start_us) * steps - 1) // max(stop_us - start_us, 1)
+    worth = dead_time.crossings(t, y * width + x, p) if dead_time else None
+    inside = t > start_us
+    t, x, y, p = (each[inside] for each in (t, x, y, p))
+    worth = None if worth is None else worth[inside]
+    step = ((t - start_us) * steps - 1) // max(stop_us - start_us, 1)
     place = (np.minimum(p, 1) * height + y) * width + x
-    worth = dead_time.crossings(t[kept], y * width + x, p) if dead_time else None
     narrow, most, wide = (np.uint8, 255, np.int32) if worth is None else (np.float16, WHOLE16, np.float32)
     counts = np.zeros((2, steps, height, width), narrow)
     for k, chosen in enumerate(_parts(step, steps)):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interp.interpolate.take import Options
-from interp.representation.dead_time import MOST, DeadTime, Law
+from interp.representation.dead_time import MOST, DeadTime, Law, look_back_us
 from interp.representation.event_counts import count_events
 from vid2ev import Dvs, Events, UsageError, load_sensor
 
@@ -141,6 +141,26 @@ def test_counts_are_of_crossings_where_the_dead_time_is_known() -> None:
     assert none.dtype == torch.uint8 and none.sum() == 4
     empty = count_events(Events.empty(), (2, 1), 0, 10_000, 2, dead_time=DeadTime(BLIND_US)).off_on
     assert (empty == 0).all()
+
+
+@pytest.mark.parametrize("gap_us", [500, 700, 2000])
+def test_of_gap_after_gap_as_much_is_made_good_as_of_all_at_once(gap_us: int) -> None:
+    """What a pixel's first event in a gap stands for is told by the last before it."""
+    events, dead_time = flash("track", 4_000), DeadTime(BLIND_US)
+    end_us = -(-int(events.t[-1]) // gap_us) * gap_us
+    back_us = look_back_us(dead_time)
+    size, parts = (64, 1), torch.zeros(2, 1, 64)
+    for start_us in range(0, end_us, gap_us):
+        near = events.select(events.t > start_us - back_us)  # (and all that come after, which do not count)
+        parts += count_events(near, size, start_us, start_us + gap_us, 1, dead_time=dead_time).off_on[0, :, 0].float()
+    whole = count_events(events, size, 0, end_us, 1, dead_time=dead_time).off_on[0, :, 0].float()
+    torch.testing.assert_close(parts, whole, rtol=0.01, atol=0.1)  # (float16, and what came longer before)
+    alone = sum(
+        count_events(events.stretch(*np.searchsorted(events.t, [at + 1, at + gap_us + 1])), size, at, at + gap_us, 1,
+                     dead_time=dead_time).off_on.sum()
+        for at in range(0, end_us, gap_us)
+    )  # fmt: skip
+    assert alone < 0.98 * whole.sum()
 
 
 def test_of_sensors_that_send_by_a_clock_nothing_is_known() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,28 @@ def test_a_cursor_gives_each_event_once_and_goes_back_if_it_has_to(tmp_path: Pat
     same(Events.concatenate(parts), events)
     for start, stop in ((70_000, 80_000), (20, 30_000), (30_000, 30_001), (0, 10**6)):
         same(cursor.between(start, stop), events.select((events.t > start) & (events.t <= stop)))
+
+
+def test_a_cursor_that_looks_back_begins_each_stretch_before(tmp_path: Path) -> None:
+    events, back_us = drawn(), 7_000
+    cursor = EventCursor(written(tmp_path / "a.npz", events), back_us)
+    forwards = [*pairwise([-1, 10, 10, 5000, 5001, 60_000, 10**6])]
+    for start, stop in (*forwards, (60_000, 70_000), (20_000, 30_000)):
+        same(cursor.between(start, stop), events.select((events.t > start - back_us) & (events.t <= stop)))
+
+
+def test_events_before_a_gap_are_given_where_a_dead_time_is_known(tmp_path: Path) -> None:
+    """Whether they are in files of their own, or in those of a recording."""
+    frames, events = images(tmp_path / "frames", moving()), drawn()
+    own = recording(tmp_path / "own", moving(4))
+    for source, path in ((frames, written(tmp_path / "events.npz", events)), (own, None)):
+        plain, told = (open_take(str(source), Options(events=path, refractory_us=each)) for each in (None, 500))
+        for start_us, stop_us in pairwise([0, STEP_US, 2 * STEP_US]):
+            gap, more = (take.events(start_us, stop_us) for take in (plain, told))
+            assert gap is not None and more is not None
+            same(more.select(more.t > start_us), gap)
+            assert more.t[0] < start_us or not start_us
+            assert more.t[0] > start_us - 16 * 500
 
 
 def test_a_sensor_of_unknown_size_is_that_of_the_frames_if_all_events_are_within(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from interp.representation.dead_time import DeadTime
+from interp.representation.dead_time import DeadTime, look_back_us
 from vid2ev import Events
 
 if TYPE_CHECKING:
@@ -77,6 +77,12 @@ class Sequence(Protocol):
 
     def events(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us].  Raises DataError for files that cannot be read."""
+
+
+def matter_from_us(sequence: Sequence, start_us: int, dead_time: DeadTime | None) -> int:
+    """From where on events matter to what those after an instant stand for, as far as they are known."""
+    known_us = [sequence.covered_us[0], *(until for _, until in sequence.unknown_us if until <= start_us)]
+    return min(start_us, max(start_us - look_back_us(dead_time), *known_us))
 
 
 @dataclass(frozen=True)
