@@ -17,6 +17,7 @@ from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
 from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
 from interp.networks import make
+from interp.networks.frame_fed import Interpolated
 from interp.warp import flows_at, warp
 from vid2ev import DataError, UsageError
 
@@ -58,9 +59,12 @@ def test_a_pyramid_tells_scales_apart() -> None:
 
 def test_smooth_flows_cost_nothing_and_steps_what_they_are() -> None:
     assert float(smoothness(torch.ones(1, 4, 5, 6))) == 0 and float(smoothness(torch.ones(1, 4, 1, 1))) == 0
-    flow = torch.zeros(1, 1, 2, 4)
-    flow[..., 2:] = 3.0
-    assert float(smoothness(flow)) == pytest.approx(3.0 / 3)  # one of three differences across
+    across, down = torch.zeros(2, 1, 1, 3, 4)
+    across[..., 2:] = 3.0
+    down[..., 1:, :] = 5.0
+    assert float(smoothness(across)) == pytest.approx(3.0 / 3)  # one of three differences across
+    assert float(smoothness(down)) == pytest.approx(5.0 / 2)  # one of two down
+    assert float(smoothness(across - down)) == pytest.approx(3.0 / 3 + 5.0 / 2)
 
 
 def test_true_flows_carry_frames_into_each_other() -> None:
@@ -137,6 +141,53 @@ def test_vgg16_is_taken_from_a_file(tmp_path: Path) -> None:
     for name in ("other.safetensors", "none.safetensors"):
         with pytest.raises(DataError, match="does not hold the weights of VGG16"):
             Perceptual(tmp_path / name)
+
+
+# The weights, by the name of the objective.  Warps are four differences, of both warps and of the frames there and
+# back, and flows are two.
+WARPS = {"warps": 4 * 0.4 * 255, "smoothness": 2 * 1}
+WEIGHTS: dict[str, dict[str, float]] = {
+    # Jiang et al. (2018), "Super SloMo", section 3.3, for codes to 255: 0.8, 0.005, 0.4 and 1
+    "super_slomo": {"image": 0.8 * 255, "features": 0.005} | WARPS,
+    "flows": {"flows": 10} | WARPS,  # ours, beside Super SloMo's
+    "residue": {"image": 1},
+    "supervised_residue": {"image": 1, "blend": 0.5, "warps": 0.25, "pyramid": 0.1},  # ours
+    "by_ratio": {"image": 0.1},  # ours
+    "time_lens": {"image": 1, "features": 0.1},  # Tulyakov et al. (2021), "Time Lens", CVPR
+    "E2VID": {"image": 1, "features": 1},  # event_cnn_minimal
+    "FireNet": {"image": 1, "features": 1, "time": 2},  # event_cnn_minimal
+    # Lai et al. (2018), "Learning blind video temporal consistency": features 10, both of time 100; the others are ours
+    "hdr": {"image": 100, "time": 100, "long time": 100, "features": 10, "beyond": 3},
+}
+MEANS = ("absolute", "charbonnier", "log_error", "pyramid", "smoothness", "inconsistency")
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_every_term_is_weighed_as_its_source_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of differences that are all 1, the weights are left."""
+    for mean in MEANS:
+        monkeypatch.setattr(objectives, mean, one)
+    monkeypatch.setattr(objectives, "between_frames", lambda *_: 2 * one())  # (there and back)
+    truth, flows = torch.rand(1, 4, 3, 8, 8), torch.zeros(1, 3, 2, 8, 8)
+    pair, flow = (truth[:, 0], truth[:, 3]), torch.zeros(1, 4, 8, 8)
+    made = Interpolated(truth, flow, flow[:, None], truth[:, :, None], flow[:, None], truth)
+    terms = {
+        "super_slomo": lambda: objectives.super_slomo(made, *pair, truth, one),
+        "flows": lambda: objectives.flows(made, *pair, truth, flow),
+        "residue": lambda: objectives.residue(made, truth),
+        "supervised_residue": lambda: objectives.supervised_residue(made, truth),
+        "by_ratio": lambda: objectives.by_ratio(made, truth),
+        "time_lens": lambda: objectives.time_lens(made, truth, one),
+        "E2VID": lambda: objectives.reconstruction(truth, truth, one),
+        "FireNet": lambda: objectives.reconstruction(truth, truth, one, flows),
+        "hdr": lambda: objectives.hdr(truth, truth, flows, flows, one, truth > 0.5),
+    }[name]()
+    assert {term: float(weighed) for term, weighed in terms.items()} == pytest.approx(WEIGHTS[name])
+
+
+def one(*_: object) -> torch.Tensor:
+    """A difference of 1, whatever is compared."""
+    return torch.tensor(1.0)
 
 
 def test_super_slomo_is_weighed_as_published() -> None:
