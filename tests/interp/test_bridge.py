@@ -150,3 +150,14 @@ def test_without_events_the_contrast_is_the_usual_one() -> None:
     first, second = frames(2, (8, 8))
     found = with_fitted_contrast(first, second, EventCounts.none(2, (8, 8))).contrast
     torch.testing.assert_close(found, torch.full((2, 2), C))
+
+
+def test_few_events_weigh_against_sixteen_pixels_of_the_usual_contrast() -> None:
+    changes = torch.tensor([0.5, 0.5, -0.3, 1.0, 1.0]).reshape(1, 1, 1, 5)
+    first, second = (0.1 * torch.exp(change) - 1e-3 for change in (torch.zeros_like(changes), changes))
+    off, on = torch.tensor([[0, 1, 3, 0, 2], [2, 3, 0, 0, 2]]).float()  # +2, +2, -3, and twice none left over
+    off_on = torch.stack([off, on]).reshape(1, 2, 1, 1, 5)
+    found = with_fitted_contrast(first, second, EventCounts(off_on, torch.full((1, 2), 0.3)), "linear").contrast[0]
+    usual = 16 * 0.15**2
+    expected = [(0.3**2 + usual) / (3**2 + 16), (2 * 0.5**2 + usual) / (2 * 2**2 + 16)]
+    torch.testing.assert_close(found, torch.tensor(expected).sqrt(), atol=1e-5, rtol=0)

@@ -90,6 +90,16 @@ def test_a_lone_event_of_noise_is_a_hump_of_half_its_height() -> None:
     assert float(logs.abs().max()) < 0.5 * C
 
 
+def test_doubt_is_what_is_missed_where_half_of_it_may_have_come() -> None:
+    dark, bright = (torch.full((1, 1, 1, 1), light) for light in (0.1, 0.3))
+    times = torch.tensor([[0.0, 0.25, 0.75, 1.0]])
+    doubt = in_doubt(dark, bright, risen(of_one_pixel([0, 0, 0, 1, 0, 0, 0, 0]), times), times, "linear").flatten()
+    missed = math.log(0.301 / 0.101) - 0.5 * C  # a first event is half of one
+    early = (0.5 * (0.25 / 0.4375) ** 2 + 2 * 0.25) / 2.5  # w before the event, in the middle of 3/8 ... 4/8
+    expected = [0.0, missed * math.sqrt(early * (1 - early)), missed * 0.4, 0.0]  # w = 0.8 after it: sqrt(0.8 0.2)
+    torch.testing.assert_close(doubt, torch.tensor(expected), atol=1e-5, rtol=0)
+
+
 def test_light_that_rises_steadily_is_nearer_than_by_stairs() -> None:
     steps, rise = 64, 3.3 * C
     errors = {"ramps": 0.0, "bridge": 0.0}
