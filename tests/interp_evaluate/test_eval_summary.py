@@ -21,7 +21,7 @@ from interp.evaluate.group import Cameras, Group
 from interp.evaluate.report.content import FROM_TRUTH
 from interp.evaluate.row import Row
 from interp.evaluate.rows import NUMBERS, read_rows, write_rows
-from interp.evaluate.scoring import conditions_of, rows_of
+from interp.evaluate.scoring import conditions_of, rows_of, scores_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.tables import binned, edges_of, values
@@ -124,6 +124,20 @@ def test_moving_pixels_and_the_worst_window_are_scored_apart() -> None:
     )  # fmt: skip
     (found,) = rows_of("seq", "m", still, [group.truth[0]], conditions_of(still))
     assert found.moving == 0 and math.isnan(found.psnr_moving) and math.isnan(found.blur_px)
+
+
+def test_pixels_move_by_more_than_ten_codes_and_are_scored_for_themselves() -> None:
+    true = np.full((2, 2, 3), 100, np.uint8)
+    keys, made = np.stack([true, true]), true.copy()
+    keys[0, 0, 0, 1] = 90  # by exactly ten in one channel: static
+    keys[1, 0, 1, 2], keys[0, 1, 0, 0] = 89, 111  # by eleven from either frame, either way: moving
+    made[0, 0], made[1, 1] = 102, 104  # squares of errors 4 and 16
+    made[0, 1, 1], made[1, 0] = 120, 90  # 400 / 3 and 100
+    found = scores_of(made, true, keys)
+    assert found["moving"] == 0.5
+    assert found["psnr_static"] == pytest.approx(10 * math.log10(255**2 / 10))
+    assert found["psnr_moving"] == pytest.approx(10 * math.log10(255**2 / (700 / 6)))
+    assert found["psnr_255"] == pytest.approx(10 * math.log10(255**2 / (760 / 12)))
 
 
 def run(*arguments: object) -> Result:
