@@ -1,0 +1,35 @@
+"""Holes are filled from one surface: inverse depths up to 1.05 times as large."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vid2ev.rig.holes import apply_fill, fill_of
+
+HOLE, FAR, NEAR = 0.0, 0.2, 0.9  # light
+surfaces = pytest.mark.parametrize(("inverse", "one"), [(1.04, True), (1.06, False), (2.0, False)])
+
+
+def filled(inverse: list[list[float]], light: list[list[float]], inset: int = 0, smoothings: int = 0) -> np.ndarray:
+    picture = np.float32(light)[..., None]
+    apply_fill(fill_of(np.float32(inverse), inset), picture, smoothings)
+    return picture[..., 0]
+
+
+@surfaces
+def test_only_the_farthest_surface_around_a_hole_counts(inverse: float, one: bool) -> None:
+    found = filled([[1.0, -1, inverse]], [[FAR, HOLE, NEAR]])[0, 1]
+    assert found == pytest.approx((FAR + NEAR) / 2 if one else FAR)
+
+
+@surfaces
+def test_beyond_the_rim_is_looked_at_on_the_same_surface(inverse: float, one: bool) -> None:
+    found = filled([[inverse, 1.0, -1]], [[NEAR, FAR, HOLE]], inset=1)[0, 2]
+    assert found == pytest.approx(NEAR if one else FAR)
+
+
+@surfaces
+def test_surfaces_are_smoothed_apart(inverse: float, one: bool) -> None:
+    found = filled([[1.0, -1], [inverse, -1]], [[FAR, HOLE], [NEAR, HOLE]], smoothings=1)[:, 1]
+    assert found == pytest.approx([(FAR + NEAR) / 2] * 2 if one else [FAR, NEAR])
