@@ -2,7 +2,8 @@
 
     Charbonnier   mean sqrt(d^2 + e^2), e = 0.001: near 0 a parabola, so that what is exactly right has slope 0 and
                   not infinity
-    pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid
+    pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid; kornia's pyrdown and
+                  pyrup are none: they lose the last of an odd number of pixels
     smoothness    mean |dF/dx| + mean |dF/dy|
     log error     mean over images of ln(mean d^2 + e), e = 1e-6, where PSNR is 60 dB: PSNR in nepers, so that a decibel
                   counts the same in pictures that are nearly right as in those that are far off
@@ -53,17 +54,20 @@ def log_error(images: torch.Tensor, truth: torch.Tensor, where: torch.Tensor | N
 def pyramid(images: torch.Tensor, truth: torch.Tensor, levels: int = LEVELS) -> torch.Tensor:
     """The difference of images [..., C, H, W] in the levels of a Laplacian pyramid, as far as there are pixels for
     them."""
-    rest = (images - truth).flatten(0, -4) if images.ndim > 4 else images - truth
-    total = rest.new_zeros(())
-    for _ in range(levels - 1):
-        if min(rest.shape[-2:]) < 2:
-            break
+    difference = (images - truth).flatten(0, -4) if images.ndim > 4 else images - truth
+    return torch.stack([level.abs().mean() for level in laplacian(difference, levels)]).sum()
+
+
+@in_full_precision
+def laplacian(images: torch.Tensor, levels: int = LEVELS) -> list[torch.Tensor]:
+    """The levels of the Laplacian pyramid of images [B, C, H, W], from fine to coarse, as far as there are pixels for
+    them: what each loses in the next one, which has every other pixel from the first on, and of the last all."""
+    found, rest = list[torch.Tensor](), images
+    while len(found) < levels - 1 and min(rest.shape[-2:]) >= 2:
         lower = _blurred(rest)[..., ::2, ::2]
-        total = (
-            total + (rest - F.interpolate(lower, rest.shape[-2:], mode="bilinear", align_corners=False)).abs().mean()
-        )
+        found.append(rest - _expanded(lower, rest.shape[-2:]))
         rest = lower
-    return total + rest.abs().mean()
+    return [*found, rest]
 
 
 @in_full_precision
@@ -85,3 +89,17 @@ def _blurred(x: torch.Tensor) -> torch.Tensor:
     kernel = x.new_tensor(BINOMIAL).expand(x.shape[1], 1, 1, 5)
     x = F.conv2d(F.pad(x, (2, 2, 0, 0), mode="replicate"), kernel, groups=x.shape[1])
     return F.conv2d(F.pad(x, (0, 0, 2, 2), mode="replicate"), kernel.transpose(2, 3), groups=x.shape[1])
+
+
+def _expanded(x: torch.Tensor, size: torch.Size) -> torch.Tensor:
+    """x [B, C, h, w] with twice the pixels, of which its own are every other from the first on, up to a size (H, W)."""
+    height, width = size
+    return _doubled(_doubled(x, width).mT, height).mT
+
+
+def _doubled(x: torch.Tensor, width: int) -> torch.Tensor:
+    """Across, the binomial blur of x with zeros in between, times two, continued by its border."""
+    continued = F.pad(x, (1, 1, 0, 0), mode="replicate")
+    before, after = continued[..., :-2], continued[..., 2:]
+    at, between = (before + 6 * x + after) / 8, (x + after) / 2
+    return torch.stack([at, between], -1).flatten(-2)[..., :width]

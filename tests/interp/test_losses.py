@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 import torch
 from pairs import counts, frames
@@ -15,7 +17,7 @@ from interp.losses import objectives
 from interp.losses.objectives import reconstruction
 from interp.losses.over_time import inconsistency, visibility
 from interp.losses.perceptual import Perceptual
-from interp.losses.terms import absolute, between_frames, charbonnier, log_error, pyramid, smoothness
+from interp.losses.terms import absolute, between_frames, charbonnier, laplacian, log_error, pyramid, smoothness
 from interp.networks import make
 from interp.networks.frame_fed import Interpolated
 from interp.warp import flows_at, warp
@@ -55,6 +57,25 @@ def test_a_pyramid_tells_scales_apart() -> None:
     assert float(pyramid(even, zeros, 1)) == pytest.approx(0.1, rel=1e-5)
     for size in ((1, 1), (1, 5), (3, 2)):
         assert torch.isfinite(pyramid(torch.rand(2, 2, 3, *size), torch.rand(2, 2, 3, *size)))
+
+
+@pytest.mark.parametrize("size", [(256, 256), (225, 203)])
+def test_an_even_ramp_is_in_the_last_level_alone(size: tuple[int, int]) -> None:
+    y, x = torch.meshgrid(*(torch.arange(side, dtype=torch.float64) for side in size), indexing="ij")
+    ramp = 0.01 * x + 0.02 * y - 0.3
+    inner = [level[0, 0, 6:-6, 6:-6] for level in laplacian(ramp[None, None])]  # no border reaches farther
+    assert len(inner) == 5 and all(float(level.abs().max()) < 1e-12 for level in inner[:-1])
+    torch.testing.assert_close(inner[-1], ramp[::16, ::16][6:-6, 6:-6], atol=1e-12, rtol=0)
+
+
+@pytest.mark.parametrize("size", [(64, 48), (75, 90), (61, 33)])
+def test_levels_of_a_pyramid_are_those_of_opencv(size: tuple[int, int]) -> None:
+    image = torch.rand(size, dtype=torch.float64)
+    lower = cv2.pyrDown(image.numpy(), borderType=cv2.BORDER_REPLICATE)
+    detail = image.numpy() - cv2.pyrUp(lower, dstsize=size[::-1])
+    fine, last = (level[0, 0].numpy() for level in laplacian(image[None, None], 2))
+    np.testing.assert_allclose(last, lower, atol=1e-12)
+    np.testing.assert_allclose(fine[2:-2, 2:-2], detail[2:-2, 2:-2], atol=1e-12)  # (its borders are mirrored)
 
 
 def test_smooth_flows_cost_nothing_and_steps_what_they_are() -> None:
