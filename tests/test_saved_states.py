@@ -105,6 +105,51 @@ def test_a_sensor_takes_no_state_of_another_kind() -> None:
     dvs.restore(state)
 
 
+SENT = ("t", "x", "y", "p", "label")
+OF_DVS = (
+    "fast", "rest", "memory", "drawn", "t_last", "count", "t_reset", "tallies", "clock", "polarities", "frame_origin",
+    "frame_last", *(f"held_{name}" for name in SENT), *(f"delayed_{name}" for name in SENT), "of",
+)  # fmt: skip
+OF_CIS = ("light", "open", "totals", "pending", "counts", "clock", "of")
+
+
+@pytest.mark.parametrize(("kind", "name"), [*(("dvs", name) for name in OF_DVS), *(("cis", name) for name in OF_CIS)])
+def test_a_refused_state_changes_nothing(kind: str, name: str) -> None:
+    """Whichever entry is wrong: what comes next is that of a sensor that was never asked."""
+    light = np.random.default_rng(2).uniform(0, 1, (12, 20, 40, 3)).astype(np.float32)
+    light[1:, 10:] = light[0, 10:]  # (half of it still, where strips sleep)
+    frames = [Frame(each if kind == "cis" else each[..., 0], k * 4_000_000) for k, each in enumerate(light)]
+    untouched, asked = ((_dvs if kind == "dvs" else _cis)() for _ in range(2))
+    _sent(untouched, frames[:9])
+    _sent(asked, frames[:4])
+    early = asked.state()
+    _sent(asked, frames[4:9])
+    assert early.keys() == set(OF_DVS if kind == "dvs" else OF_CIS)
+    with pytest.raises(UsageError, match=f"'{name}'"):
+        asked.restore(early | {name: early[name].astype(np.complex64)})
+    assert asked.counts == untouched.counts
+    ours, theirs = _sent(asked, frames[9:]), _sent(untouched, frames[9:])
+    assert ours[0].size and all(np.array_equal(one, other) for one, other in zip(ours, theirs, strict=True))
+    one, other = asked.state(), untouched.state()
+    assert all(np.array_equal(one[each], other[each]) for each in other)
+
+
+def _dvs() -> Dvs:
+    return Dvs(load_sensor("ideal", ["delay_us=3000", "frame_rate_hz=200"]), (40, 20), 5)
+
+
+def _cis() -> Cis:
+    return Cis(load_cis("ideal", ["frame_rate_hz=120", "exposure_us=8000"]), (40, 20), 5)
+
+
+def _sent(sensor: Any, frames: list[Frame]) -> list[np.ndarray]:
+    """The columns of the events, or the codes of the exposures."""
+    if isinstance(sensor, Cis):
+        return [exposure.codes for frame in frames for exposure in sensor.see(frame)]
+    events = Events.concatenate([sensor.see(frame) for frame in frames])
+    return [events.t, events.x, events.y, events.p]
+
+
 @pytest.mark.parametrize("keys", [[], ["frame_rate_hz=3"], ["delay_us=900"]])
 def test_an_empty_state_is_that_of_a_sensor_without_light(keys: list[str]) -> None:
     light = np.random.default_rng(1).uniform(0, 1, (9, 12, 16)).astype(np.float32)

@@ -110,9 +110,10 @@ class Replayed:
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state."""
+        origin_us = int(state["origin"]) if self._frames else None
         self._parts = [_Stream(folder, int(sent)) for folder, sent in zip(self._folders, state["sent"], strict=True)]
         if self._frames:
-            self._frames.origin_us = int(state["origin"])
+            self._frames.origin_us = origin_us
 
     def _sent_us(self, t_us: int) -> int:
         """The last instant of which all is sent by a time [us]."""

@@ -214,6 +214,23 @@ def test_a_state_of_another_time_is_refused(which: int, by: int, tmp_path: Path)
         preview.begin(frame_at(10**9))
 
 
+@pytest.mark.parametrize("name", ["clock", "starts", "counts", "piece"])
+def test_a_refused_state_changes_nothing(name: str, tmp_path: Path) -> None:
+    for folder in ("old", "new"):
+        (tmp_path / folder).mkdir()
+    old, new = (Preview(SIZE, tmp_path / folder) for folder in ("old", "new"))
+    for preview in (old, new):
+        preview.begin(frame_at(0))
+    old.add(frame_at(10**9), events_at([5]))
+    old.close()
+    before, state = new.state(), old.state()
+    wrong = state if name == "piece" else state | {name: state[name].astype(np.complex64)}  # (it has no pieces yet)
+    with pytest.raises(UsageError, match=f"'{name}'" if name != "piece" else "without its piece 0"):
+        new.restore(wrong)
+    after = new.state()
+    assert all(np.array_equal(after[each], before[each]) for each in before)
+
+
 def test_a_state_of_more_frames_than_there_was_time_for_is_refused(tmp_path: Path) -> None:
     preview = Preview(SIZE, tmp_path)
     preview.begin(frame_at(0))

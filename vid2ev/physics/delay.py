@@ -13,6 +13,7 @@ makers state their pixels' response (Lichtsteiner, Posch, Delbruck, IEEE JSSC 20
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,12 @@ class Delayed:
         arrays = {name: getattr(self.held, name) for name in FIELDS}
         return {f"delayed_{name}": np.array(() if part is None else part, np.int64) for name, part in arrays.items()}
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that `state` gave."""
-        labelled = len(state.get("delayed_label", ())) > 0
-        self.held = events_of(state, "delayed_", self.size, labelled, dict.fromkeys(FIELDS, np.int64))
+    def restoring(self, state: dict[str, np.ndarray]) -> Callable[[], None]:
+        """What takes up a state, all of which is found right before.  Raises UsageError for another."""
+        labelled = np.size(state.get("delayed_label", ())) > 0
+        held = events_of(state, "delayed_", self.size, labelled, dict.fromkeys(FIELDS, np.int64))
+
+        def take_up() -> None:
+            self.held = held
+
+        return take_up

@@ -13,6 +13,7 @@ Source: the paper, algorithm step 3, "rounded to the closest event frame timesta
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -102,11 +103,17 @@ class EventFrames:
         parts = {"t": held.t, "x": held.x, "y": held.y, "p": held.p, "label": label}
         return {"frame_origin": origin, "frame_last": self.last.copy()} | {f"held_{k}": v for k, v in parts.items()}
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that `state` gave."""
-        (self.origin_us,) = clock(state, "frame_origin", 1)
-        self.last[...] = entry(state, "frame_last", np.int64, self.last.shape)
-        self.held = events_of(state, "held_", (self.width, self.height), self.labels, KINDS)
+    def restoring(self, state: dict[str, np.ndarray]) -> Callable[[], None]:
+        """What takes up a state, all of which is found right before.  Raises UsageError for another."""
+        (origin_us,) = clock(state, "frame_origin", 1)
+        last = entry(state, "frame_last", np.int64, self.last.shape)
+        held = events_of(state, "held_", (self.width, self.height), self.labels, KINDS)
+
+        def take_up() -> None:
+            self.origin_us, self.held = origin_us, held
+            self.last[...] = last
+
+        return take_up
 
 
 def omission(scene: Scene, spec: Any) -> Omission:

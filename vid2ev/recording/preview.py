@@ -103,15 +103,17 @@ class Preview:
         return {"clock": clock, "starts": np.array(self._starts, np.int64), "counts": self._counts.copy()}
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state."""
-        self._t0_ns, self._next, *flags = clock(state, "clock", 5)
+        """Take up a state.  Raises UsageError for one that cannot be, which changes nothing."""
+        t0_ns, following, *flags = clock(state, "clock", 5)
+        starts = [int(start) for start in entry(state, "starts", np.int64, (None,))]
+        counts = entry(state, "counts", np.uint8, self._counts.shape)
+        if any(after <= before for before, after in pairwise([-1, *starts, following + (not starts)])):
+            raise UsageError(f"state of a preview whose pieces begin at {starts[:9]}, up to {following}")
+        if missing := [k for k in range(len(starts)) if not self._piece(k).is_file()]:
+            raise UsageError(f"state of a preview without its piece {missing[0]}")
+        self._t0_ns, self._next, self._starts = t0_ns, following, starts
         self._waiting, self._showing, self._moved = (bool(flag) for flag in flags)
-        self._starts = [int(start) for start in entry(state, "starts", np.int64, (None,))]
-        self._counts[...] = entry(state, "counts", np.uint8, self._counts.shape)
-        if any(after <= before for before, after in pairwise([-1, *self._starts, self._next + (not self._starts)])):
-            raise UsageError(f"state of a preview whose pieces begin at {self._starts[:9]}, up to {self._next}")
-        if missing := next((k for k in range(len(self._starts)) if not self._piece(k).is_file()), None):
-            raise UsageError(f"state of a preview without its piece {missing}")
+        self._counts[...] = counts
 
     def join(self, path: Path, duration_us: int) -> None:
         """Put the pieces one after the other into one file, without encoding them again.  Raises UsageError for a state

@@ -130,28 +130,27 @@ class Cis:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave.
 
-        Raises UsageError for another.
+        Raises UsageError for another, which changes nothing.
         """
-        if state:
-            check_mark(state, self._mark())
-        self._open.clear()
         if not state:
+            self._open.clear()
             self._t_ns, self._first_ns, self._next = None, 0, 0
             self._made = self._unfinished = self._rows.mended = 0
             return
+        check_mark(state, self._mark())
         shape = self._rows.shape
         light = entry(state, "light", np.float32, shape)
         begun = entry(state, "open", np.int64, (None, 2))
         totals = entry(state, "totals", np.float64, (len(begun), *shape)) if len(begun) else begun
         pending = entry(state, "pending", np.float64, (len(begun), shape[0])) if len(begun) else begun
-        t_ns, first_ns, following = clock(state, "clock", 3)
+        counts, (t_ns, first_ns, following) = clock(state, "counts", 3), clock(state, "clock", 3)
         open_ns = [first_ns + opening_ns(k, self.spec.frame_rate_hz) for k in (following - 1, following)]
         if following < 1 or not open_ns[0] <= t_ns < open_ns[1]:
             raise UsageError(f"state of a frame camera at {t_ns} ns before exposure {following} since {first_ns} ns")
         self._t_ns, self._first_ns, self._next = t_ns, first_ns, following
-        self._made, self._unfinished, self._rows.mended = clock(state, "counts", 3)
+        self._made, self._unfinished, self._rows.mended = counts
         self._rows.before = self._rows.put(light)
-        self._open += [
+        self._open = [
             Open(int(index), int(start_ns), self._rows.put(total), rows.copy())
             for (index, start_ns), total, rows in zip(begun, totals, pending, strict=True)
         ]

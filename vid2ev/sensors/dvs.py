@@ -205,17 +205,18 @@ class Dvs:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state that a sensor of the same parameters, size, seed and camera gave.
 
-        Raises UsageError for another.
+        Raises UsageError for another, which changes nothing.
         """
         if not state:
             self._be(self.spec, self.seed, self.camera)
             return
         check_mark(state, self._mark())
-        self._pixels.restore(state)
+        numbers = clock(state, "clock", 5)
+        for take_up in [self._pixels.restoring(state), self._readout.restoring(state)]:  # (both look at it first)
+            take_up()
         self._seen = None
-        self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = clock(state, "clock", 5)
+        self._t_ns, self._leak_since_ns, self._step, fresh, self._origin_ns = numbers
         self._fresh_noise = bool(fresh)
-        self._readout.restore(state)
 
     def inside(self, pixels: np.ndarray) -> Inside:
         """What pixels [int, y * width + x] have in them after the last frame (`vid2ev.sensors.inside`).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from vid2ev.physics.delay import Delayed
@@ -62,9 +64,14 @@ class DvsReadout:
             state |= part.state() if part is not None else {}
         return state
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state that `state` gave.  Raises UsageError for another."""
-        self.polarities[...] = entry(state, "polarities", self.polarities.dtype, self.polarities.shape)
-        for part in (self._frames, self._delayed):
-            if part is not None:
-                part.restore(state)
+    def restoring(self, state: dict[str, np.ndarray]) -> Callable[[], None]:
+        """What takes up a state, all of which is found right before.  Raises UsageError for another."""
+        polarities = entry(state, "polarities", self.polarities.dtype, self.polarities.shape)
+        parts = [part.restoring(state) for part in (self._frames, self._delayed) if part is not None]
+
+        def take_up() -> None:
+            self.polarities[...] = polarities
+            for take_up_part in parts:
+                take_up_part()
+
+        return take_up

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -130,14 +130,20 @@ class Pixels:
         state = {name: getattr(self.planes, name).copy() for name in STATE_PLANES}
         return state | {"tallies": self.tallies.sum(axis=0)}
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Take up a state."""
-        self.sleep.forget()
-        for name in STATE_PLANES:
-            plane = getattr(self.planes, name)
-            plane[...] = entry(state, name, plane.dtype, plane.shape)
-        self.tallies[...] = 0
-        self.tallies[0] = entry(state, "tallies", self.tallies.dtype, self.tallies.shape[1:])
+    def restoring(self, state: dict[str, np.ndarray]) -> Callable[[], None]:
+        """What takes up a state, all of which is found right before.  Raises UsageError for another."""
+        planes = {name: getattr(self.planes, name) for name in STATE_PLANES}
+        saved = {name: entry(state, name, plane.dtype, plane.shape) for name, plane in planes.items()}
+        tallies = entry(state, "tallies", self.tallies.dtype, self.tallies.shape[1:])
+
+        def take_up() -> None:
+            self.sleep.forget()
+            for name, plane in planes.items():
+                plane[...] = saved[name]
+            self.tallies[...] = 0
+            self.tallies[0] = tallies
+
+        return take_up
 
     def inside(self, pixels: np.ndarray, leak_nat: float) -> Inside:
         """What pixels [int, y * width + x] have in them, whose levels have leaked this far."""
