@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shutil
 import sys
 from pathlib import Path
 
@@ -123,6 +124,22 @@ def test_dat_goes_on_in_further_files(tmp_path: Path) -> None:
     file = open_events(path)
     assert_same(Events.concatenate(file.events()), events.select(events.t >> 32 != 4))
     assert len(file.warnings) == 1 and file.warnings[0].startswith("1 further files of the recording are not there")
+
+
+@pytest.mark.parametrize("foreign", ["short", "longer"])
+def test_dat_does_not_go_on_in_a_file_of_another_recording(tmp_path: Path, foreign: str) -> None:
+    """Which has the name of its second part, but says of itself that it is 1/1, or 2/3."""
+    kind, turns = format_named("dat"), {"long": 1, "short": 0, "longer": 2}
+    for name, last_turn in turns.items():
+        t = np.array([0, 5, (last_turn << 32) + 9])
+        (tmp_path / name).mkdir()
+        written(kind, recording_of(events_of(t, (100, 100)), (100, 100)), tmp_path / name)
+    path = tmp_path / "long" / "events.dat"
+    other = "events.dat" if foreign == "short" else "events_1.dat"
+    shutil.copy(tmp_path / foreign / other, path.with_name("events_1.dat"))
+    file = open_events(path)
+    assert Events.concatenate(file.events()).t.tolist() == [0, 5]
+    assert [text.split(" are not there")[0] for text in file.warnings] == ["1 further files of the recording"]
 
 
 @pytest.mark.parametrize("after_us", [-1, 0, 1])

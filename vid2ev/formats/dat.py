@@ -53,13 +53,13 @@ class DatEvents(Sequential):
 
     def _decoded(self) -> Iterator[Events]:
         yield from self._alone()
-        missing = [path for path in self._further() if not path.exists()]
-        self._leave_out(len(missing), f"further files of the recording are not there ({self.path.stem}_*) and are")
-        for path in self._further():
-            if path not in missing:
-                part = DatEvents(path)
-                yield from part._alone()
-                self.warnings += [text for text in part.warnings if text not in self.warnings]
+        there = self.further()
+        missing = len(self._further()) - len(there)
+        self._leave_out(missing, f"further files of the recording are not there ({self.path.stem}_*) and are")
+        for path in there:
+            part = DatEvents(path)
+            yield from part._alone()
+            self.warnings += [text for text in part.warnings if text not in self.warnings]
 
     def further(self) -> list[Path]:
         """Those files in which the recording goes on that are there, and say themselves that they are its parts."""
