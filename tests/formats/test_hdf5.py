@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,24 @@ def test_the_same_events_give_the_same_bytes(tmp_path: Path) -> None:
 def test_times_out_of_order_or_before_the_start_are_not_written(tmp_path: Path, t: list[int]) -> None:
     with pytest.raises(ValueError, match="order"):
         write(tmp_path / "events.h5", events_at(np.array(t)), duration_us=10)
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        ({"size": (100, 240)}, "outside of 100x240 pixels"),
+        ({"size": (320, 7)}, "outside of 320x7 pixels"),
+        ({"duration_us": 998}, "outside of the recording"),
+        ({"count": 1001}, "1000 events, 1001 announced"),
+    ],
+)
+def test_what_is_not_as_the_recording_says_is_not_written(tmp_path: Path, said: dict[str, Any], expected: str) -> None:
+    """A file with those attributes would be refused, or read wrong, later."""
+    events = events_at(np.arange(1000))
+    recording = Recording(SIZE, 0, 999, 1000, lambda: iter([events]))
+    with pytest.raises(ValueError, match=expected):
+        write_events(tmp_path / "events.h5", replace(recording, **said))
+    write_events(tmp_path / "events.h5", recording)
 
 
 def test_the_description_counts(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording
+from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.stream.ahead import ahead
@@ -87,7 +87,7 @@ class Hdf5Events:
 
 
 def write_events(path: Path, recording: Recording) -> None:
-    """Write a recording.  Raises OSError where the disk cannot take it, ValueError for times out of order."""
+    """Write a recording.  Raises OSError where the disk cannot take it, ValueError as `promised` does."""
     import h5py
 
     offset_us, duration_us = recording.start_us, recording.duration_us
@@ -99,19 +99,16 @@ def write_events(path: Path, recording: Recording) -> None:
         types = {name: dataset.dtype for name, dataset in columns.items()}
         index = _dataset(file, "ms_to_idx", duration_us // MS_US + 2, np.uint64)
         frames = None if recording.frame_us is None else FrameIndex(recording.frame_us - offset_us)
-        indexed = start = last_us = 0
+        indexed = start = 0
         with closing(ahead(_as_stored(recording, types), BLOCKS_AHEAD)) as blocks:
             for t, stored in blocks:
-                last_us = int(t[-1]) if len(t) else last_us
                 for name, dataset in columns.items():
                     dataset[start : start + len(t)] = stored[name]
-                indexed = _index(index, indexed, last_us // MS_US + 1, t, start)
+                indexed = _index(index, indexed, int(t[-1]) // MS_US + 1, t, start)
                 if frames is not None:
                     frames.add(t, start)
                 start += len(t)
                 raw.check()
-        if start != recording.count:
-            raise ValueError(f"{start} events, {recording.count} announced")
         _index(index, indexed, len(index), np.empty(0, np.int64), start)
         if frames is not None:
             for name, values, dtype in (("t", frames.frame_us, np.int64), ("to_idx", frames.counts, np.uint64)):
@@ -123,17 +120,8 @@ def write_events(path: Path, recording: Recording) -> None:
 def _as_stored(
     recording: Recording, types: Mapping[str, np.dtype[Any]]
 ) -> Generator[tuple[np.ndarray, dict[str, np.ndarray]]]:
-    """The events in blocks: int64 times since the start of the recording, and columns as the file has them.
-
-    Raises ValueError for times out of order.
-    """
-    count = last_us = 0
-    for block in recording.blocks():
-        t = block.t - recording.start_us
-        if len(t) and (t[0] < last_us or np.any(t[1:] < t[:-1])):
-            raise ValueError(f"events out of order of time after event {count}")
-        last_us = int(t[-1]) if len(t) else last_us
-        count += len(t)
+    """The events in blocks: int64 times since the start of the recording, and columns as the file has them."""
+    for t, block in promised(recording):
         columns = {name: t if name == "t" else getattr(block, name) for name in types}
         yield t, {name: column.astype(types[name], copy=False) for name, column in columns.items()}
 
