@@ -30,7 +30,7 @@ from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.conversion import telling
 from vid2ev.errors import DiskError
-from vid2ev.recording.disk import lock, sync, whole_file, writing
+from vid2ev.recording.disk import lock, sync, undisturbed, whole_file, writing
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
 FACTS = "dataset.json"
@@ -72,16 +72,19 @@ def write_dataset(
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
     scenes, unusable = scenes_of(spec)
+    handle: int | None = None
     with writing(directory):
-        made_in.mkdir(parents=True, exist_ok=True)
-        handle = lock(made_in)
         try:
+            with undisturbed():
+                made_in.mkdir(parents=True, exist_ok=True)
+                handle = lock(made_in)
             _begin(made_in / "job.json", job, directory)
             made = sorted(_all(scenes, made_in, spec, workers, share, report))
             facts = _facts(job, spec, made, unusable)
             _publish(made_in, directory, facts)
         finally:
-            os.close(handle)
+            if handle is not None:
+                os.close(handle)
     return facts
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from interp.data.settings import ClipSettings
 from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
+from vid2ev.recording.disk import lock
 
 pytestmark = pytest.mark.long
 
@@ -238,6 +240,21 @@ def test_what_was_killed_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -
         if path.is_file() and path.name != "manifest.json":  # (which says when it was made)
             assert path.read_bytes() == (directory / path.relative_to(made)).read_bytes(), path
     assert write_dataset(directory, spec, resume=True) == again  # (a finished one is left as it is)
+
+
+def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl = pytest.importorskip("fcntl", reason="no file locks on this system")
+    flock = fcntl.flock
+
+    def asked(handle: int, flags: int) -> None:
+        flock(handle, flags)
+        signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(fcntl, "flock", asked)
+        write_dataset(tmp_path / "set", DatasetSpec(**QUICK))
+    assert not (tmp_path / "set.partial" / "job.json").exists()
+    os.close(lock(tmp_path / "set.partial"))
 
 
 def test_what_is_there_is_left_alone(made: Path) -> None:
