@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from vid2ev.errors import UsageError
 from vid2ev.rig.pose import Pose
-from vid2ev.scenes.complaints import sentence
 from vid2ev.scenes.scene import Camera, LightSource, Object, Scene, Setting
-from vid2ev.scenes.scene_file import frozen
+from vid2ev.scenes.scene_file import scene_of_tables
 from vid2ev.scenes.trajectory import Fixed, pose_of
 
 PLACE = ("position_m", "rotation_deg")  # of the fixed motion that comes first
@@ -65,7 +63,7 @@ def with_values(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
             table[key] = values[key]
     if here := {key: values[key] for key in PLACE if key in values}:
         _put_first(table, _first(thing_named(scene, name)) | here)
-    return _scene_of(tables)
+    return scene_of_tables(tables, "scene")
 
 
 def value_of(scene: Scene, name: str, key: str) -> Any:
@@ -116,10 +114,3 @@ def _table(tables: dict[str, Any], name: str) -> dict[str, Any]:
     if not own:
         return tables.setdefault(kind, {})
     return next(table for table in tables[kind] if table["name"] == own)
-
-
-def _scene_of(tables: dict[str, Any]) -> Scene:
-    try:
-        return Scene.model_validate(frozen(tables))
-    except ValidationError as error:
-        raise UsageError(sentence(error, tables, "scene", Scene)) from error

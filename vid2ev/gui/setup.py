@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from vid2ev.errors import UsageError
 from vid2ev.gui import files
 from vid2ev.recipe import refuse_recordings
 from vid2ev.rig.camera import Camera, Rig, Source, default_rig
-from vid2ev.rig.rig_file import complaint, read_rig
+from vid2ev.rig.rig_file import made, read_rig
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
 from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile
@@ -110,14 +110,14 @@ class Setup:
         """Values of a camera of the rig.  Raises UsageError for what cannot be."""
         before = self.rig.cameras[camera]
         table = {key: value for key, value in {**before.model_dump(), **values}.items() if value is not None}
-        changed = _made(Camera, table, f"camera {before.name}")
+        changed = made(Camera, table, f"camera {before.name}")
         cameras = tuple(changed if k == camera else each for k, each in enumerate(self.rig.cameras))
         return self.with_rig(cameras, own="sensor" in values or "set" in values)
 
     def with_video_camera(self, values: Mapping[str, Any]) -> Setup:
         """Values of the camera that took the video.  Raises UsageError for what cannot be."""
         table = {key: value for key, value in {**self.rig.source.model_dump(), **values}.items() if value is not None}
-        return replace(self, rig=Rig(source=_made(Source, table, "[source]"), cameras=self.rig.cameras), own_rig=False)
+        return replace(self, rig=Rig(source=made(Source, table, "[source]"), cameras=self.rig.cameras), own_rig=False)
 
     def with_rig(self, cameras: tuple[Camera, ...], own: bool = False) -> Setup:
         """Other cameras; `own` says that they stand where they stood.  Raises UsageError for what cannot be."""
@@ -166,13 +166,6 @@ def texts_of(changes: Mapping[str, Any], prefix: str = "") -> list[str]:
 def spec_of(kind: Kind, name: str, changes: Mapping[str, Any]) -> Any:
     """The specification of a sensor and changes to it.  Raises UsageError, DataError."""
     return files.specification(kind, name, tuple(texts_of(changes)))
-
-
-def _made(model: type[BaseModel], table: Mapping[str, Any], where: str) -> Any:
-    try:
-        return model(**table)
-    except ValidationError as error:
-        raise UsageError(complaint(error, model, table, where)) from error
 
 
 def _plain(value: Any) -> Any:

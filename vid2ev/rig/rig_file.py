@@ -53,7 +53,7 @@ def read_rig(path: str | Path, to_use: bool = True) -> Rig:
     listed = tables.get("camera", [])
     if not isinstance(listed, list) or not listed or not all(isinstance(table, dict) for table in listed):
         raise UsageError(f"{path}: there is no camera; write a table [[camera]] for each one, with its name and kind")
-    source = _made(Source, tables.get("source", {}), f"{path}: [source]")
+    source = made(Source, tables.get("source", {}), f"{path}: [source]")
     cameras = [_camera(table, index, path, to_use) for index, table in enumerate(listed)]
     try:
         return Rig(source=source, cameras=tuple(cameras))
@@ -131,7 +131,7 @@ def _tables(path: Path) -> dict[str, Any]:
 def _camera(table: Mapping[str, Any], index: int, path: Path, to_use: bool) -> Camera:
     name = table.get("name")
     where = f"{path}: camera '{name}'" if isinstance(name, str) else f"{path}: camera {index + 1}"
-    camera = _made(Camera, table, where)
+    camera = made(Camera, table, where)
     if camera.sensor is not None and is_file(camera.sensor):
         if to_use:
             beside(path, camera.sensor)
@@ -144,17 +144,17 @@ def is_file(sensor: str) -> bool:
     return sensor.endswith(".toml") or len(Path(sensor).parts) > 1
 
 
-def _made(model: type[Model], values: Any, where: str) -> Model:
-    """A record of a table's values, or one sentence that says what is wrong with them."""
+def made(model: type[Model], values: Any, where: str) -> Model:
+    """A record of a table's values.  Raises UsageError, one sentence that says what is wrong with them."""
     if not isinstance(values, dict):
         raise UsageError(f"{where} is no table; write [source] on a line, and its keys below")
     try:
         return model(**values)
     except ValidationError as error:
-        raise UsageError(complaint(error, model, values, where)) from error
+        raise UsageError(_complaint(error, model, values, where)) from error
 
 
-def complaint(error: ValidationError, model: type[BaseModel], values: Mapping[str, Any], where: str) -> str:
+def _complaint(error: ValidationError, model: type[BaseModel], values: Mapping[str, Any], where: str) -> str:
     """The first of pydantic's complaints as one sentence: where, key, value, what is possible."""
     first = error.errors()[0]
     if not first["loc"]:

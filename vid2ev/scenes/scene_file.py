@@ -64,10 +64,7 @@ class SceneFile:
         except UsageError as error:
             raise UsageError(f"{self.name}: {error}") from error
         self._find_files(tables, chance)
-        try:
-            return Scene.model_validate(frozen(tables))
-        except ValidationError as error:
-            raise UsageError(sentence(error, tables, self.name, Scene)) from error
+        return scene_of_tables(tables, self.name)
 
     def _things(self, kind: str, things: Any, chance: Chance) -> Iterator[Any]:
         """Each of a list of objects or lights, as often as its count says."""
@@ -122,6 +119,14 @@ def files_named(tables: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str
     for key in ("environment", "rig"):
         if isinstance(setting, dict) and isinstance(setting.get(key), str):
             yield setting, key, f"scene.{key}"
+
+
+def scene_of_tables(tables: Mapping[str, Any], name: str) -> Scene:
+    """The scene of settled tables, of a file of a name.  Raises UsageError, in a sentence, for what cannot be."""
+    try:
+        return Scene.model_validate(frozen(tables))
+    except ValidationError as error:
+        raise UsageError(sentence(error, tables, name, Scene)) from error
 
 
 def frozen(node: Any) -> Any:
