@@ -28,9 +28,9 @@ BINOMIAL = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)
 
 
 @in_full_precision
-def charbonnier(images: torch.Tensor, truth: torch.Tensor, epsilon: float = EPSILON) -> torch.Tensor:
-    """A smooth absolute difference; epsilon for 0."""
-    return torch.sqrt((images - truth) ** 2 + epsilon**2).mean()
+def charbonnier(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
+    """A smooth absolute difference; EPSILON for 0."""
+    return torch.sqrt((images - truth) ** 2 + EPSILON**2).mean()
 
 
 @in_full_precision

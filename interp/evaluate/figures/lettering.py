@@ -9,27 +9,28 @@ import numpy as np
 
 GROUND, INK, ACCENT = (16, 18, 24), (226, 228, 232), (240, 166, 70)  # of sheets: that of events, and what is on it
 SIZE_PX = 12
+BELOW_PX = SIZE_PX // 3  # what g and y need
 STRIP_PX = SIZE_PX + 8  # the height of a line of letters
 
 
 @lru_cache(maxsize=256)
-def letters(text: str, size_px: int = SIZE_PX) -> np.ndarray:
-    """How far pixels are covered by a line of text, float32 [size + below, w], 0 ... 1; its baseline is at `size`."""
+def letters(text: str) -> np.ndarray:
+    """How far pixels are covered by a line of text, float32 [SIZE_PX + BELOW_PX, w], 0 ... 1; its baseline is at the
+    former."""
     from matplotlib.font_manager import findfont, get_font
 
-    below = size_px // 3  # what g and y need
     if not text.strip():
-        return np.zeros((size_px + below, 0), np.float32)
+        return np.zeros((SIZE_PX + BELOW_PX, 0), np.float32)
     font = get_font(findfont("DejaVu Sans"))
-    font.set_size(size_px, 72)
+    font.set_size(SIZE_PX, 72)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of letters that the font lacks: they become boxes
         font.set_text(" ".join(text.split()), 0)
         font.draw_glyphs_to_bitmap(antialiased=True)
     covered = np.array(font.get_image(), np.float32) / 255
     above = covered.shape[0] - round(font.get_descent() / 64)
-    covered = np.pad(covered, ((max(0, size_px - above), below), (0, 0)))[max(0, above - size_px) :]
-    return covered[: size_px + below]
+    covered = np.pad(covered, ((max(0, SIZE_PX - above), BELOW_PX), (0, 0)))[max(0, above - SIZE_PX) :]
+    return covered[: SIZE_PX + BELOW_PX]
 
 
 def write(picture: np.ndarray, text: str, left: int, top: int, colour: tuple[int, int, int] = INK) -> None:
@@ -39,8 +40,8 @@ def write(picture: np.ndarray, text: str, left: int, top: int, colour: tuple[int
     part[:] = np.rint(part + covered[..., None] * (np.array(colour) - part.astype(np.float32))).astype(np.uint8)
 
 
-def strip(text: str, width: int, colour: tuple[int, int, int] = INK) -> np.ndarray:
+def strip(text: str, width: int) -> np.ndarray:
     """A line of text on dark ground, uint8 [STRIP_PX, width, 3]."""
     made = np.full((STRIP_PX, width, 3), GROUND, np.uint8)
-    write(made, text, 4, 2, colour)
+    write(made, text, 4, 2)
     return made
