@@ -25,10 +25,10 @@ from typing import Any
 
 import click
 import numpy as np
+from still_pixels import hot_from, rates_by_light
 
 from vid2ev import Dvs, DvsSpec, load_sensor, read_events
 from vid2ev.compare.statistics import EDGES_US, Statistics, statistics_of
-from vid2ev.compare.still_pixels import hot_from, rates_by_light
 from vid2ev.stream.events import Events
 
 PRESET, ASKED = "davis346", ("photoreceptor_tau_us=500", "refractory_us=750", "shot_rate_hz=2", "shot_light_factor=1")

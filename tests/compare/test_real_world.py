@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+import importlib
 from pathlib import Path
 from types import ModuleType
 
@@ -21,12 +20,9 @@ needs_data = pytest.mark.skipif(not (DATA / "hybrid").exists(), reason=f"needs {
 
 @pytest.fixture(scope="module")
 def real_world() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("real_world", ROOT / "examples" / "real_world.py")
-    assert specification and specification.loader
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["real_world"] = module  # (dataclasses look their module up)
-    specification.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patched:
+        patched.syspath_prepend(ROOT / "examples")
+        return importlib.import_module("real_world")
 
 
 def column(title: str, name: str) -> dict[str, str]:

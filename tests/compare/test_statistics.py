@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.compare.statistics import EDGES_US, Statistics, statistics_of
-from vid2ev.compare.still_pixels import hot_from, rates_by_light
 from vid2ev.formats import read_events
 from vid2ev.stream.events import Events
 
@@ -137,34 +136,6 @@ def test_events_outside_of_the_sensor_are_refused(events: Events) -> None:
 def test_events_out_of_order_are_refused() -> None:
     with pytest.raises(ValueError, match="order"):
         statistics_of([events_of([5]), events_of([4])], SIZE)
-
-
-def test_rates_against_light() -> None:
-    light = np.tile(np.linspace(0.01, 0.99, 200), (150, 1))
-    light[:, :20] = np.nan
-    random = np.random.default_rng(3)
-    seconds, rate = 2.0, 4.0 - 3.0 * np.nan_to_num(light)
-    counts = random.poisson(np.stack([0.25 * rate, 0.75 * rate]) * seconds)
-    rows = rates_by_light(counts, light, seconds, np.linspace(0, 1, 6))
-    assert sum(row.pixels for row in rows) == 180 * 150
-    for row in rows:
-        assert abs(row.rate_hz - (4 - 3 * row.light)) < 5 * row.error_hz
-        assert row.error_hz == pytest.approx(math.sqrt(row.rate_hz / (row.pixels * seconds)))
-        assert row.on_share == pytest.approx(0.75, abs=0.03)
-    assert rates_by_light(counts, light, seconds, np.array([2.0, 3.0])) == []
-
-
-@pytest.mark.parametrize("mean", [0.01, 0.5, 8.0, 60.0])
-def test_of_pixels_of_chance_none_is_hot_and_hot_ones_are_found(mean: float) -> None:
-    counts = np.random.default_rng(5).poisson(mean, (200, 300))
-    assert np.count_nonzero(counts >= hot_from(counts)) <= 3
-    counts[::50, ::50] = 40 + 5 * int(mean)
-    assert 24 <= np.count_nonzero(counts >= hot_from(counts)) <= 27
-
-
-def test_the_hot_of_silent_pixels() -> None:
-    assert hot_from(np.zeros((4, 4), int)) == 1
-    assert hot_from(np.array([[0, 0, 0, 9]])) <= 9
 
 
 @pytest.mark.skipif(not BAG.exists(), reason=f"needs {BAG}")
