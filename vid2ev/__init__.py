@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from vid2ev.formats import read_events as read_events
     from vid2ev.instants import events_of as events_of
     from vid2ev.sensors.batch import DvsBatch as DvsBatch
+    from vid2ev.sensors.batch_on_card import DvsBatchOnCard as DvsBatchOnCard
+    from vid2ev.sensors.card_grids import NetCountsOnCard as NetCountsOnCard
+    from vid2ev.sensors.card_grids import VoxelsOnCard as VoxelsOnCard
     from vid2ev.sensors.cis import Cis as Cis
     from vid2ev.sensors.cis_spec import CisSpec as CisSpec
+    from vid2ev.sensors.devices import memory_of as memory_of
     from vid2ev.sensors.dvs import Dvs as Dvs
     from vid2ev.sensors.presets import cis_names as cis_names
     from vid2ev.sensors.presets import load_cis as load_cis
@@ -41,20 +45,24 @@ _HOME = {
     "DataError": "vid2ev.errors",
     "Dvs": "vid2ev.sensors.dvs",
     "DvsBatch": "vid2ev.sensors.batch",
+    "DvsBatchOnCard": "vid2ev.sensors.batch_on_card",
     "DvsSpec": "vid2ev.sensors.spec",
     "Events": "vid2ev.stream.events",
     "Exposure": "vid2ev.stream.exposures",
     "Frame": "vid2ev.stream.frames",
     "Label": "vid2ev.stream.events",
     "NetCounts": "vid2ev.views.grid",
+    "NetCountsOnCard": "vid2ev.sensors.card_grids",
     "UsageError": "vid2ev.errors",
     "Vid2evError": "vid2ev.errors",
+    "VoxelsOnCard": "vid2ev.sensors.card_grids",
     "Windows": "vid2ev.views.grid",
     "cis_names": "vid2ev.sensors.presets",
     "convert": "vid2ev.conversion",
     "events_of": "vid2ev.instants",
     "load_cis": "vid2ev.sensors.presets",
     "load_sensor": "vid2ev.sensors.presets",
+    "memory_of": "vid2ev.sensors.devices",
     "open_source": "vid2ev.sources",
     "preset_names": "vid2ev.sensors.presets",
     "read_events": "vid2ev.formats",
