@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+from voxel_grid import voxel_grid
 
 from interp.representation.event_counts import USUAL_NATS, as_voxels
 from vid2ev import Events
-from vid2ev.views.voxel import voxel_grid
 
 
 def exact_voxels(

@@ -12,7 +12,7 @@ standard deviation would take away, and there is nothing to divide by where ther
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -123,12 +123,6 @@ class EventCounts:
     def none(batch: int, size: tuple[int, int], steps: int = 1, contrast: float = USUAL_NATS) -> EventCounts:
         """No events, for sizes (height, width)."""
         return EventCounts(torch.zeros(batch, 2, steps, *size), torch.full((batch, 2), contrast))
-
-    @staticmethod
-    def stacked(counts: Sequence[EventCounts]) -> EventCounts:
-        """Several of one camera as one batch; they must have one size and one number of sub-intervals."""
-        off_on, contrast = (torch.cat([getattr(one, name) for one in counts]) for name in ("off_on", "contrast"))
-        return EventCounts(off_on, contrast, counts[0].footprint)
 
 
 def before_and_after(times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

@@ -10,13 +10,22 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from vid2ev.compare.comparison import Comparison, compare, percentile
-from vid2ev.compare.matching import partners
+from vid2ev.compare.matching import _pair
 from vid2ev.stream.events import Events
 
 TIMES = st.one_of(
     st.lists(st.integers(0, span), max_size=14).map(lambda times: np.array(sorted(times), np.int64))
     for span in (4, 20, 100)
 )
+
+
+def partners(a_us: np.ndarray, b_us: np.ndarray, window_us: int) -> tuple[np.ndarray, np.ndarray]:
+    """The indices of the events that are paired, of two ascending series of times [us]: the first of one with the
+    first of the other, and so on."""
+    a_kept, b_kept = np.zeros(len(a_us), np.bool_), np.zeros(len(b_us), np.bool_)
+    scratch = np.empty((3, len(a_us) + len(b_us)), np.int64)
+    _pair(a_us, b_us, len(a_us), len(b_us), window_us, a_kept, b_kept, scratch)
+    return np.flatnonzero(a_kept), np.flatnonzero(b_kept)
 
 
 def least_cost(a: np.ndarray, b: np.ndarray, window: int) -> int:

@@ -68,7 +68,8 @@ def test_what_is_in_its_place_stays_there(seed: int) -> None:
 def test_each_of_a_batch_is_moved_by_itself() -> None:
     made = [seen(seed, shift) for seed, shift in ((1, (6, 0)), (2, (0, -6)))]
     first, last = (torch.cat([each[k] for each in made]) for k in (0, 1))
-    both = brought(first, last, EventCounts.stacked([each[2] for each in made]))
+    off_on, contrast = (torch.cat([getattr(each[2], name) for each in made]) for name in ("off_on", "contrast"))
+    both = brought(first, last, EventCounts(off_on, contrast))
     for k, each in enumerate(made):
         assert torch.equal(both.off_on[k : k + 1], brought(*each).off_on)
 

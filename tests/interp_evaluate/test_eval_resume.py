@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 import torch
 from footage_made import pictures, write_film, write_hsergb, write_predictions
+from rows_read import read_rows
 
 from interp.evaluate import run
 from interp.evaluate.protocol import Protocol
-from interp.evaluate.rows import read_rows
 from interp.evaluate.run import evaluate
 from interp.networks import make
 from interp.weights import save

@@ -1,4 +1,4 @@
-"""Pixel maps, flow and visibility against closed forms and OpenCV's projection."""
+"""Pixel maps, flow and depth against closed forms and OpenCV's projection."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from view_rigs import pinhole
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid
 from vid2ev.rig.pose import IDENTITY, Pose, rotation_vector_deg
-from vid2ev.rig.truth import carried, depth_of_plane, depth_seen, pixel_map, visible
+from vid2ev.rig.truth import depth_of_plane, depth_seen, pixel_map
 
 A = pinhole()
 B = pinhole((200, 100), 140).model_copy(update={"model": "radtan", "distortion": (-0.1, 0.02, 1e-3, 0.0)})
@@ -31,9 +31,7 @@ def test_pixel_maps_are_those_of_opencv(camera: Intrinsics) -> None:
         ]
     else:
         expected = cv2.projectPoints(points.reshape(-1, 3), turn, back.translation_m, camera.matrix, values)[0]
-    found = carried(A, pose_a, DEPTH, camera, pose_b)
-    np.testing.assert_allclose(found.px, expected.reshape(grid.shape), atol=1e-3)
-    np.testing.assert_allclose(found.depth_m, back.apply(points)[..., 2], rtol=1e-6)
+    np.testing.assert_allclose(pixel_map(A, pose_a, DEPTH, camera, pose_b), expected.reshape(grid.shape), atol=1e-3)
 
 
 def test_the_disparity_of_a_rectified_pair() -> None:
@@ -67,31 +65,13 @@ def test_the_infinitely_far_turns_and_does_not_shift() -> None:
     way, turn = (5.0, -3.0, 2.0), (2, 3, 4)
     both, only_turned = (pixel_map(A, IDENTITY, far, A, Pose.of(turn, t)) for t in (way, (0, 0, 0)))
     np.testing.assert_array_equal(both, only_turned)
-    assert np.isinf(carried(A, IDENTITY, far, A, Pose.of(turn, way)).depth_m).all()
 
 
 @pytest.mark.parametrize("depth_m", [0.0, -1.0, np.nan, -np.inf])
 def test_what_is_not_known_or_not_in_front_is_nan(depth_m: float) -> None:
-    found = carried(A, IDENTITY, np.full((120, 160), depth_m), B, Pose.of((0, 0, 0), (0.1, 0, 0)))
-    assert np.isnan(found.px).all() and np.isnan(found.depth_m).all()
+    assert np.isnan(pixel_map(A, IDENTITY, np.full((120, 160), depth_m), B, Pose.of((0, 0, 0), (0.1, 0, 0)))).all()
     for pose in (Pose.of((0, 180, 0)), Pose.of((0, 0, 0), (0, 0, 6))):
         assert np.isnan(pixel_map(A, IDENTITY, DEPTH, B, pose)).all()
-        assert not visible(A, IDENTITY, DEPTH, B, pose, np.ones((100, 200))).any()
-
-
-def test_what_is_hidden_is_not_visible() -> None:
-    """A card at 1 m before a wall at 4 m: it hides 11 px more or less of the wall from a camera 0.1 m beside."""
-    beside = Pose.of((0, 0, 0), (0.1, 0, 0))
-    source = np.full((120, 160), 4, np.float32)
-    source[40:80, 60:100] = 1
-    other = np.full((120, 160), 4, np.float32)
-    other[40:80, 45:85] = 1
-    seen = visible(A, IDENTITY, source, A, beside, other)
-    hidden = np.zeros((120, 160), np.bool_)
-    hidden[40:80, 49:60] = True  # what the card covers there, 45 ... 84, less its own pixels: 48.75 ... 59
-    hidden[:, :4] = True  # out of the picture to the left
-    assert (seen == hidden).sum() <= 2 * 40 + 120
-    assert seen[40:80, 60:100].all()
 
 
 def test_depth_that_another_camera_has() -> None:

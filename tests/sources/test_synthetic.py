@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -50,11 +51,12 @@ def test_a_step_and_a_flash_happen_when_they_should() -> None:
         assert lit == list(range(at, at + 50))
 
 
-def test_an_edge_crosses_when_it_says() -> None:
+def test_an_edge_crosses_when_it_should() -> None:
     clip = MovingEdge(size=(64, 2))
     for x in (10, 33, 60):
         for light in (0.11, 0.35, 0.59):
-            t_ns = round(clip.crossing_s(x, light) * 1e9)
+            behind_px = clip.width * NormalDist().inv_cdf((light - clip.low) / (clip.high - clip.low))
+            t_ns = round((x - clip.start + behind_px) / clip.speed * 1e9)
             assert clip.light(t_ns)[1, x] == pytest.approx(light, abs=1e-6)
 
 

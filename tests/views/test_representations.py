@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from voxel_grid import voxel_grid
 
 from vid2ev.errors import UsageError
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
 from vid2ev.stream.events import Events
-from vid2ev.views.counts import Counts, counts_of
+from vid2ev.views.counts import Counts
 from vid2ev.views.frame import Frame
 from vid2ev.views.representation import Kind, represent, slices_of
 from vid2ev.views.requests import parse_representation
 from vid2ev.views.slices import Area, Count, Duration, Slicing
 from vid2ev.views.time_surface import NEVER, ActiveEvents, TimeSurface, decayed
-from vid2ev.views.voxel import Voxel, voxel_grid
+from vid2ev.views.voxel import Voxel
 
 from .recordings import SIZE, events_at, recording_of
 
@@ -57,9 +58,15 @@ def signs(events: Events) -> np.ndarray:
 # ------------------------------------------------------------------------------------------------------- counts, frame
 
 
+def counts_of(events: Events) -> np.ndarray:
+    counts = Counts(SIZE)
+    counts.add(events)
+    return counts.take()
+
+
 def test_counts_are_those_of_a_histogram() -> None:
     events = events_at(np.arange(5000))
-    counts = counts_of(events, SIZE)
+    counts = counts_of(events)
     assert counts.dtype == np.uint16 and counts.shape == (2, HEIGHT, WIDTH)
     np.testing.assert_array_equal(counts, histogram(events))
     assert counts.sum() == len(events)
@@ -68,7 +75,7 @@ def test_counts_are_those_of_a_histogram() -> None:
 def test_counts_stop_at_the_most_that_they_can_hold() -> None:
     n = 70_000
     same = Events(np.arange(n), np.full(n, 3, np.uint16), np.full(n, 2, np.uint16), np.ones(n, np.uint8))
-    counts = counts_of(same, SIZE)
+    counts = counts_of(same)
     assert counts[1, 2, 3] == 65535 and counts.sum() == 65535
 
 

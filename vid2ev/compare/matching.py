@@ -56,15 +56,6 @@ def match(a: ByPixel, b: ByPixel, window_us: int = WINDOW_US) -> Matches:
     return Matches(errors, int(polarity_errors))
 
 
-def partners(a_us: np.ndarray, b_us: np.ndarray, window_us: int = WINDOW_US) -> tuple[np.ndarray, np.ndarray]:
-    """The indices of the events that are paired, of two ascending series of times [us]: the first of one with the
-    first of the other, and so on."""
-    a_kept, b_kept = np.zeros(len(a_us), np.bool_), np.zeros(len(b_us), np.bool_)
-    scratch = np.empty((3, len(a_us) + len(b_us)), np.int64)
-    _pair(a_us, b_us, len(a_us), len(b_us), window_us, a_kept, b_kept, scratch)
-    return np.flatnonzero(a_kept), np.flatnonzero(b_kept)
-
-
 @cached
 def _pair(a, b, a_many, b_many, window, a_kept, b_kept, scratch):  # type: ignore[no-untyped-def]
     """Mark the events that have partners: a[:a_many] and b[:b_many] are times [us], ascending."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -173,11 +172,3 @@ def _scratch() -> tuple[np.ndarray, ...]:
         aligned(BLOCK + 8, np.int32),
         aligned(LANES, np.float32),
     )
-
-
-def scene_of(spec: DvsSpec, size: tuple[int, int], frames: Iterable[Frame]) -> Scene:
-    """The scene of all frames."""
-    measure = Measure(spec, size)
-    for frame in frames:
-        measure.see(frame)
-    return measure.scene()

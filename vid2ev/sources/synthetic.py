@@ -155,11 +155,6 @@ class MovingEdge(SyntheticClip):
         row = [edge.cdf((place - x) / self.width) for x in range(self.size[0])]
         return np.tile((self.low + (self.high - self.low) * np.array(row)).astype(np.float32), (self.size[1], 1))
 
-    def crossing_s(self, x: float, light: float) -> float:
-        """Instant [s] at which column x has this light, strictly between low and high."""
-        quantile = NormalDist().inv_cdf((light - self.low) / (self.high - self.low))
-        return (x - self.start + self.width * quantile) / self.speed
-
 
 @dataclass(frozen=True)
 class Black(SyntheticClip):

@@ -47,13 +47,6 @@ class Counts:
         return COLOURS[off, on]
 
 
-def counts_of(events: Events, size: tuple[int, int]) -> np.ndarray:
-    """Counts of events on a sensor of `size` (width, height); raises ValueError for events outside of it."""
-    counts = Counts(size)
-    counts.add(events)
-    return counts.take()
-
-
 @cached
 def _count(x, y, p, counts):  # type: ignore[no-untyped-def]
     for i in range(len(x)):

@@ -9,7 +9,7 @@ alike), those that are 0 stay 0, as in E2VID's code.
 
 The formula is that of Zhu et al. (2019), "Unsupervised event-based learning of optical flow, depth, and egomotion",
 CVPR, for events at whole pixels, and of Rebecq et al. (2019), "High speed and high dynamic range video with an event
-camera" (E2VID).  Their t_0 and t_1 are the first and the last event: so are those of `voxel_grid` unless it is told.
+camera" (E2VID).  Their t_0 and t_1 are the first and the last event.
 """
 
 from __future__ import annotations
@@ -69,27 +69,6 @@ class Voxel:
             tile = COLOURS[level[k]] if k < self.bins else COLOURS[BRIGHTEST]
             picture[top : top + down - 1, left : left + across - 1] = tile
         return picture
-
-
-def voxel_grid(
-    events: Events,
-    size: tuple[int, int],
-    bins: int = 5,
-    start_us: int | None = None,
-    stop_us: int | None = None,
-    *,
-    polarity: bool = False,
-    normalised: bool = False,
-) -> np.ndarray:
-    """The voxel grid of events on a sensor of `size` (width, height), between two instants [us].
-
-    By default these are the first and the last event.  Raises ValueError for events outside of the sensor.
-    """
-    grid = Voxel(size, bins, polarity=polarity, normalised=normalised)
-    if len(events):
-        first = int(events.t[0]) if start_us is None else start_us
-        grid.add(events, first, int(events.t[-1]) if stop_us is None else stop_us)
-    return grid.take()
 
 
 def _normalised(grid: np.ndarray) -> np.ndarray:
