@@ -7,6 +7,7 @@ which it goes on, and takes up columns that come later.
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 from lightning.pytorch.loggers.logger import Logger
 from lightning.pytorch.utilities import rank_zero_only
 
+from vid2ev.errors import DataError
 from vid2ev.recording.disk import whole_file
 
 FILES = {"train": "training.csv", "validation": "validation.csv"}
@@ -72,7 +74,31 @@ class Curves(Logger):
 
 
 def read_curve(path: Path) -> list[dict[str, str]]:
-    """The rows of a curve that are whole; none if there is no file."""
-    text = path.read_text(encoding="utf-8") if path.exists() else ""
-    whole = text[: text.rfind("\n") + 1]
-    return list(csv.DictReader(whole.splitlines()))
+    """The rows of a curve that are whole; none if there is no file.
+
+    A crash may leave less than was written, or zeros in its place: rows from there on are not whole, and are dropped.
+    Raises DataError for what no crash leaves: somebody may want to put it right.
+    """
+    content = path.read_bytes().partition(b"\0")[0] if path.exists() else b""
+    try:
+        rows = list(csv.DictReader(content[: content.rfind(b"\n") + 1].decode().splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise _damaged(path, "it is not text in UTF-8, or no CSV") from error
+    for line, row in enumerate(rows, 2):
+        if None in row or None in row.values() or not _is_number(row.get("step", "")):
+            raise _damaged(path, f"line {line} has no step, or not a value for each column")
+    return rows
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _damaged(path: Path, why: str) -> DataError:
+    return DataError(
+        f"{path} cannot be read as a curve: {why}; put it right, or remove it: training goes on from its checkpoint,"
+        " and the curve from there"
+    )

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from interp.train.curves import Curves, read_curve
+from vid2ev.errors import DataError
 
 
 def log(curves: Curves, *steps: int) -> None:
@@ -29,6 +32,34 @@ def test_a_row_cut_off_by_a_crash_is_dropped(tmp_path: Path) -> None:
         assert [row["step"] for row in read_curve(tmp_path / "training.csv")] == ["1"]
     log(Curves(tmp_path, step=1), 2)
     assert [row["step"] for row in read_curve(tmp_path / "training.csv")] == ["1", "2"]
+
+
+@pytest.mark.parametrize("zeros", [b"", bytes(100), bytes(50) + b"\n" + bytes(50), b"\n"])
+def test_a_curve_that_a_crash_left_without_content_is_begun_anew(tmp_path: Path, zeros: bytes) -> None:
+    (tmp_path / "training.csv").write_bytes(zeros)
+    log(Curves(tmp_path, step=1), 2)
+    assert [row["step"] for row in read_curve(tmp_path / "training.csv")] == ["2"]
+
+
+def test_zeros_in_place_of_rows_are_dropped(tmp_path: Path) -> None:
+    log(Curves(tmp_path), 1, 2)
+    whole = (tmp_path / "training.csv").read_bytes()
+    (tmp_path / "training.csv").write_bytes(whole + bytes(20) + b"\n3,0.1\n")
+    log(Curves(tmp_path, step=5), 6)
+    assert [row["step"] for row in read_curve(tmp_path / "training.csv")] == ["1", "2", "6"]
+
+
+@pytest.mark.parametrize("name", ["training.csv", "validation.csv"])
+@pytest.mark.parametrize(
+    "content",
+    [b"step,loss\none,0.5\n", b"loss\n0.5\n", b"step,loss\nnan,0.5\n", b"step,loss\n1\n", b"step,loss\n1,2,3\n",
+     b"step,loss\n1,\xff\n", b"\xff\xfes\n1\n", b"step;loss\n1;0,5\n", b"step,loss\n1," + b"5" * 200_000 + b"\n"],
+)  # fmt: skip
+def test_a_damaged_curve_is_one_sentence_and_stays_as_it_is(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError, match=rf"{name} cannot be read as a curve: .*; put it right, or remove it"):
+        Curves(tmp_path, step=5)
+    assert (tmp_path / name).read_bytes() == content
 
 
 def test_columns_may_come_later(tmp_path: Path) -> None:
