@@ -41,7 +41,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
     "--layout", type=click.Choice(["own", "hsergb", "bsergb"]), default="own", show_default=True,
     help="Recordings of vid2ev, or the files of HS-ERGB or BS-ERGB.",
 )  # fmt: skip
-@click.option("--size", default="640x480", show_default=True, metavar="WxH", help="Pixels of rendered scenes.")
+@click.option("--size", show_default="640x480", metavar="WxH", help="Pixels of rendered scenes.")
 @click.option(
     "--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Another seed, other scenes."
 )
@@ -52,7 +52,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
 def dataset(
     directory: Path,
     videos: tuple[str, ...],
-    size: str,
+    size: str | None,
     resume: bool,
     as_json: bool,
     quiet: bool,
@@ -76,8 +76,10 @@ def dataset(
 
     workers = workers_of(options, usable_cores())
     found = tuple(source for video in videos for source in sources_in(video))
+    if size is not None:
+        options["size"] = _size(size)
     try:
-        spec = DatasetSpec(videos=found, size=_size(size), **options)
+        spec = DatasetSpec(videos=found, **options)
     except ValidationError as error:
         complaint = error.errors()[0]
         named = f"--{str(complaint['loc'][0]).replace('_', '-')} {complaint['input']}: " if complaint["loc"] else ""

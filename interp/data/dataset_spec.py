@@ -23,7 +23,7 @@ from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_senso
 from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
-from vid2ev.sources import begins_s
+from vid2ev.sources import begins_s, is_single_picture
 
 Layout = Literal["own", "hsergb", "bsergb"]
 EDGES_S = 0.022  # of a scene's light more than its exposures take: instants may be 10 ms apart, at both ends
@@ -49,6 +49,9 @@ class DatasetSpec(BaseModel):
     def _fits(self) -> DatasetSpec:
         if self.slowdown != 1 and not self.videos:
             raise ValueError(f"slowdown {self.slowdown:g} without videos; name some with --from, or leave it out")
+        if "size" in self.model_fields_set and self.videos:
+            width, height = self.size
+            raise ValueError(f"size {width}x{height} of videos, which are seen as they are; leave it out")
         return self
 
     @property
@@ -122,6 +125,8 @@ def _of_videos(spec: DatasetSpec) -> tuple[list[Scene], dict[str, str]]:
 
 def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     """Of one video."""
+    if is_single_picture(Path(video)):
+        raise UsageError(f"{video}: a single picture; give a video, or a folder that holds a sequence of pictures")
     source = open_source(video)
     seconds = source.duration_expected_s or 0.0
     frame_s = seconds / max(source.frames_expected or 1, 1)

@@ -26,6 +26,7 @@ from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
 from vid2ev.recording.disk import lock
+from vid2ev.recording.exposures import write_codes
 
 pytestmark = pytest.mark.long
 
@@ -292,3 +293,17 @@ def test_what_cannot_be_meant_is_one_sentence_and_exit_code_2(tmp_path: Path, ar
     said = result.exception if isinstance(result.exception, UsageError) else result
     assert said is not None and said.exit_code == 2, result.output
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("size", ["64x48", "640x480"])
+def test_a_size_is_of_rendered_scenes_only(tmp_path: Path, film: Path, size: str) -> None:
+    result = run(tmp_path / "set", "--from", film, "--size", size)
+    assert isinstance(result.exception, UsageError)
+    assert str(result.exception) == f"size {size} of videos, which are seen as they are; leave it out"
+    assert not (tmp_path / "set").exists()
+
+
+def test_a_single_picture_is_no_video(tmp_path: Path) -> None:
+    write_codes(tmp_path / "brick.png", np.zeros((24, 32, 3), np.uint8))
+    with pytest.raises(UsageError, match=r"brick\.png: a single picture; give a video, or a folder that holds a seq"):
+        scenes_of(DatasetSpec(videos=(str(tmp_path / "brick.png"),)))

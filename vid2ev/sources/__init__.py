@@ -117,10 +117,9 @@ def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colou
 
     match recognise(path):
         case "picture":
-            from vid2ev.light.picture_files import pages_of
             from vid2ev.sources.images import Images
 
-            if pages_of(path) == 1:
+            if is_single_picture(path):
                 raise UsageError(
                     f"{path}: a single picture; give the folder that holds the sequence, or let a camera move over it"
                     " with --motion pan"
@@ -140,6 +139,14 @@ def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colou
             from vid2ev.sources.video import Video
 
             return Video(VideoFile(path), transfer=transfer, fps=fps, colour=colour)
+
+
+def is_single_picture(path: Path) -> bool:
+    """Whether there is a file that holds one picture, which by itself is no source.  Raises as `open_source`."""
+    from vid2ev.light.picture_files import pages_of
+    from vid2ev.light.recognise import recognise
+
+    return path.is_file() and recognise(path) == "picture" and pages_of(path) == 1
 
 
 def _in_motion(path: Path, motion: str, **options: Any) -> Source:
