@@ -5,11 +5,19 @@ The defaults are those of `tiny` on two cores.  Where a number has no source, it
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Share = Annotated[float, Field(ge=0, lt=1)]
+
+
+def _as_text(value: Any) -> Any:
+    """A whole number as it is written: precision=32 is a number where settings are read."""
+    return str(value) if isinstance(value, int) else value
+
+
+Precision = Annotated[Literal["auto", "32", "bf16", "16"], BeforeValidator(_as_text)]
 
 
 class Recipe(BaseModel):
@@ -31,7 +39,7 @@ class Recipe(BaseModel):
     clip: float = Field(1.0, gt=0, description="longest gradient")
     mean: float = Field(0.998, ge=0, lt=1, description="weight of what was, in the running mean of the weights")
     most_skipped: int = Field(20, ge=1, description="steps in a row without a finite gradient that end training")
-    precision: Literal["auto", "32", "bf16", "16"] = Field(
+    precision: Precision = Field(
         "auto", description="bits of activations: 32 on a CPU; on a GPU bf16 where it has that, else 16"
     )
     validations: int = Field(10, ge=1, description="how often it is validated, the end included")

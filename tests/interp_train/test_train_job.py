@@ -72,6 +72,14 @@ def test_what_cannot_be_meant_is_refused_in_a_sentence(network: str, settings: l
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("bits", ["32", "16"])
+def test_a_precision_may_be_written_as_a_number(bits: str) -> None:
+    for said in (bits, f'"{bits}"'):
+        assert Job.of("rrin", settings=[f"precision={said}"]).recipe.precision == bits
+    with pytest.raises(UsageError, match="precision = '8' is impossible: it must be 'auto', '32', 'bf16' or '16'"):
+        Job.of("rrin", settings=["precision=8"])
+
+
 def test_every_number_of_the_recipe_says_what_it_is_and_stays() -> None:
     assert all(field.description for field in Recipe.model_fields.values())
     with pytest.raises(ValidationError):
