@@ -91,6 +91,7 @@ def train(
     A run is a folder with weights.safetensors, curves, pictures, and all that it takes to go on: interrupted or killed
     at any moment, or carried to another machine, it continues with --resume, on a CPU to the very same weights.
     """
+    from interp.data.inputs import trained_with
     from interp.data.samples import check_fits
     from interp.data.usable import unusable
     from interp.train.machines import Machines, check_installed
@@ -107,9 +108,10 @@ def train(
         job = job.trained_by(machines.devices)
     machines.check_batch(job.recipe.batch)
     check_fits(job.clips, job.samples.size)
-    for reason in unusable(job.clips, job.validation.videos):
-        if machines.first:
-            click.echo(f"note: not used: {reason}", err=True)
+    films = job.validation.videos
+    notes = [f"not used: {reason}" for reason in unusable(job.clips, films)] + trained_with(job.clips, films)
+    for note in notes if machines.first else ():
+        click.echo(f"note: {note}", err=True)
     if dry_run:
         from interp.train.made_of import learner_of
         from interp.train.starts import begin

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from interp.data.settings import ClipSettings
@@ -26,6 +26,18 @@ def inputs_of(settings: ClipSettings, videos: Iterable[str] = ()) -> dict[str, s
     """Those of settings of clips, and of further videos."""
     named = (settings.video_files, settings.recording_folders, settings.textures, settings.environments, videos)
     return digests_of(name for names in named for name in names)
+
+
+def trained_with(settings: ClipSettings, videos: Sequence[str]) -> list[str]:
+    """Which of the videos to validate with clips are made of, too, by what is in them, each with what that means."""
+    ours = {digest: name for name, digest in digests_of(settings.video_files if settings.videos > 0 else ()).items()}
+    known = digests_of(videos)
+    return [
+        f"{video} is validated with, and trained with as {ours[known[video]]}: its scores are better than of films"
+        " that training never sees"
+        for video in dict.fromkeys(videos)
+        if known.get(video) in ours
+    ]
 
 
 def known_by(settings: ClipSettings, *more: object) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from interp.data.settings import ClipSettings
 from interp.data.shot import AHEAD, Beside, coarse
 from vid2ev import Frame, UsageError, open_source
 from vid2ev.sensors.devices import Device
-from vid2ev.sources import Source, begins_s
+from vid2ev.sources import Source, begins_s, is_single_picture
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
@@ -85,7 +86,13 @@ def _wanted(multiple: int) -> int:
 
 
 def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
-    """Raise UsageError for a film that is too short or too small for clips, DataError for one that cannot be read."""
+    """Raise UsageError for a film that is none, too short or too small for clips, DataError for one that cannot be
+    read."""
+    if is_single_picture(Path(name)):
+        raise UsageError(
+            f"{name}: a single picture, expected a video; leave it out, or train with photographs in motion that"
+            " --set clips.textures=[...] names"
+        )
     _fitting(_opened(name)[0], name, size, multiple)
 
 

@@ -245,6 +245,38 @@ def test_a_film_that_is_too_small_is_refused_before_training(tmp_path: Path) -> 
     assert shown.exit_code == 2 and "film.npz: 40x24 pixels; expected at least 128x128" in shown.output
 
 
+@pytest.mark.parametrize("option", ["--data", "--validate"])
+def test_a_single_picture_is_no_film_to_train_with(option: str, tmp_path: Path) -> None:
+    write_codes(tmp_path / "brick.png", np.zeros((200, 200, 3), np.uint8))
+    shown = run(option, "brick.png", "--dry-run")
+    assert shown.exit_code == 2 and "brick.png: a single picture, expected a video; leave it out" in shown.output
+    assert "--motion" not in shown.output and shown.output.count("\n") == 1
+
+
+def test_a_film_that_is_trained_and_validated_with_is_named(tmp_path: Path) -> None:
+    """Whatever its name: by what is in it."""
+    for name, light in (("film.npz", 0.2), ("copy.npz", 0.2), ("other.npz", 0.3)):
+        np.savez(tmp_path / name, frames=np.full((20, 24, 40, 3), light, np.float32), fps=30)
+    small = ("--dry-run", "--set", "clips.size=[32,24]", "--set", "samples.size=16", "--data", "film.npz")
+    for name in ("film.npz", "copy.npz"):
+        shown = run(*small, "--validate", name)
+        assert shown.exit_code == 0 and shown.output.count("note: ") == 1
+        assert f"note: {name} is validated with, and trained with as film.npz: its scores are better" in shown.output
+    assert "note: " not in run(*small, "--validate", "other.npz").output
+
+
+def test_a_damaged_curve_is_one_sentence_and_can_be_removed() -> None:
+    assert run(*FEW, "-o", "run", "--session", "0.001s").exit_code == 0
+    on = ("-o", "run", "--resume", "--workers", "0", "--cpu")
+    Path("run/validation.csv").write_bytes(b"step,psnr\n0,\xff\n")
+    damaged = run(*on)
+    assert damaged.exit_code == 1 and damaged.output.count("\n") == 1
+    assert f"error: {Path('run', 'validation.csv')} cannot be read as a curve: " in damaged.output
+    Path("run/validation.csv").unlink()
+    again = run(*on)
+    assert again.exit_code == 0 and again.output.startswith("run: step 3 of 3"), again.output
+
+
 def test_a_scene_that_is_too_short_is_refused_before_training(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text("[scene]\nduration_s = 0.2\n")
     shown = run("--set", 'clips.scene_names=["short.toml"]', "--dry-run")
