@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
+
+SMALLEST = 1e-12  # of what may be 0: a draw that is nearer to 0 than 1e-100, which no sensor takes, then never comes
 
 
 def _rises(ends: tuple[float, float]) -> tuple[float, float]:
@@ -18,6 +20,24 @@ def _rises(ends: tuple[float, float]) -> tuple[float, float]:
 
 
 Range = Annotated[tuple[float, float], AfterValidator(_rises)]
+Share = Annotated[float, Field(ge=0, le=1e6)]  # sums of them, and parts of sums, are neither infinite nor rounded away
+
+
+def within(least: float, most: float) -> AfterValidator:
+    """That both ends of a range lie between these; those of one that is drawn in the logarithm above 0."""
+    first, words = (SMALLEST, f"0, or from {SMALLEST:g}") if least == 0 else (least, f"from {least:g}")
+
+    def lies(ends: tuple[float, float]) -> tuple[float, float]:
+        if not all(end == 0 == least or first <= end <= most for end in ends):
+            raise ValueError(f"range {ends[0]:g} to {ends[1]:g}: expected both ends {words} to {most:g}")
+        return ends
+
+    return AfterValidator(lies)
+
+
+def has_some(shares: Sequence[float]) -> bool:
+    """Whether there is something to choose from in these proportions."""
+    return sum(shares) >= SMALLEST
 
 
 def chance(seed: int, *name: object) -> np.random.Generator:
@@ -34,7 +54,7 @@ def uniform(draw: np.random.Generator, ends: Range) -> float:
 def log_uniform(draw: np.random.Generator, ends: Range) -> float:
     """The same in the logarithm; both ends are above 0."""
     low, high = ends
-    return low * (high / low) ** float(draw.random())
+    return min(low * (high / low) ** float(draw.random()), high)  # (which rounding may exceed)
 
 
 def one_of(draw: np.random.Generator, shares: Sequence[float]) -> int:

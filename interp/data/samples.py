@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from torch.utils.data import Dataset
 
 from interp.data import alter
-from interp.data.chance import Range, chance, uniform
+from interp.data.chance import Range, chance, uniform, within
 from interp.data.clip import Clip
 from interp.data.pool import Pool
 from interp.data.recorded import coarser_by
@@ -35,17 +35,19 @@ class SampleSettings(BaseModel):
         default=(40, 95), description="of that JPEG, from, to"
     )
     thinned: float = Field(default=0.15, ge=0, le=1, description="share that has lost events")
-    lost: Range = Field(default=(0.0, 0.1), description="share of the events that these have lost")
-    threshold_error: Range = Field(default=(0.9, 1.1), description="thresholds that are believed, over those that are")
+    lost: Annotated[Range, within(0, 1)] = Field(
+        default=(0.0, 0.1), description="share of the events that these have lost"
+    )
+    threshold_error: Annotated[Range, within(0.01, 100)] = Field(
+        default=(0.9, 1.1), description="thresholds that are believed, over those that are"
+    )
 
     @model_validator(mode="after")
-    def _rises(self) -> SampleSettings:
+    def _fits(self) -> SampleSettings:
         if self.quality[0] > self.quality[1]:
             raise ValueError(f"quality {self.quality}: expected the lower one first")
-        if not 0 <= self.lost[0] <= self.lost[1] <= 1:
-            raise ValueError(f"lost {self.lost}: expected shares from 0 to 1")
-        if self.threshold_error[0] <= 0:
-            raise ValueError(f"threshold_error {self.threshold_error}: expected factors above 0")
+        if self.still + self.all_still > 1:
+            raise ValueError(f"still {self.still:g} and all_still {self.all_still:g}: expected 1 together at most")
         return self
 
 

@@ -14,12 +14,12 @@ for the darkest and the noise.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from interp.data.chance import Range, log_uniform, one_of, uniform
+from interp.data.chance import Range, Share, has_some, log_uniform, one_of, uniform, within
 from vid2ev import CisSpec, DvsSpec
 
 KINDS = ("clean", "slow", "noisy")
@@ -28,46 +28,76 @@ WHITE = 65535.0  # I16 of diffuse white
 
 
 class SensorRanges(BaseModel):
-    """Ranges that sensors are drawn from; a range of no width is a number."""
+    """Ranges that sensors are drawn from; a range of no width is a number.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    Beside each stand its least and most: whatever is drawn from there is a sensor (`DvsSpec`, `CisSpec`), thresholds
+    times `off_to_on` and `mismatch`, too.  Raises `pydantic.ValidationError` for what is not.
+    """
 
-    kinds: tuple[float, float, float] = Field(
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    kinds: tuple[Share, Share, Share] = Field(
         default=(0.4, 0.3, 0.3), description="shares of clean, slow and noisy sensors"
     )
-    threshold: Range = Field(default=(0.1, 0.4), description="of ON events [nat]")
-    off_to_on: Range = Field(default=(0.8, 1.25), description="threshold OFF / threshold ON")
-    mismatch: Range = Field(
+    threshold: Annotated[Range, within(1e-3, 10)] = Field(default=(0.1, 0.4), description="of ON events [nat]")
+    off_to_on: Annotated[Range, within(0.01, 10)] = Field(
+        default=(0.8, 1.25), description="threshold OFF / threshold ON"
+    )
+    mismatch: Annotated[Range, within(0, 10)] = Field(
         default=(0.03, 0.13), description="standard deviation over pixels, as a share of the threshold"
     )
-    crossing_noise: Range = Field(
+    crossing_noise: Annotated[Range, within(0, 100)] = Field(
         default=(0.005, 0.04), description="standard deviation from crossing to crossing [nat]"
     )
-    refractory_us: Range = Field(default=(1.0, 1000.0), description="refractory period, even in the logarithm [us]")
-    tau_us: Range = Field(
+    refractory_us: Annotated[Range, within(1e-9, 1e9)] = Field(
+        default=(1.0, 1000.0), description="refractory period, even in the logarithm [us]"
+    )
+    tau_us: Annotated[Range, within(1e-3, 1e9)] = Field(
         default=(30.0, 1000.0), description="first pole, even in the logarithm [us]; the second is a third"
     )
-    leak_rate_hz: Range = Field(default=(0.01, 0.3), description="leak events per pixel [Hz]")
-    shot_rate_hz: Range = Field(
+    leak_rate_hz: Annotated[Range, within(0, 1e6)] = Field(
+        default=(0.01, 0.3), description="leak events per pixel [Hz]"
+    )
+    shot_rate_hz: Annotated[Range, within(1e-6, 5e4)] = Field(
         default=(0.1, 5.0), description="shot-noise events per pixel, even in the logarithm [Hz]"
     )
-    hot_probability: Range = Field(
+    hot_probability: Annotated[Range, within(1e-9, 1)] = Field(
         default=(1e-4, 1e-3), description="share of pixels that are hot, even in the logarithm"
     )
-    hot_rate_hz: Range = Field(default=(10.0, 200.0), description="events of a hot pixel, even in the logarithm [Hz]")
+    hot_rate_hz: Annotated[Range, within(1e-6, 1e5)] = Field(
+        default=(10.0, 200.0), description="events of a hot pixel, even in the logarithm [Hz]"
+    )
     exposed: float = Field(
         default=0.5, ge=0, le=1, description="share of frames with an exposure; the others see an instant"
     )
-    exposure: Range = Field(default=(0.0, 0.5), description="exposure as a share of the time between frames")
+    exposure: Annotated[Range, within(0, 1)] = Field(
+        default=(0.0, 0.5), description="exposure as a share of the time between frames"
+    )
     clipping: float = Field(
         default=0.3, ge=0, le=1, description="share of frame sensors whose range is not from black to white"
     )
-    min_illuminance: Range = Field(default=(0.0, 4096.0), description="I16 of code 0 of those; white is 65535")
-    top_illuminance: Range = Field(default=(45000.0, 65535.0), description="I16 of the highest code of those")
-    noise_lsb: Range = Field(default=(0.0, 5.2), description="noise of the ADC [LSB of 10 bits]")
-    white: Range = Field(
+    min_illuminance: Annotated[Range, within(0, 1e6)] = Field(
+        default=(0.0, 4096.0), description="I16 of code 0 of those; white is 65535"
+    )
+    top_illuminance: Annotated[Range, within(1, 1e6)] = Field(
+        default=(45000.0, 65535.0), description="I16 of the highest code of those"
+    )
+    noise_lsb: Annotated[Range, within(0, 1e5)] = Field(
+        default=(0.0, 5.2), description="noise of the ADC [LSB of 10 bits]"
+    )
+    white: Annotated[Range, within(1e-3, 1e3)] = Field(
         default=(0.4, 1.2), description="light of the brightest twentieth of a picture, by the aperture"
     )
+
+    @model_validator(mode="after")
+    def _fits(self) -> SensorRanges:
+        if not has_some(self.kinds):
+            raise ValueError(f"kinds {self.kinds}: expected a share above 0")
+        if self.min_illuminance[1] >= self.top_illuminance[0]:
+            raise ValueError(
+                f"min_illuminance {self.min_illuminance}: expected less than top_illuminance {self.top_illuminance}"
+            )
+        return self
 
     def dvs(self, draw: np.random.Generator) -> DvsSpec:
         """An event sensor."""

@@ -6,13 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from interp.data.chance import Range
+from interp.data.chance import Range, Share, has_some, within
 from interp.data.sensor_ranges import SENSORS, SensorRanges
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.scenes.textures import PHOTOGRAPHS
 
 HELD_OUT = ("coffee", "motorcycle", "gravel", "rocket")  # photographs that are kept for validation
 TRAINED_ON = tuple(name for name in PHOTOGRAPHS if name not in HELD_OUT)
+MOST_PX = 1000  # of motion: what turns and grows with much more is soon beyond all numbers
 SOURCES = ("scenes", "photographs", "videos", "recordings")
 
 
@@ -30,13 +31,13 @@ class ClipSettings(BaseModel):
     multiples: tuple[int, ...] = Field(
         default=(8,), description="frames to rebuild per key frame: of 4, 8, 16, 32, each as often"
     )
-    bins: int = Field(default=32, description="sub-intervals that events are counted in; a multiple of all multiples")
-    scenes: float = Field(default=0.4, ge=0, description="share of clips of rendered scenes")
-    photographs: float = Field(
-        default=0.6, ge=0, description="share of clips of photographs in motion, one before the other"
+    bins: int = Field(
+        default=32, ge=1, description="sub-intervals that events are counted in; a multiple of all multiples"
     )
-    videos: float = Field(default=0.0, ge=0, description="share of clips of real videos")
-    recordings: float = Field(default=0.0, ge=0, description="share of clips of recordings on disk")
+    scenes: Share = Field(default=0.4, description="share of clips of rendered scenes")
+    photographs: Share = Field(default=0.6, description="share of clips of photographs in motion, one before the other")
+    videos: Share = Field(default=0.0, description="share of clips of real videos")
+    recordings: Share = Field(default=0.0, description="share of clips of recordings on disk")
     video_files: tuple[str, ...] = Field(default=(), description="real videos")
     recording_folders: tuple[str, ...] = Field(
         default=(), description="recordings: own, or in the HS-ERGB or BS-ERGB layout"
@@ -47,16 +48,20 @@ class ClipSettings(BaseModel):
         default=TRAINED_ON, min_length=1, description="photographs: bundled ones by name, or files"
     )
     environments: tuple[str, ...] = Field(default=(), description="HDR pictures of all that is around, for scenes")
-    motion: tuple[tuple[float, float, float], ...] = Field(
+    motion: tuple[tuple[Share, float, float], ...] = Field(
         default=((0.6, 4, 24), (0.2, 0.5, 4), (0.2, 24, 60)),
         description="share of clips, and motion per key frame from, to [px]",
     )
     step_px: float = Field(
         default=1.5, gt=0, description="the most that things move from picture to picture, while there are bins"
     )
-    gap_ms: Range = Field(default=(8.0, 60.0), description="from key frame to key frame, even in the logarithm [ms]")
+    gap_ms: Annotated[Range, within(1e-3, 1e5)] = Field(
+        default=(8.0, 60.0), description="from key frame to key frame, even in the logarithm [ms]"
+    )
     rigs: float = Field(default=0.0, ge=0, le=1, description="share of clips whose event camera stands elsewhere")
-    baseline_mm: Range = Field(default=(0.0, 15.0), description="how far from the frame camera [mm]")
+    baseline_mm: Annotated[Range, within(0, 1e4)] = Field(
+        default=(0.0, 15.0), description="how far from the frame camera [mm]"
+    )
     coarser: tuple[Annotated[int, Field(ge=1)], ...] = Field(
         default=(1, 2, 3), min_length=1, description="pixels of frames per pixel of events, across, in rigs"
     )
@@ -71,12 +76,12 @@ class ClipSettings(BaseModel):
             raise ValueError(f"multiples {self.multiples}: expected some of 4, 8, 16, 32")
         if self.bins % max(self.multiples) or self.bins > 64:
             raise ValueError(f"bins {self.bins}: expected a multiple of {max(self.multiples)} up to 64")
-        if self.gap_ms[0] <= 0:
-            raise ValueError(f"gap_ms {self.gap_ms}: expected times above 0")
         shares = [share for share, _, _ in self.motion]
-        if sum(shares) <= 0 or min(shares) < 0 or any(not 0 <= low <= high for _, low, high in self.motion):
-            raise ValueError(f"motion {self.motion}: expected shares above 0, each with a range of pixels that rises")
-        if sum(self.shares) <= 0:
+        if not has_some(shares) or any(not 0 <= low <= high <= MOST_PX for _, low, high in self.motion):
+            raise ValueError(
+                f"motion {self.motion}: expected shares above 0, each with a range of pixels that rises to {MOST_PX}"
+            )
+        if not has_some(self.shares):
             raise ValueError("no clips: expected a share of scenes, photographs, videos or recordings above 0")
         if self.videos > 0 and not self.video_files:
             raise ValueError("videos without video_files: expected one or more")

@@ -156,7 +156,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         ),
         (["--dry-run", "--set", "clips.textures=[]"], "setting clips.textures = [] is impossible"),
         (["--dry-run", "--set", "clips.coarser=[0]"], "setting clips.coarser.0 = 0 is impossible"),
-        (["--dry-run", "--set", "clips.gap_ms=[0,8]"], "gap_ms (0.0, 8.0): expected times above 0"),
+        (["--dry-run", "--set", "clips.gap_ms=[0,8]"], "clips.gap_ms = [0, 8] is impossible: range 0 to 8: expected"),
         (["--dry-run", "--set", "clips.motion=[]"], "motion (): expected shares above 0"),
         (["--dry-run", "--set", "clips.scene_names=[]"], "setting clips.scene_names = [] is impossible"),
         (["--dry-run", "--set", "samples.lost=[0.5,0.1]"], "range 0.5 to 0.1: expected two finite numbers"),
@@ -169,6 +169,47 @@ def test_wrong_options_are_one_sentence_and_exit_code_2(arguments: list[str], se
     assert shown.exit_code == 2
     assert sentence in shown.output and "Traceback" not in shown.output
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("clips.bins=0", "clips.bins = 0 is impossible: it must be greater than or equal to 1"),
+        ("clips.bins=-32", "clips.bins = -32 is impossible: it must be greater than or equal to 1"),
+        ("clips.gap_ms=[1e9,1e9]", "range 1e+09 to 1e+09: expected both ends from 0.001 to 100000"),
+        ("clips.baseline_mm=[-5,-1]", "range -5 to -1: expected both ends 0, or from 1e-12 to 10000"),
+        ("clips.motion=[[1,1,1e300]]", "each with a range of pixels that rises to 1000"),
+        ("clips.motion=[[1e300,1,2]]", "clips.motion.0.0 = 1e+300 is impossible: it must be less than or equal to"),
+        ("clips.sensors={kinds=[0,0,0]}", "kinds (0.0, 0.0, 0.0): expected a share above 0"),
+        ("clips.sensors={kinds=[-1,1,1]}", "clips.sensors.kinds.0 = -1 is impossible: it must be greater than or"),
+        ("clips.sensors={threshold=[0,0]}", "clips.sensors.threshold = [0, 0] is impossible: range 0 to 0: expected"),
+        ("clips.sensors={threshold=[-1,0.1]}", "range -1 to 0.1: expected both ends from 0.001 to 10"),
+        ("clips.sensors={off_to_on=[-1,-1]}", "range -1 to -1: expected both ends from 0.01 to 10"),
+        ("clips.sensors={mismatch=[-2,-1]}", "range -2 to -1: expected both ends 0, or from 1e-12 to 10"),
+        ("clips.sensors={refractory_us=[0,100]}", "range 0 to 100: expected both ends from 1e-09 to 1e+09"),
+        ("clips.sensors={refractory_us=[-5,100]}", "range -5 to 100: expected both ends from 1e-09 to 1e+09"),
+        ("clips.sensors={refractory_us=[100,5]}", "range 100 to 5: expected two finite numbers, the lower one first"),
+        ("clips.sensors={tau_us=[0,0]}", "range 0 to 0: expected both ends from 0.001 to 1e+09"),
+        ("clips.sensors={hot_probability=[1,2]}", "range 1 to 2: expected both ends from 1e-09 to 1"),
+        ("clips.sensors={noise_lsb=[-3,-2]}", "range -3 to -2: expected both ends 0, or from 1e-12 to 100000"),
+        ("clips.sensors={exposure=[0,5]}", "range 0 to 5: expected both ends 0, or from 1e-12 to 1"),
+        (
+            "clips.sensors={min_illuminance=[70000,80000],clipping=1.0}",
+            "min_illuminance (70000.0, 80000.0): expected less than top_illuminance (45000.0, 65535.0)",
+        ),
+        ("clips.sensors={clipping=nan}", "clips.sensors.clipping = nan is impossible: it must be a finite number"),
+    ],
+)
+def test_settings_that_no_clip_can_have_are_refused_before_training(setting: str, sentence: str) -> None:
+    shown = run("--dry-run", "--set", setting)
+    assert shown.exit_code == 2 and sentence in shown.output, shown.output
+    assert shown.output.startswith("error: ") and shown.output.count("\n") == 1
+
+
+def test_shares_of_what_is_still_are_1_together_at_most() -> None:
+    shown = run("--dry-run", "--set", "samples.still=0.9", "--set", "samples.all_still=0.9")
+    assert shown.exit_code == 2 and "still 0.9 and all_still 0.9: expected 1 together at most" in shown.output
+    assert run("--dry-run", "--set", "samples.still=0.9", "--set", "samples.all_still=0.1").exit_code == 0
 
 
 def test_data_that_cannot_be_used_leave_room_for_another_run(monkeypatch: pytest.MonkeyPatch) -> None:
