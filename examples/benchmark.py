@@ -103,7 +103,10 @@ def video(count: int, width: int, height: int, clip: Path, blends: int = 10, sta
     """Frames of a clip from number `start` on, `blends` linear steps each; uint8 [N, height, width]."""
     import cv2
 
-    capture, source = cv2.VideoCapture(str(clip)), []
+    from vid2ev.untrusted import plain_name
+
+    with plain_name(clip) as name:
+        capture, source = cv2.VideoCapture(name), []
     for index in range(start + count // blends + 2):
         ok, image = capture.read()
         if not ok:

@@ -80,7 +80,7 @@ def load_scene(folder: Path, name: str, wall_only: bool = False) -> Scene:
     from scipy.io import loadmat
 
     t, x, y, p = loadmat(folder / "hybrid" / f"{name}.mat")["events"].T
-    frame = cv2.imread(str(folder / "hybrid" / f"{name}.png"), cv2.IMREAD_GRAYSCALE)
+    frame = cv2.imdecode(np.fromfile(folder / "hybrid" / f"{name}.png", np.uint8), cv2.IMREAD_GRAYSCALE)
     kept = np.ones(frame.shape, bool)
     if wall_only:
         kept[SHUTTLE] = False

@@ -11,8 +11,10 @@ import json
 import math
 import os
 import re
+import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -168,7 +170,8 @@ def check_exr(path: Path) -> None:
     """Raise DataError for an EXR whose header claims more memory than it may, before the library takes it at its word.
     What is damaged otherwise the library finds out."""
     try:
-        parts = [part.header for part in openexr(path).File(str(path), header_only=True).parts]
+        with plain_name(path) as name:
+            parts = [part.header for part in openexr(path).File(name, header_only=True).parts]
         bytes_ = 0
         for header in parts:
             for name in ("dataWindow", "displayWindow"):
@@ -231,3 +234,42 @@ def possible(place: str) -> bool:
     """Whether a file can have this name."""
     longest = max(len(part.encode(errors="replace")) for part in place.split(os.sep))
     return "\0" not in place and longest <= LONGEST_NAME and len(place.encode(errors="replace")) <= LONGEST_PATH
+
+
+@contextmanager
+def plain_name(path: Path) -> Iterator[str]:
+    """A name in UTF-8 by which a library that takes no other finds the file meanwhile: its own wherever that will do,
+    otherwise that of a link.
+
+    A file may be called by any bytes.  Python keeps those that are no text as surrogates, and OpenCV ends the program
+    at them; where a locale is not UTF-8, it looks for another file.  (Decoded from memory, as most pictures can be, a
+    TIFF may not have 2 GB.)  Raises DataError where no link can be made.
+    """
+    if _is_utf8(str(path)):
+        yield str(path)
+        return
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="vid2ev_")
+    except OSError as error:
+        raise DataError(_without_link(path, error.strerror)) from error
+    with folder as place:
+        if not _is_utf8(place):
+            raise DataError(_without_link(path, "the folder for temporary files has no name in UTF-8 either"))
+        link = Path(place, "file")
+        try:
+            link.symlink_to(path.absolute())
+        except OSError as error:
+            raise DataError(_without_link(path, error.strerror)) from error
+        yield str(link)
+
+
+def _is_utf8(name: str) -> bool:
+    """Whether the bytes by which the system knows a file are those that UTF-8 has for its name."""
+    try:
+        return name.encode() == os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+
+
+def _without_link(path: Path, why: str | None) -> str:
+    return f"{path}: a name that is not UTF-8, and no link to it can be made ({why}); rename it, or set TMPDIR"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import cv2
@@ -20,6 +23,7 @@ from vid2ev.light.recognise import recognise
 from vid2ev.light.tags import BT709_WEIGHTS
 from vid2ev.light.transfer import code_table
 from vid2ev.sources import open_source
+from vid2ev.untrusted import plain_name
 
 
 def codes(shape: tuple[int, ...], dtype: type = np.uint8) -> np.ndarray:
@@ -316,3 +320,49 @@ def test_an_animated_webp_is_no_single_picture(tmp_path: Path) -> None:
     first.save(tmp_path / "a.webp", lossless=True)
     with pytest.raises(UsageError, match="a single picture"):
         open_source(tmp_path / "a.webp")
+
+
+# ---------------------------------------------------------------------------------------------------------- names
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "tif", "webp", "jp2", "hdr", "pfm", "exr"])
+def test_a_picture_whose_name_is_not_utf8_is_read_as_any_other(tmp_path: Path, suffix: str) -> None:
+    """In a process of its own: OpenCV ended the program at such a name."""
+    light = np.random.default_rng(0).uniform(1, 3, (6, 8, 3)).astype(np.float32)
+    plain = tmp_path / f"a.{suffix}"
+    if suffix == "exr":
+        OpenEXR.File({}, {name: light[..., k].copy() for k, name in enumerate("RGB")}).write(str(plain))
+    else:
+        cv2.imwrite(str(plain), light if suffix in ("hdr", "pfm") else codes((64, 64, 3)))
+    try:
+        shutil.copy(plain, os.fsencode(tmp_path) + f"/\xff.{suffix}".encode("latin-1"))
+    except OSError:
+        pytest.skip("names are UTF-8 here")
+    program = (
+        "import numpy as np, os, sys; from pathlib import Path; from vid2ev.light.picture_files import *;"
+        f"folder = Path(sys.argv[1]); other = folder / os.fsdecode(b'\\xff.{suffix}');"
+        f"one, two = (read_picture(path).pixels for path in (folder / 'a.{suffix}', other));"
+        "assert one.dtype == two.dtype and (one == two).all(); print(pages_of(other))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, tmp_path], capture_output=True, text=True, timeout=100)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "1\n", "")
+
+
+def test_a_stack_whose_name_is_not_in_the_locale_is_a_clip(tmp_path: Path) -> None:
+    """UTF-8, where the locale is ASCII: OpenCV looked for a file of another name."""
+    path = os.fsencode(tmp_path) + b"/\xc3\xbc.tif"
+    tifffile.imwrite(tmp_path / "a.tif", codes((3, 6, 8)), photometric="minisblack")
+    shutil.move(tmp_path / "a.tif", path)
+    program = (
+        "import sys; from vid2ev.sources import open_source;print(len(list(open_source(sys.argv[1], fps=10).frames())))"
+    )
+    ascii_only = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    arguments = [sys.executable, "-c", program, path]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=100, env=ascii_only)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "3\n", "")
+
+
+def test_a_name_that_is_not_utf8_needs_a_place_for_a_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    with pytest.raises(DataError, match=r"not UTF-8.*No such file.*rename it"), plain_name(tmp_path / "\udcff.png"):
+        pass

@@ -23,7 +23,7 @@ from vid2ev.light.pictures import TYPES
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
 from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
-from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr
+from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
 
@@ -43,8 +43,8 @@ def pages_of(path: Path) -> int:
 
     if not head_of(path).startswith(TIFF):
         return 1
-    with _silent_decoders():
-        return max(1, cv2.imcount(str(path)))
+    with _silent_decoders(), plain_name(path) as name:
+        return max(1, cv2.imcount(name))
 
 
 def read_picture(path: Path, page: int = 0) -> Picture:
@@ -99,10 +99,10 @@ def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.nd
     if head.startswith(PNG):
         check_png(path)
     try:
-        with _silent_decoders():
+        with _silent_decoders(), plain_name(path) as name:
             if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
-                return list(cv2.imreadmulti(str(path), page, count, flags=flags)[1])
-            one = cv2.imread(str(path), flags)
+                return list(cv2.imreadmulti(name, page, count, flags=flags)[1])
+            one = cv2.imread(name, flags)
             return [] if one is None else [one]
     except cv2.error as error:
         if "MAX_IMAGE" not in str(error):
@@ -141,7 +141,8 @@ def _read_exr(path: Path) -> Picture:
     check_exr(path)
     try:
         # (one thread: pictures are read in turn with work that has threads of its own)
-        file = library.File(str(path), separate_channels=True, num_threads=0)
+        with plain_name(path) as name:
+            file = library.File(name, separate_channels=True, num_threads=0)
         parts = [(part.header, part.channels) for part in file.parts]
     except Exception as error:  # (the library raises RuntimeError, ValueError and more)
         raise DataError(f"{path}: not an EXR that can be read ({first_line(error)})") from error

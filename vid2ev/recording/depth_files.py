@@ -30,7 +30,7 @@ from vid2ev.recording.truth_arrays import (
     stated_number,
     write_png,
 )
-from vid2ev.untrusted import check_exr, openexr, read_array
+from vid2ev.untrusted import check_exr, openexr, plain_name, read_array
 
 SCALE = "depth.txt"
 NOTHING, MOST = 65535, 65534  # codes
@@ -87,7 +87,8 @@ def _read_exr(path: Path) -> np.ndarray:
     with reading(path):
         open(path, "rb").close()  # (the library does not say why it cannot)
         check_exr(path)
-        channels = library.File(str(path), separate_channels=True, num_threads=0).channels()
+        with plain_name(path) as plain:
+            channels = library.File(plain, separate_channels=True, num_threads=0).channels()
         name = next((name for last in CHANNELS for name in channels if name.rpartition(".")[2] == last), None)
         if name is None:
             raise DataError(f"{path} has no channel Z of depth, only {', '.join(channels)}; give another file")

@@ -28,7 +28,7 @@ from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import EXR, head_of, natural, recognise
 from vid2ev.recording.depth_files import is_stated, read_depth
 from vid2ev.rig.depth import DepthScale
-from vid2ev.untrusted import check_exr, first_line, openexr, read_arrays
+from vid2ev.untrusted import check_exr, first_line, openexr, plain_name, read_arrays
 
 SUFFIXES = (".png", ".tif", ".tiff", ".pfm", ".exr", ".npy", ".npz")
 NAMES = ("depth", "depths", "disparity", "disparities")
@@ -137,7 +137,8 @@ def _read_exr(path: Path) -> np.ndarray:
     library = openexr(path)
     try:
         check_exr(path)
-        file = library.File(str(path), separate_channels=True, num_threads=0)
+        with plain_name(path) as plain:
+            file = library.File(plain, separate_channels=True, num_threads=0)
         channels = {name: channel for part in file.parts for name, channel in part.channels.items()}
         named = [name for name in channels if name.rpartition(".")[2] in ("Z", "depth", "Depth")]
         if not named and len(channels) != 1:

@@ -16,7 +16,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.scenes.render import Picture
-from vid2ev.untrusted import openexr
+from vid2ev.untrusted import openexr, plain_name
 
 NOTHING, NOTHING_M = -1, 1e9  # and what is beyond
 DEPTH, INDEX = (".Depth.Z",), (".Object Index.X", ".IndexOB.X")
@@ -43,7 +43,7 @@ def channels_of(path: Path, wanted: Sequence[Sequence[str]], size: tuple[int, in
     """Channels [H, W] float32 of a file, each by the first of some ends of its name."""
     library = openexr(path)
     try:
-        with library.File(str(path), separate_channels=True, num_threads=0) as file:
+        with plain_name(path) as plain, library.File(plain, separate_channels=True, num_threads=0) as file:
             found = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
     except Exception as error:  # (the library raises whatever it comes across)
         raise DataError(f"{path}: not an EXR file that can be read; render it again") from error
