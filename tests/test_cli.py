@@ -25,6 +25,7 @@ from vid2ev.commands import main
 from vid2ev.commands.summary import of_the_clip, result_facts
 from vid2ev.instants import Instant
 from vid2ev.recipe import Recipe
+from vid2ev.recording.manifest import difference
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 LONG = "a" * 300
@@ -500,3 +501,32 @@ def test_a_terminal_shows_progress_and_a_file_does_not() -> None:
 )
 def test_times_are_multiples_of_the_clip_without_powers_of_ten(seconds: float, text: str) -> None:
     assert of_the_clip(2 * seconds, 2.0) == f"{text} x the length of the clip"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_full_standard_output_is_one_sentence(unbuffered: str) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "vid2ev", "sensors"],
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=100,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        )  # fmt: skip
+    said = "error: standard output cannot be written: No space left on device; make room, or print to another place\n"
+    assert (done.returncode, done.stderr) == (1, said)
+
+
+def test_a_dry_run_refuses_a_budget_that_cannot_be_measured(tmp_path: Path) -> None:
+    arguments = ["convert", "synthetic:moving-edge", "--stop", "0.05", "--budget", "lsb=1", "-o", str(tmp_path / "a")]
+    result = CliRunner().invoke(main, [*arguments, "--dry-run"])
+    assert result.exit_code == 2 and "lsb cannot be measured here" in result.output
+    assert CliRunner().invoke(main, [*arguments, "--dry-run", "--frames"]).exit_code == 0
+
+
+def test_a_difference_is_the_value_that_differs() -> None:
+    rig = {"cameras": [{"name": "left", "line_us": [1, 100]}, {"name": "right", "line_us": [1, 2]}]}
+    other = {"cameras": [rig["cameras"][0], {"name": "right", "line_us": [1, 3]}]}
+    assert difference(rig, other) == "cameras[right].line_us[1] = 2, not 3"
+    assert difference([{"name": "a"}], [{"name": "b"}], "all") == 'all[0].name = "a", not "b"'
+    assert difference([1], [1, 2], "all") == "all = [1], not [1, 2]"
+    assert len(difference([1] * 999, [1], "all")) < 130

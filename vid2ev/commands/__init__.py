@@ -7,6 +7,8 @@ what is heavy when they are called.
 from __future__ import annotations
 
 import difflib
+import errno
+import os
 import signal
 import sys
 import threading
@@ -20,6 +22,7 @@ import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
 
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
 GPU_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
 MEMORY_FULL = "the memory is full; take smaller frames, tiles or batches, or fewer workers"
@@ -75,8 +78,13 @@ class Commands(click.Group):
             click.echo(f"error: {error}", err=True)
             sys.exit(error.exit_code)
         except OSError as error:
+            if error.filename is None and (error.errno not in NO_ROOM or not _printing_fails()):
+                raise  # (click ends quietly where nobody reads on)
             if error.filename is None:
-                raise
+                place = "standard output cannot be written"
+                click.echo(f"error: {place}: {error.strerror}; make room, or print to another place", err=True)
+                _print_nowhere()
+                sys.exit(DataError.exit_code)
             # (no name of a file, a folder that may not be entered: what the system says of it is all that is known)
             said = DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
             click.echo(f"error: {said}", err=True)
@@ -89,6 +97,22 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
+
+
+def _printing_fails() -> bool:
+    """Whether nothing can be printed, as on a disk that is full."""
+    try:
+        print(flush=True)
+    except OSError:
+        return True
+    return False
+
+
+def _print_nowhere() -> None:
+    """What is waiting to be printed is dropped: Python would try it again at its end, and complain."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 def what_is_full(error: Exception) -> str | None:

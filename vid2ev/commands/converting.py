@@ -25,14 +25,14 @@ def convert_one(
     from vid2ev.commands.progress import bar, given, heard, kept
     from vid2ev.terminal import lines
 
-    budget = options["budget"]
+    budget, limits = options["budget"], None
     if budget is not None:
         from vid2ev.cost.front import Budget
 
-        Budget.parse(budget)
+        limits = Budget.parse(budget)
     options = chosen_for(video, directory, quiet, options, given(), dry_run)
     if dry_run or verbose:
-        recipe, plan = planned(video, directory, dict(options))
+        recipe, plan = planned(video, directory, dict(options), limits)
         if not quiet:
             click.echo(plan)
             if dry_run and budget is not None:

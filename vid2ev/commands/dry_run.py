@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vid2ev.cost.front import Budget
 
 
-def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[str, Any], str]:
+def planned(
+    video: str, directory: Path, options: dict[str, Any], budget: Budget | None = None
+) -> tuple[dict[str, Any], str]:
     """The recipe for programs, and lines for people; raises what the conversion would raise before its first frame."""
     from vid2ev import conversion
     from vid2ev.commands import summary
@@ -24,6 +29,8 @@ def planned(video: str, directory: Path, options: dict[str, Any]) -> tuple[dict[
     effects, tolerance = options.pop("effects"), options.pop("tolerance")
     options.pop("notes", None)
     recipe = Recipe.of(video, seed=seed or 0, **options)
+    if budget is not None:
+        budget.check({mount.kind for mount in recipe.mounts})
     check_effects(effects, tolerance)
     conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)

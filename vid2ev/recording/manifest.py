@@ -19,6 +19,7 @@ from typing import Any
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.untrusted import json_of, read_text
 
+LONGEST = 100  # characters of a value that is not as it was
 LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
 HEAD, LEAST = 1 << 20, 4096  # bytes of all beginnings by which files are known, and of each at least; of ends as many
 
@@ -114,7 +115,21 @@ def difference(one: Any, other: Any, name: str = "") -> str:
             if found:
                 return found
         return ""
-    return "" if one == other else f"{name} = {json.dumps(one)}, not {json.dumps(other)}"
+    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        pairs = enumerate(zip(one, other, strict=True))
+        return next(filter(None, (difference(*pair, f"{name}[{_place(k, *pair)}]") for k, pair in pairs)), "")
+    return "" if one == other else f"{name} = {_short(one)}, not {_short(other)}"
+
+
+def _place(index: int, one: Any, other: Any) -> int | str:
+    """What tells an element of a list from the others: its name, if it has the same in both."""
+    names = [each.get("name") if isinstance(each, dict) else None for each in (one, other)]
+    return names[0] if isinstance(names[0], str) and names[0] == names[1] else index
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
 @cache
