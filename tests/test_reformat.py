@@ -185,3 +185,11 @@ def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.
 def test_every_format_that_is_read_can_be_named() -> None:
     assert all(format_named(name).open for name in FORMATS)
     assert open_events.__doc__
+
+
+def test_the_summary_counts_from_the_first_event(tmp_path: Path) -> None:
+    """Also of a clock that began long before, which the file does not say."""
+    source = tmp_path / "late.csv"
+    source.write_text("t,x,y,p\n7000000,1,1,1\n9000000,2,2,0\n")
+    result = run(str(source), str(tmp_path / "late.h5"))
+    assert "2 in 2 s" in result.output, result.output

@@ -51,7 +51,8 @@ def reformat(
     file = open_events(of_only_camera(source))
     recording = survey(file) if start_s is None and stop_s is None else _part(file, start_s, stop_s)
     check_holds(kind, recording.size, recording.duration_us, recording.start_us)
-    made = _write(target, kind, _reported(recording, report), overwrite)
+    seen_us: list[int] = []
+    made = _write(target, kind, _reported(recording, report, seen_us), overwrite)
     had = {"labels": recording.labelled, "frames": recording.frames is not None}
     unsaid = [f"the size is not stated; {recording.size[0]}x{recording.size[1]} holds all events"] * (file.size is None)
     lost = [what for what in KEPT if had[what] and what not in kind.keeps]
@@ -65,6 +66,7 @@ def reformat(
         "size_stated": file.size is not None,
         "start_us": recording.start_us,
         "duration_us": recording.duration_us,
+        "span_us": seen_us[-1] - seen_us[0] if seen_us else 0,  # from the first event to the last
         "bytes": sum(path.stat().st_size for path in made),
         "warnings": file.warnings + unsaid + [f"{kind.name} does not hold {what}; they are left out" for what in lost],
     }
@@ -127,14 +129,16 @@ def _further(target: Path) -> list[Path]:
         return []
 
 
-def _reported(recording: Recording, report: Report | None) -> Recording:
-    """The recording, telling how many events were taken from it."""
+def _reported(recording: Recording, report: Report | None, seen_us: list[int]) -> Recording:
+    """The recording, telling how many events were taken from it; the times of the first and the last are put down."""
 
     def blocks() -> Iterator[Events]:
         done = 0
         for events in recording.blocks():
             yield events
             done += len(events)
+            if len(events):
+                seen_us[:] = [*seen_us[:1], *events.t[[0, -1]].tolist()]
             if report is not None:
                 report(recording, done)
 
