@@ -19,6 +19,11 @@ def lines(facts: Iterable[tuple[str, str]]) -> str:
     return "\n".join(f"{name:<{width}}{text}" for name, text in facts)
 
 
+def counted(count: int, name: str) -> str:
+    """A number of things that have a name."""
+    return f"{count:,} {name}{'s' * (count != 1)}"
+
+
 @contextmanager
 def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[..., None]]:
     """A progress bar on a terminal; what this yields is told how many are done, of how many, and perhaps a name."""

@@ -72,7 +72,7 @@ def dataset(
     from vid2ev.cores import usable_cores
     from vid2ev.errors import UsageError, clause
     from vid2ev.sources.many import sources_in
-    from vid2ev.terminal import counting
+    from vid2ev.terminal import counted, counting
 
     workers = workers_of(options, usable_cores())
     found = tuple(source for video in videos for source in sources_in(video))
@@ -94,7 +94,8 @@ def dataset(
         done = [{"video": name, "state": "done", "events": of["events"]} for name, of in facts["of_scenes"].items()]
         left = [{"video": name, "state": "failed", "error": why} for name, why in facts["left_out"].items()]
         click.echo(table([*done, *left]))
-        click.echo(f"{directory}: {facts['scenes']} scenes, {facts['samples']:,} samples, {facts['events']:,} events")
+        made = (counted(facts[f"{name}s"], name) for name in ("scene", "sample", "event"))
+        click.echo(f"{directory}: {', '.join(made)}")
 
 
 def _said(outcome: Outcome) -> Said:

@@ -105,7 +105,7 @@ def evaluate(
     from vid2ev.commands.progress import heard
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.sources import OPTIONS
-    from vid2ev.terminal import counting
+    from vid2ev.terminal import counted, counting
 
     workers = workers_of(options)
     edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}
@@ -133,7 +133,8 @@ def evaluate(
     if not quiet:
         for table in (protocol_table(found.rows), full_scale_table(found.rows)):
             click.echo(f"{table.title}\n\n{aligned(table)}\n")
-        click.echo(f"{folder / PAGE}: {len(found.rows)} rows of {len(found.summary['sequences'])} sequences")
+        sequences = counted(len(found.summary["sequences"]), "sequence")
+        click.echo(f"{folder / PAGE}: {counted(len(found.rows), 'row')} of {sequences}")
     for note in (*notes(found.summary), *filter(None, (uneven(found.rows),))):
         click.echo(f"note: {note}", err=True)
 

@@ -150,7 +150,7 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
     write_hsergb(tmp_path / "set" / "seq", pictures(18))
     shown = run("set", "--baseline", "linear", "--baseline", "bridge")
     assert shown.exit_code == 0, shown.output
-    assert "set_eval/report.html: 28 rows of 1 sequences" in shown.stdout
+    assert "set_eval/report.html: 28 rows of 1 sequence\n" in shown.stdout
     assert "note: seq: 1 frames after the last complete group of 8 are not rebuilt" in shown.stderr
     text, page = ((tmp_path / "set_eval" / name).read_text() for name in ("report.md", "report.html"))
     assert "1 frames after the last complete group of 8 are not rebuilt" in text and "seed" not in text

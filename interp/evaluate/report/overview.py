@@ -17,7 +17,8 @@ NOTHING = Mean(math.nan, math.nan, 0)
 PROTOCOL = "Each frame against the range of its own truth, key frames not scored."
 FULL_SCALE = (
     "Against 255. Moving pixels are those whose truth is more than 10 codes away from either key frame."
-    " The worst patch is the least of all 99×99 windows of all frames, PSNR and SSIM each for itself."
+    " The worst patch is the least of all 99×99 windows of all frames, PSNR and SSIM each for itself;"
+    " of a frame that is smaller, all of it."
 )
 
 
