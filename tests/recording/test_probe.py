@@ -9,7 +9,7 @@ import pytest
 
 from vid2ev import Dvs, Events, UsageError, convert, load_sensor, read_events
 from vid2ev.outputs import Outputs
-from vid2ev.recording.probe import HEADER, Probe, merged, read_probe
+from vid2ev.recording.probe import HEADER, Probe, merged, read_probe, stepped
 from vid2ev.stream.frames import Frame
 
 F = np.float32
@@ -52,6 +52,41 @@ def test_without_effects_the_signal_is_the_log_of_the_light(tmp_path: Path) -> N
     columns = read_probe(tmp_path / "out" / "probe.csv")[PIXEL]
     np.testing.assert_allclose(columns["signal_nat"], np.log(columns["light"] + 1e-3), atol=2e-6)
     assert len(columns["t_us"]) == 61 and np.all(np.diff(columns["t_us"]) == 5000)
+
+
+@pytest.mark.parametrize(("sensor", "overrides"), [("ideal", []), ("ideal", ["mismatch=0.03"])])
+def test_levels_step_at_events_and_the_signal_stays_between_them(
+    tmp_path: Path, sensor: str, overrides: list[str]
+) -> None:
+    """Light is a straight line from frame to frame, so that the signal is known at the events, too."""
+    events = 0
+    convert(CLIP, tmp_path / "out", sensor, overrides, preview=False, probe=["24,16", (3, 5)], upsample="none")
+    for columns in read_probe(tmp_path / "out" / "probe.csv").values():
+        t_us, low, high = columns["band"].T
+        instants = t_us + np.array([[-1], [0], [1]])  # (times of events are rounded)
+        signal = np.log(np.interp(instants, columns["t_us"], columns["light"]) + 1e-3)
+        assert not np.isnan(low).any()
+        assert np.all((low < signal.max(axis=0) + 2e-6) & (signal.min(axis=0) < high + 2e-6))
+        on, off = (np.isin(t_us, columns[name]) for name in ("ON", "OFF"))
+        middle = 0.5 * (low + high)
+        assert np.all(np.diff(middle)[on[1:]] > 0.1) and np.all(np.diff(middle)[off[1:]] < -0.1)
+        events += on.sum() + off.sum()
+    assert events > 5
+
+
+def test_levels_that_the_thresholds_do_not_lead_to_are_not_told_and_drawn_in_equal_steps() -> None:
+    events = Events(np.array([1, 2]), np.ones(2, np.uint16), np.zeros(2, np.uint16), np.array([1, 1], np.uint8))
+    thresholds, frame = (np.full((1, 2), 0.25), np.full((1, 2), 0.5)), Frame(np.zeros((1, 2), F), 4000)
+
+    def levels(on: float) -> list[list[str]]:
+        states = [[np.array([value]) for value in (0, 0, level, level - 0.75)] for level in (0.25, on)]
+        lines = Probe([(1, 0)], 2, thresholds).lines(frame, events, states[1], states[0]).decode().splitlines()
+        return [line.split(",")[-2:] for line in lines]
+
+    assert levels(0.75) == [["0.5", "-0.25"], ["0.75", "0"], ["0.75", "0"]]
+    assert levels(0.85) == [["", ""], ["", ""], ["0.85", "0.1"]]
+    gaps = np.array([[0, 0, 0.25], [1, np.nan, np.nan], [2, np.nan, np.nan], [4, 0.3, 0.55]])
+    np.testing.assert_allclose(stepped(gaps)[1:3, 1:], [[0.15, 0.4], [0.3, 0.55]])
 
 
 def test_times_before_zero_are_told_as_they_are() -> None:

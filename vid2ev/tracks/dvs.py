@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +56,7 @@ class DvsTrack:
         self._columns = EventColumns(folder, within, dvs.labels)
         self._film = Preview(dvs.size, folder.partial / within, wanted=outputs.preview, rate=rate)
         pixels = () if probed else tuple(filter(dvs.simulates, outputs.probe))
-        self._probe = Probe(pixels, dvs.size[0]) if pixels else None
+        self._probe = self._probe_of(pixels) if pixels else None
         self._waiting: list[Frame] = []  # until there are as many as the sensor takes at a time
 
     @property
@@ -73,7 +73,7 @@ class DvsTrack:
             self._note(frame)
             if self._probe:
                 self.folder.write(f"{self._within}{PROBE}", HEADER)
-                self._look_inside(frame, Events.empty())
+                self._look_inside(frame, Events.empty(), None)
 
     def add(self, frame: Frame) -> None:
         """The next frame, and its events, now or with those of the next few."""
@@ -151,11 +151,12 @@ class DvsTrack:
     def _see(self) -> None:
         """Show the sensor the frames that wait, and keep their events."""
         frames, self._waiting = self._waiting, []
+        before = self.dvs.inside(self._probe.places) if self._probe and frames else None  # (of one frame at a time)
         for frame, events in zip(frames, self.dvs.see_all(frames), strict=True):
             self._append(events)
             self._film.add(frame, events)
             self._note(frame)
-            self._look_inside(frame, events)
+            self._look_inside(frame, events, before)
 
     def _append(self, events: Events) -> None:
         self._columns.append(events)
@@ -165,9 +166,13 @@ class DvsTrack:
         if frame.original:
             self.folder.write(f"{self._within}{FRAME_US}", np.int64(frame.t_ns // 1000).tobytes())
 
-    def _look_inside(self, frame: Frame, events: Events) -> None:
+    def _probe_of(self, pixels: Sequence[tuple[int, int]]) -> Probe:
+        maps = self.dvs.maps()
+        return Probe(pixels, self.dvs.size[0], (maps["threshold_on"], maps["threshold_off"]))
+
+    def _look_inside(self, frame: Frame, events: Events, before: Sequence[np.ndarray] | None) -> None:
         if self._probe:
-            lines = self._probe.lines(frame, events, self.dvs.inside(self._probe.places))
+            lines = self._probe.lines(frame, events, self.dvs.inside(self._probe.places), before)
             self.folder.write(f"{self._within}{PROBE}", lines)
 
     def _recording(self, start_us: int, duration_us: int) -> Recording:
