@@ -66,6 +66,15 @@ def test_times_beside_the_file(tmp_path: Path, suffix: str) -> None:
     source = open_source(path)
     assert [frame.t_ns for frame in source.frames()] == [1_000_000, 2_000_000, 4_000_000]
     assert source.describe()["timestamps_unit"] == "us (by spacing)"
+    remedy = (
+        "write clip_timestamps.npy as seconds in floating" if suffix == ".npy" else "begin clip_timestamps.txt with"
+    )
+    assert [remedy in warning for warning in source.warnings] == [True]
+    if suffix == ".npy":
+        np.save(tmp_path / "clip_timestamps.npy", stamps / 1e3)
+        said = open_source(path)
+        assert said.describe()["timestamps_unit"] == "s" and not said.warnings
+        assert [frame.t_ns for frame in said.frames()] == [10**9, 2 * 10**9, 4 * 10**9]
     np.save(tmp_path / "clip_timestamps.npy", 2 * stamps)
     others = open_source(path).describe()
     assert others != source.describe() and others.keys() == source.describe().keys()

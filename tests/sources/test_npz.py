@@ -123,3 +123,14 @@ def test_memory_does_not_grow_with_the_length(tmp_path: Path) -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2_000_000  # of 16 MB
+
+
+def test_a_guess_at_the_unit_names_what_ends_it(tmp_path: Path) -> None:
+    path, frames, times = tmp_path / "clip.npz", np.zeros((3, 2, 2), np.float32), np.array([1000, 2000, 4000])
+    np.savez(path, frames=frames, timestamps=times)
+    assert ["end the name of the times in clip.npz with _s, _ms" in said for said in open_source(path).warnings] == [
+        True
+    ]
+    np.savez(path, frames=frames, timestamps_ms=times)
+    source = open_source(path)
+    assert not source.warnings and [frame.t_ns for frame in source.frames()] == [10**9, 2 * 10**9, 4 * 10**9]

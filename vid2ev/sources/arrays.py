@@ -27,6 +27,7 @@ from vid2ev.sources.times import (
     remarks_on_unit,
     stamps_beside,
     stamps_of_array,
+    times_beside,
 )
 from vid2ev.stream.frames import Colour, Frame
 
@@ -109,7 +110,7 @@ class ArrayStack:
 
     def _find_times(self) -> None:
         """Stamps or a rate: of the archive, else of a file beside it."""
-        count = self._stack.shape[0]
+        count, file = self._stack.shape[0], self.path
         if isinstance(self._stack, NpzStack) and self._stack.times is not None:
             times, unit = self._stack.times
             self._stamps, self._unit = stamps_of_array(times, self.path, unit)
@@ -119,4 +120,5 @@ class ArrayStack:
             self._fps = parse_fps(self._stack.fps)
         else:
             self._stamps, self._unit = stamps_beside(self.path, count)
-        self.warnings += remarks_on_unit(self._unit)
+            file = times_beside(self.path)
+        self.warnings += remarks_on_unit(self._unit, file)

@@ -32,6 +32,7 @@ from vid2ev.sources.times import (
     read_timestamps,
     remarks_on_unit,
     stamps_beside,
+    times_beside,
 )
 from vid2ev.stream.frames import Colour, Frame
 from vid2ev.untrusted import json_of, read_text
@@ -72,7 +73,8 @@ class Images:
         self._unit: str | None = None
         if fps is None:
             self._stamps, self._unit = self._read_stamps()
-            self.warnings += remarks_on_unit(self._unit)
+            file = self.path / TIMESTAMPS if self.path.is_dir() else times_beside(self.path)
+            self.warnings += remarks_on_unit(self._unit, file)
         first, _, tagged = read_picture(*self._places[0])
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)

@@ -109,13 +109,19 @@ def stamps_beside(path: Path, frames: int) -> tuple[list[Fraction], str]:
 
     Raises UsageError if there is neither, DataError if they are not as many as the frames.
     """
-    binary, text = (path.with_name(f"{path.stem}_timestamps{suffix}") for suffix in (".npy", ".txt"))
-    if not binary.exists() and not text.exists():
-        raise UsageError(f"{path}: frames without times; give --fps, or put {binary.name} beside it")
-    stamps, unit = read_timestamp_array(binary) if binary.exists() else read_timestamps(text)
+    file = times_beside(path)
+    if not file.exists():
+        raise UsageError(f"{path}: frames without times; give --fps, or put {path.stem}_timestamps.npy beside it")
+    stamps, unit = read_timestamp_array(file) if file.suffix == ".npy" else read_timestamps(file)
     if len(stamps) != frames:
         raise DataError(f"{path}: {len(stamps)} times beside it for {frames} frames; expected one each")
     return stamps, unit
+
+
+def times_beside(path: Path) -> Path:
+    """Where the times beside a file are, or would be."""
+    binary, text = (path.with_name(f"{path.stem}_timestamps{suffix}") for suffix in (".npy", ".txt"))
+    return binary if binary.exists() else text
 
 
 def read_timestamps(path: Path, images: Sequence[str] = ()) -> tuple[list[Fraction], str]:
@@ -217,15 +223,17 @@ def stamps_of_array(stamps: np.ndarray, path: Path, unit: str | None = None) -> 
     return _in_seconds([Fraction(value) for value in values], unit, path), f"{unit}{GUESSED * guessed}"
 
 
-def remarks_on_unit(unit: str | None) -> list[str]:
-    """A warning for a unit that was found by the rule for whole numbers."""
+def remarks_on_unit(unit: str | None, file: Path) -> list[str]:
+    """A warning for a unit that was found by the rule for whole numbers, and how to state it in a file of times."""
     if unit is None or not unit.endswith(GUESSED):
         return []
     name = unit.removesuffix(GUESSED)
-    return [
-        f"times without a unit are taken for {name}, by their spacing; if that is wrong, begin timestamps.txt with"
-        " `# unit: s`, ms, us or ns"
-    ]
+    remedies = {
+        ".npz": f"end the name of the times in {file.name} with _s, _ms, _us or _ns",
+        ".npy": f"write {file.name} as seconds in floating point",
+    }
+    remedy = remedies.get(file.suffix.lower(), f"begin {file.name} with `# unit: s`, ms, us or ns")
+    return [f"times without a unit are taken for {name}, by their spacing; if that is wrong, {remedy}"]
 
 
 def unit_of_integers(values: Sequence[int]) -> str:
