@@ -74,6 +74,12 @@ def test_levels_step_at_events_and_the_signal_stays_between_them(
     assert events > 5
 
 
+def test_late_events_have_no_levels(tmp_path: Path) -> None:
+    convert(CLIP, tmp_path / "out", "ideal", ["delay_us=7000"], preview=False, probe=["24,16"], upsample="none")
+    columns = read_probe(tmp_path / "out" / "probe.csv")[PIXEL]
+    assert np.isnan(columns["band"]).any(axis=1).sum() == len(columns["ON"]) + len(columns["OFF"]) > 0
+
+
 def test_levels_that_the_thresholds_do_not_lead_to_are_not_told_and_drawn_in_equal_steps() -> None:
     events = Events(np.array([1, 2]), np.ones(2, np.uint16), np.zeros(2, np.uint16), np.array([1, 1], np.uint8))
     thresholds, frame = (np.full((1, 2), 0.25), np.full((1, 2), 0.5)), Frame(np.zeros((1, 2), F), 4000)

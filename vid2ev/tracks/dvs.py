@@ -167,6 +167,8 @@ class DvsTrack:
             self.folder.write(f"{self._within}{FRAME_US}", np.int64(frame.t_ns // 1000).tobytes())
 
     def _probe_of(self, pixels: Sequence[tuple[int, int]]) -> Probe:
+        if self.dvs.spec.delay_us > 0 or latest_us(self.dvs.spec) > 0:  # an event may be told of after the next frame
+            return Probe(pixels, self.dvs.size[0])
         maps = self.dvs.maps()
         return Probe(pixels, self.dvs.size[0], (maps["threshold_on"], maps["threshold_off"]))
 
