@@ -79,6 +79,11 @@ class RunFolder:
         file = self.path / FINISHED
         return read_json(file) if file.exists() else None
 
+    def check_weights(self) -> None:
+        """Raise DataError where those of the best validation have been removed, which nothing makes again."""
+        if self.first and not self.weights.exists():
+            raise DataError(f"{self.weights} is gone; put it back and --resume, or start another run with -o")
+
     def finish(self, outcome: Mapping[str, Any]) -> None:
         """Training is done: keep how it came out, and nothing that is needed to go on only."""
         if self.first:

@@ -74,6 +74,7 @@ def run(
                 raise
             outcome = Fit(learner, feed, folder, job.network, machines, session_s, stop, quiet, begun_s).run()
         if outcome.finished:
+            folder.check_weights()
             folder.finish(told.as_json(outcome))
         return outcome
     finally:

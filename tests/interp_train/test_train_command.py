@@ -71,6 +71,17 @@ def test_a_run_that_goes_on_with_other_libraries_says_so(monkeypatch: pytest.Mon
     assert "note:" not in run(*on).output and json.loads(Path("run/run.json").read_text()) == said
 
 
+def test_weights_that_were_removed_meanwhile_are_missed() -> None:
+    assert run(*FEW, "-o", "run", "--session", "0.001s").exit_code == 0
+    Path("run/weights.safetensors").rename("kept")
+    on = ("-o", "run", "--resume", "--workers", "0", "--cpu")
+    missed = run(*on)
+    assert missed.exit_code == 1 and "weights.safetensors is gone; put it back" in missed.output
+    assert not Path("run/finished.json").exists()
+    Path("kept").rename("run/weights.safetensors")
+    assert run(*on).exit_code == 0 and Path("run/finished.json").exists()
+
+
 def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.MonkeyPatch) -> None:
     made = run(*FEW, "-o", "run", "--json")
     before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
