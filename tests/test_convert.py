@@ -109,6 +109,18 @@ def test_what_counts_makes_other_events(reference: Path, tmp_path: Path, changed
     assert (tmp_path / "out" / "events.h5").read_bytes() != (reference / "events.h5").read_bytes()
 
 
+@pytest.mark.parametrize(("name", "meant"), [("framesout", "frames"), ("subframe", "subframes"), ("previw", "preview")])
+def test_an_option_that_is_misspelt_is_named_before_anything_is_opened(tmp_path: Path, name: str, meant: str) -> None:
+    with pytest.raises(UsageError, match=rf"option '{name}' \(did you mean {meant}\?\): expected one of "):
+        convert("there is no such video", tmp_path / "out", **{name: 1})
+    assert not any(tmp_path.iterdir())
+
+
+def test_an_option_of_outputs_is_none_of_events(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="option 'preview': expected one of bayer, "):
+        next(events_of(CLIP, preview=False))
+
+
 def test_events_of_gives_what_convert_writes(reference: Path) -> None:
     options = OPTIONS | {"threads": 2}
     one = Events.concatenate(events_of(CLIP, **options))

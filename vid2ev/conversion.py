@@ -15,7 +15,7 @@ from typing import Any
 
 from vid2ev.cluster.task import share_of
 from vid2ev.cores import usable_cores
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, UsageError, check_names
 from vid2ev.instants import instants
 from vid2ev.outputs import Outputs
 from vid2ev.parts import Made
@@ -103,6 +103,7 @@ def convert(
     Raises UsageError for what cannot be meant, DataError for a source that cannot be read or a folder that cannot
     be written.
     """
+    check_names(rest, Outputs.options() + Recipe.options())
     directory = default_directory(video) if directory is None else Path(directory)
     if seed is None:
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class Vid2evError(Exception):
@@ -49,6 +49,13 @@ def nearest(word: str, words: Iterable[str]) -> str:
     """A hint at the one of the words that may have been meant, to go on a sentence with; empty if none is near."""
     close = difflib.get_close_matches(word, list(words), n=1)
     return f" (did you mean {close[0]}?)" if close else ""
+
+
+def check_names(names: Iterable[str], known: Sequence[str]) -> None:
+    """Raise UsageError for the name of an option that there is not."""
+    for name in names:
+        if name not in known:
+            raise UsageError(f"option '{name}'{nearest(name, known)}: expected one of {', '.join(sorted({*known}))}")
 
 
 def clause(message: str) -> str:

@@ -75,9 +75,14 @@ class Outputs:
         return outputs
 
     @classmethod
-    def taken_from(cls, options: dict[str, Any]) -> dict[str, Any]:
-        """Those options that are fields of this class, taken out of all."""
-        return {each.name: options.pop(each.name) for each in fields(cls) if each.name in options}
+    def options(cls) -> tuple[str, ...]:
+        """Its fields."""
+        return tuple(each.name for each in fields(cls))
+
+    @classmethod
+    def taken_from(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """Those options that are fields of this class, taken out of all that are given."""
+        return {name: given.pop(name) for name in cls.options() if name in given}
 
     def check(self, size: tuple[int, int], duration_us: int | None, start_us: int | None = None) -> None:
         """Raise UsageError where a format cannot hold pixels of `size` (width, height), or the duration or the time at

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, fields
 from functools import partial
+from inspect import signature
 from pathlib import Path
 from typing import Any, Literal
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import UsageError, check_names
 from vid2ev.formats import recognise
 from vid2ev.mounts import Mount, Sensors, mounts_of
 from vid2ev.physics.bayer import check_pattern
@@ -34,6 +35,7 @@ from vid2ev.upsample import Upsampler, make_upsampler
 THRESHOLD = 0.15  # nat, where there are frame cameras only
 
 CUTS = ("restart", "keep")
+OF_SOURCE = tuple(name for name in OPTIONS if name != "colour")  # (which cameras decide)
 RAW = exposures.KINDS["raw"]
 
 
@@ -97,6 +99,7 @@ class Recipe:
         truth      some of `truth.KINDS`, to be written so many times a second
         The rest are the options of `open_source` and the fields above.  Raises UsageError, DataError.
         """
+        check_names(rest, cls.options())
         check_seed(seed := rest.get("seed", 0))
         if rest.get("bayer"):
             rest["bayer"] = check_pattern(rest["bayer"].upper())
@@ -111,7 +114,7 @@ class Recipe:
         sensors = [of(camera) for camera in asked.cameras]
         coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
         maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
-        options = {key: rest.pop(key) for key in OPTIONS if key in rest} | {"seen_through": maps}
+        options = {key: rest.pop(key) for key in OF_SOURCE if key in rest} | {"seen_through": maps}
         source = open_source(video, colour="rgb" if coloured else "luminance", **options)
         if source.dense:
             make_upsampler(rest.get("upsample", "flow"))  # (which is refused though it is not needed)
@@ -127,6 +130,12 @@ class Recipe:
         recipe = cls(str(video), source, resolved, mounts, depth, truth=wanted, **rest)
         recipe.check()
         return recipe
+
+    @classmethod
+    def options(cls) -> tuple[str, ...]:
+        """What `of` takes by name."""
+        own = [name for name, each in signature(cls.of).parameters.items() if each.kind is each.KEYWORD_ONLY]
+        return *own, *OF_SOURCE, *(each.name for each in fields(cls) if each.default is not MISSING)
 
     def check(self) -> None:
         """Raise UsageError for what does not go together."""
