@@ -10,6 +10,7 @@ from typing import Any
 
 import av
 import cv2
+import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -333,7 +334,8 @@ def test_files_that_are_none_or_damaged() -> None:
     refused(UsageError, "no such file", "missing.h5")
     Path("text.h5").write_text("t x y p")
     refused(DataError, "no event file", "text.h5")
-    write(scattered(50), size=(4, 4))
+    with h5py.File(write(scattered(50)), "r+") as file:
+        file.attrs["width"] = file.attrs["height"] = 4
     refused(DataError, "4x4 sensor", "events.h5")
     content = Path(write(scattered(600))).read_bytes()
     Path("cut.h5").write_bytes(content[: len(content) // 2])

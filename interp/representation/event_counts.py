@@ -23,7 +23,7 @@ from torch.nn import functional as F
 
 from interp.precision import in_full_precision
 from interp.representation.bins import bin_weights
-from interp.representation.dead_time import DeadTime
+from interp.representation.dead_time import DeadTime, look_back_us
 from interp.rows import by_rows
 from vid2ev.errors import UsageError
 from vid2ev.sensors.limits import is_whole
@@ -150,7 +150,8 @@ def count_events(
     if not is_whole(steps, 1):
         raise UsageError(f"{steps} sub-intervals between frames: expected at least 1; choose for example 32")
     width, height = size
-    known = np.asarray(events.t) <= stop_us
+    times_us = np.asarray(events.t).astype(np.int64)
+    known = (times_us > start_us - look_back_us(dead_time)) & (times_us <= stop_us)
     t, x, y, p = (np.asarray(each)[known].astype(np.int64) for each in (events.t, events.x, events.y, events.p))
     if len(x) and (min(x.min(), y.min()) < 0 or x.max() >= width or y.max() >= height):
         raise UsageError(f"events outside of the {width}x{height} sensor; give the size of the sensor that sent them")

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from vid2ev.plan.measure import scene_of
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.chances import _pixels, surely
 from vid2ev.stream.scene import Scene
 
 from .clips import clip
+from .measured import scene_of
 
 CASES = 40_000
 

@@ -10,13 +10,14 @@ import pytest
 from against.clips import clean
 
 from vid2ev.errors import UsageError
-from vid2ev.plan.measure import Measure, scene_of
+from vid2ev.plan.measure import Measure
 from vid2ev.stream import Frame
 from vid2ev.stream.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.stream.still import Still, strip_count
 from vid2ev.upsample.stillness import still_strips
 
 from .clips import clip, sent
+from .measured import scene_of
 
 SIZE = (50, 45)  # more than one tile, the last one not full
 

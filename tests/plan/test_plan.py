@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -15,7 +14,6 @@ from vid2ev.errors import UsageError
 from vid2ev.physics.omission import light_events
 from vid2ev.physics.peaks import taken
 from vid2ev.physics.shading import shading_map
-from vid2ev.plan.measure import Measure
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
 from vid2ev.sensors.spec import DvsSpec
@@ -25,18 +23,11 @@ from vid2ev.stream.chances import at_least, at_most, surely
 from vid2ev.stream.scene import Scene
 
 from .clips import clip, distance, sent, without
+from .measured import scene_of
 
 QUIET = {"mismatch": 0.0, "crossing_noise": 0.0}
 NO_POLES = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0}
 POLES = DvsSpec(**QUIET, refractory_us=0)
-
-
-def scene_of(spec: DvsSpec, size: tuple[int, int], frames: Iterable[Frame]) -> Scene:
-    """The scene of all frames."""
-    measure = Measure(spec, size)
-    for frame in frames:
-        measure.see(frame)
-    return measure.scene()
 
 
 @cache

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import pytest
 
-from vid2ev.plan.measure import scene_of
 from vid2ev.plan.plan import ASKED_FOR, EFFECTS, TOLERANCE, plan_of
 from vid2ev.sensors.spec import DvsSpec
 
 from .clips import clip, distance, is_there, sent, without
+from .measured import scene_of
 
 MATTERS = TOLERANCE / 5
 
