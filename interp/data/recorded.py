@@ -73,7 +73,7 @@ def clip_of(
         counted = events_between(sequence, keys[:, rows, columns], times_us, bins, below)
     else:
         counted = over(events_between(sequence, keys, times_us, bins), sequence.size[::-1], (rows, columns))
-    off, on = counted.contrast[0].tolist()
+    off, on = sequence.contrast or counted.contrast[0].tolist()  # (those that are known, to the last bit)
     about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
     about |= {"coarser": coarser}
     return Clip(truth, keys[:, rows, columns], kept_counts(counted), (off, on), times_us[1] - times_us[0], about)
