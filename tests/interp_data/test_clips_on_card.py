@@ -55,8 +55,9 @@ def test_clips_of_a_card_are_those_of_the_cpu(said: dict[str, object], monkeypat
             one, other = getattr(ours, name), getattr(theirs, name)
             assert one.dtype == other.dtype and one.shape == other.shape
             np.testing.assert_allclose(one.astype(float), other.astype(float), rtol=1e-3, atol=1.01)
-            # (what an event behind a dead time counts for hangs on all others: the last bits of 16 are none of its own)
-            same = np.isclose(one.astype(float), other.astype(float), rtol=2e-3, atol=0)
+            # (what an event behind a dead time counts for hangs on all others, which hardly ever are others: not whole)
+            shared = 0.02 if name == "off_on" else 0.0
+            same = np.isclose(one.astype(float), other.astype(float), rtol=shared, atol=0)
             assert (~same).mean() < 2e-3
         assert (ours.contrast, ours.gap_us) == (theirs.contrast, theirs.gap_us)
         assert ours.about == theirs.about | {"gain": pytest.approx(theirs.about["gain"], rel=1e-6)}
