@@ -17,6 +17,7 @@ from vid2ev.commands import main
 from vid2ev.conversion import Paused
 from vid2ev.recipe import Recipe
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
+from vid2ev.rig.bands import Bands
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.pose import IDENTITY
 from vid2ev.rig.rig_file import read_rig
@@ -55,6 +56,19 @@ def test_a_camera_where_the_video_was_taken_sends_what_it_sends_alone(tmp_path: 
     assert len(pixels[0]) == len(pixels[1]) > 1000
     for one, other in zip(*pixels, strict=True):
         assert one[:2] == other[:2] and one[3] == other[3] and abs(one[2] - other[2]) <= 1
+
+
+def test_threads_form_views_and_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bands, moved = list[int](), {"rig": rig(translation_mm=(15.0, 0.0, 0.0)), "depth": "plane:2"}
+    run = Bands.run
+    monkeypatch.setattr(Bands, "run", lambda self, *rest: (bands.append(self.threads), run(self, *rest)))
+    for threads in (1, 3):
+        bands.clear()
+        convert(CLIP, tmp_path / str(threads), **OPTIONS | moved | {"threads": threads})
+        assert bands and {*bands} == {threads}
+    for name in ("left", "right"):
+        files = [tmp_path / threads / name / "events.h5" for threads in "13"]
+        assert files[0].read_bytes() == files[1].read_bytes()
 
 
 def test_the_only_event_camera_of_a_rig_is_the_one_that_is_meant(tmp_path: Path) -> None:

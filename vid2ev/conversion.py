@@ -79,7 +79,7 @@ def convert(
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
 
     seed       of the sensor; None draws one
-    threads    of the sensor; by default as many as there are cores.  They change nothing but the time it takes
+    threads    of views and sensors; by default as many as there are cores.  They change nothing but the time it takes
     skip       let strips of pixels sleep in which nothing can happen, and keep what cannot have changed of a scene's
                picture; changes nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole
@@ -237,7 +237,11 @@ def _record(recorder: Recorder, planner: Planner | None, course: _Course, began:
     on it `began` [s of the monotonic clock], with that of earlier runs."""
     recipe, done = recorder.recipe, recorder.done
     limited_before, work = done.limited, 0
-    coming = planner.instants if planner else partial(instants, recorder.seen, device=recorder.device)
+    coming = (
+        planner.instants
+        if planner
+        else partial(instants, recorder.seen, device=recorder.device, threads=recorder.threads)
+    )
     with closing(coming(done.warmed + max(done.frames - 1, 0))) as seen:
         first = next(seen, None)
         while first and not done.frames and course.since_ns is not None and first.t_ns < course.since_ns:

@@ -62,14 +62,14 @@ class Instant:
         return replace(self, frames=tuple(map(downloaded, self.frames)))
 
 
-def instants(recipe: Recipe, start: int = 0, device: Device = CPU) -> Generator[Instant]:
+def instants(recipe: Recipe, start: int = 0, device: Device = CPU, threads: int = 1) -> Generator[Instant]:
     """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
-    little in advance: one looks for motion, another carries light along it, a third forms the views.
+    little in advance: one looks for motion, another carries light along it, and `threads` form the views.
 
     Light is made on the `device` from the source's frames on, and is in tensors of torch there.
     """
     upload = None if device.light is None else Upload(device.light)
-    return ahead(_instants(recipe, start, upload), frames_ahead(recipe.source.size))
+    return ahead(_instants(recipe, start, upload, threads), frames_ahead(recipe.source.size))
 
 
 def frames_ahead(size: tuple[int, int]) -> int:
@@ -109,8 +109,8 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
         yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(as_array(light)))
 
 
-def _instants(recipe: Recipe, start: int, upload: Upload | None) -> Generator[Instant]:
-    sight, wanted, before_ns = recipe.sight(), recipe.truth, None
+def _instants(recipe: Recipe, start: int, upload: Upload | None, threads: int) -> Generator[Instant]:
+    sight, wanted, before_ns = recipe.sight(threads), recipe.truth, None
     if recipe.rendered:
         return (yield from _rendered(recipe, start, upload))
     of_scene = _of_scene(recipe, wanted) if wanted else None

@@ -197,9 +197,9 @@ class Recipe:
         events = [spec for spec in specs if isinstance(spec, DvsSpec)]
         return min((min(spec.threshold_on, spec.threshold_off) for spec in events), default=THRESHOLD)
 
-    def sight(self) -> Sight:
+    def sight(self, threads: int = 1) -> Sight:
         """What the cameras see, before the first frame."""
-        return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer)
+        return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer, threads)
 
     @property
     def rendered(self) -> bool:

@@ -108,10 +108,11 @@ class Recorder:
         part: Part = WHOLE,
         made: Made | None = None,
     ):
-        self.recipe, self.outputs, self.folder, self.device = recipe, outputs, folder, device
+        self.recipe, self.outputs, self.folder = recipe, outputs, folder
+        self.device, self.threads = device, threads
         self._part, self._made = part, made
         self.done = Progress()
-        self.tracks: Sequence[Track] = [self._track(mount, threads, skip) for mount in recipe.mounts]
+        self.tracks: Sequence[Track] = [self._track(mount, skip) for mount in recipe.mounts]
         self._truths = [TruthTrack(mount, folder) for mount in recipe.mounts if recipe.truth]
 
     @property
@@ -226,12 +227,12 @@ class Recorder:
         tracks = zip(self.recipe.mounts, self.tracks, strict=True)
         return {mount.name: list(track.dvs.slept) for mount, track in tracks if isinstance(track, DvsTrack)}
 
-    def _track(self, mount: Mount, threads: int, skip: bool) -> Track:
+    def _track(self, mount: Mount, skip: bool) -> Track:
         if mount.kind == "cis":
-            return CisTrack(mount.cis(threads, self.device), self.folder, self.outputs, within=mount.within)
+            return CisTrack(mount.cis(self.threads, self.device), self.folder, self.outputs, within=mount.within)
         source, labels, made = self.recipe.source, self.recipe.labels, self._made
         return DvsTrack(
-            made.sensor(mount, labels) if made else mount.dvs(labels, threads, skip, self.device, self._part),
+            made.sensor(mount, labels) if made else mount.dvs(labels, self.threads, skip, self.device, self._part),
             self.folder,
             self.outputs,
             within=mount.within,

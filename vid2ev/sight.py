@@ -33,6 +33,7 @@ class Sight:
 
     plane_m  how far the scene is, if it is a plane before the source's camera; None where frames carry their depth
     bayer    the pattern of colour filters before the pixels of event cameras, or None
+    threads  change nothing but the time it takes
     """
 
     def __init__(
@@ -41,11 +42,12 @@ class Sight:
         mounts: Sequence[Mount],
         plane_m: float | None,
         bayer: str | None = None,
+        threads: int = 1,
     ):
         self._mounts = mounts
         self.free = are_free(source, mounts)
         self._groups = [  # (those that see colours, and those that see luminance: a third of the work)
-            (coloured, places, Views(source, [mounts[k].view for k in places], plane_m))
+            (coloured, places, Views(source, [mounts[k].view for k in places], plane_m, threads=threads))
             for coloured in (True, False)
             if (places := [k for k, mount in enumerate(mounts) if sees_colour(mount, bayer) == coloured])
         ]

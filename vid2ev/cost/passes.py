@@ -89,7 +89,7 @@ def _passed(
     done = Pass([Sent(mount) for mount in recipe.mounts], (0, 0), 0)
     first_ns, last_ns, originals = None, 0, 0
     every = max(1, (recipe.source.frames_expected or PICTURES) // PICTURES)
-    with closing(planner.instants() if planner else instants(recipe)) as coming:
+    with closing(planner.instants() if planner else instants(recipe, threads=threads)) as coming:
         for index, instant in enumerate(coming):
             if planner and planner.see(instant, index):
                 return None

@@ -57,13 +57,13 @@ class Planner:
     """The plans of a recipe's cameras within a tolerance of the distance: `begin`, then go through `instants` and show
     each to `see`; after the last, `finish`.  Where these return True the recording has to begin again by new `plans`.
 
-    `threads` measure, and change nothing but the time it takes.  Light is made on the `device`, and comes back to be
-    looked at.
+    `threads` see and measure, and change nothing but the time it takes.  Light is made on the `device`, and comes back
+    to be looked at.
     """
 
     def __init__(self, recipe: Recipe, tolerance: float, threads: int = 1, device: Device = CPU):
         check_tolerance(tolerance)
-        self.recipe, self.tolerance, self.device = recipe, tolerance, device
+        self.recipe, self.tolerance, self.device, self._threads = recipe, tolerance, device, threads
         self.plans: dict[str, Plan] = {}
         self.looked, self.ended = 0, False  # instants, from the first on; and whether the last of them was the last
         self._kept = recipe.source.kept
@@ -84,7 +84,7 @@ class Planner:
             return
         if self._kept:
             self._kept.wanted = True
-        self._rest = instants(self.recipe, device=self.device)
+        self._rest = self._from(0)
         more = self._hold(self._rest)
         once = self._kept is None and not self.recipe.source.rewindable
         if not self.looked or (more and once):
@@ -106,11 +106,14 @@ class Planner:
         if self._kept and not self._looking:
             self._kept.wanted = False
         held, rest, self._held, self._rest = self._held, self._rest, deque(), None
-        rest = rest or instants(self.recipe, frame, self.device)
+        rest = rest or self._from(frame)
         with closing(rest):
             while held:
                 yield held.popleft()
             yield from rest
+
+    def _from(self, frame: int) -> Generator[Instant]:
+        return instants(self.recipe, frame, self.device, self._threads)
 
     def see(self, instant: Instant, index: int) -> bool:
         """Look at an instant, the one after so many of the recording; returns whether there are new plans."""

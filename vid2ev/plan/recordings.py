@@ -28,7 +28,7 @@ def plans_of(
     recipe: Recipe, effects: str | Sequence[str] = "auto", tolerance: float = TOLERANCE, threads: int = 1
 ) -> dict[str, Plan]:
     """The plan of each camera, from a look at the whole source, made denser in time as for a recording, which does
-    without (`plan.planner`).  `threads` measure, and change nothing but the time it takes.
+    without (`plan.planner`).  `threads` see and measure, and change nothing but the time it takes.
 
     A camera that goes on and on is not looked at, and auto keeps all of it.  Raises UsageError as `plan_of` does.
     """
@@ -36,7 +36,7 @@ def plans_of(
     if _is_endless(recipe.source):
         return plans_unseen(recipe, PASSES, effects, tolerance)
     look = Look(recipe, threads)
-    with closing(instants(recipe)) as seen:
+    with closing(instants(recipe, threads=threads)) as seen:
         for instant in seen:
             look.see(instant)
     return look.plans(effects, tolerance)

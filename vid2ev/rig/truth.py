@@ -40,14 +40,14 @@ def depth_of_plane(camera: Intrinsics, pose: Pose, plane_m: float) -> np.ndarray
     return np.where(depth_m > 0, depth_m, np.nan).astype(np.float32)
 
 
-def depth_seen(source: Intrinsics, depth_m: np.ndarray, camera: Intrinsics, pose: Pose, threads: int = 1) -> np.ndarray:
+def depth_seen(source: Intrinsics, depth_m: np.ndarray, camera: Intrinsics, pose: Pose) -> np.ndarray:
     """Depth [h, w] float32 m that a camera has of what a source with a depth map [H, W] sees.
 
     pose   from the camera's coordinates to those of the source; NaN in holes, and where depth is not known
     """
     inverse, known = filled_inverse(np.asarray(depth_m, np.float32))
     surface = surface_of(inverse, corners_of(source), source)
-    x, y, there = seen_of(surface, camera, pose, Bands(threads))
+    x, y, there = seen_of(surface, camera, pose, Bands())
     width, height = source.size
     rows, columns = (np.clip(np.rint(place), 0, last - 1).astype(np.intp) for place, last in ((y, height), (x, width)))
     with np.errstate(divide="ignore"):
