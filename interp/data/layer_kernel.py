@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached, cached_with
+from vid2ev.compiling.cache import cached, cached_with
 
 
 @cached_with(fastmath={"contract", "nsz"})

@@ -17,8 +17,8 @@ import math
 import numpy as np
 
 from vid2ev import Events
+from vid2ev.compiling.cache import cached
 from vid2ev.errors import UsageError
-from vid2ev.kernel_cache import cached
 
 GREY = 0.18
 CUTOFF_HZ = 1.0

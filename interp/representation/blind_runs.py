@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 MOST = 8  # crossings that an event may stand for
 PACE = 0.3  # of ln r, from one interval to the next

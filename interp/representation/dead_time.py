@@ -26,8 +26,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from interp.representation.blind_runs import MOST, crossings_in_runs
+from vid2ev.compiling.cache import cached
 from vid2ev.errors import UsageError
-from vid2ev.kernel_cache import cached
 
 LEAST = 0.03  # R: 0.01 and 0.1 are the same to 0.02 dB
 SHORTEST_US = 1.0  # less is no dead time: times are of whole microseconds

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.stream.events import Events
 
 

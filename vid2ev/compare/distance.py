@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.compare.by_pixel import ByPixel
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 TAUS_US = (1000, 100)  # the headline, and a magnifier for small errors of time
 _NEVER = np.int64(1 << 62)

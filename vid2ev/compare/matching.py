@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vid2ev.compare.by_pixel import ByPixel
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 WINDOW_US = 5000
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 PEAK = 255.0
 HIGHEST_DB = 100.0  # of pictures without an error

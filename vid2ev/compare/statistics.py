@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.compare.comparison import percentile
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.stream.events import Events
 
 NEIGHBOUR_US = 5000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vid2ev.compiling.cache import cached
 from vid2ev.formats.es import EXPOSURES, OUTSIDE, TIME
-from vid2ev.kernel_cache import cached
 
 EVENT = 5  # bytes
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vid2ev.compiling.cache import cached
 from vid2ev.formats.evt_state import Left, State
-from vid2ev.kernel_cache import cached
 
 HIGH, TRIGGER, OTHERS, CONTINUED = 0x8, 0xA, 0xE, 0xF
 BEAT = 64  # steps of EVT_TIME_HIGH, of 64 us each, after which there is one even in silence

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vid2ev.compiling.cache import cached
 from vid2ev.formats.evt_state import Left, State
-from vid2ev.kernel_cache import cached
 
 ROW, COLUMN, BASE, VECTOR_12, VECTOR_8, LOW, HIGH = 0x0, 0x2, 0x3, 0x4, 0x5, 0x6, 0x8
 EXPOSURE_ROW, CONTINUED_4, TRIGGER, CONTINUED_12 = 0x1, 0x7, 0xA, 0xF

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 TIME_HIGH, TIME_LOW, COLUMN, ROW, BASE, VECTOR_8 = range(6)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 NOTHING, T, X, Y, P, LABEL = -1, 0, 1, 2, 3, 4  # what a field can be
 WIDEST = 48  # bytes of a line that is written

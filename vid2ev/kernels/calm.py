@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
 from vid2ev.kernels.measured import BENDS, LIGHT, SEEN, SMOOTH, first_tau, left_of
 from vid2ev.kernels.scan import BRIGHTEST

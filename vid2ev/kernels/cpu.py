@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
-from vid2ev.kernel_intrinsics import from_entry, prefetch, put_eight
+from vid2ev.compiling.compiler import compiled, inner
+from vid2ev.compiling.intrinsics import from_entry, prefetch, put_eight
 from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel

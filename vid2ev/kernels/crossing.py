@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.kernels.sink import put, room

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import fma
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import fma
 from vid2ev.physics.adc import WHITE, code_of
 from vid2ev.physics.electrons import shoot
 from vid2ev.physics.random import READOUT, fill_words, normal_pair

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import (
     AT,
     HOT,

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
-from vid2ev.kernel_intrinsics import floor
+from vid2ev.compiling.compiler import inner
+from vid2ev.compiling.intrinsics import floor
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
 from vid2ev.kernels.layout import CAPPED, LANE_COUNT, LANE_PITCH
 

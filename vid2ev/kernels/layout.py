@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 from vid2ev.kernels.widths import BLOCK, BLOCK_BITS, LANE_COUNT, LANE_PITCH, PITCH
 from vid2ev.physics.log_curve import Curve
 from vid2ev.stream.still import STRIP  # pixels of a block that sleep or are awake together

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import bits_32, float_32
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import bits_32, float_32
 from vid2ev.kernels.calm import CALM, arriving, next_run, rest
 from vid2ev.kernels.cpu import hits_of
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP

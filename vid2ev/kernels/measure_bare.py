@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.calm import arriving, next_run
 from vid2ev.kernels.cpu import hits_of
 from vid2ev.kernels.layout import BLOCK, PITCH

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
-from vid2ev.kernel_intrinsics import bits_32
+from vid2ev.compiling.compiler import inner
+from vid2ev.compiling.intrinsics import bits_32
 from vid2ev.kernels.layout import PITCH
 from vid2ev.physics.elementary import expm1_32
 

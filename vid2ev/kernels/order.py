@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 
 _TIME, _PIXEL = np.uint64(28), np.uint64(3)
 _PASS, _SHORT_PASS = np.uint64(16), np.uint64(8)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import PITCH
 from vid2ev.kernels.measured import (
     AT_HALF,

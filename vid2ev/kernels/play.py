@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measured import (
     AT_HALF,

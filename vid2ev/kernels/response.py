@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels import turns as T
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED, RUNGS, keep_lanes, reached_lanes
 from vid2ev.kernels.layout import HIGH, INPUT, LANE_PITCH, LOW, PITCH

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import Interval, Numbers
 from vid2ev.physics.log_curve import Curve
 

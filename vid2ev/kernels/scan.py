@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 from numba.core.extending import overload
 
-from vid2ev.kernel_compiler import INNER_OPTIONS, inner
+from vid2ev.compiling.compiler import INNER_OPTIONS, inner
 from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH, last_light
 from vid2ev.physics.elementary import exp64, expm1_32
 from vid2ev.physics.log_curve import light_at, log_level_32

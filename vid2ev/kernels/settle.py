@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import AT, LEVEL_ON, WHEN, fresh_thresholds, leave_levels, load_thresholds
 from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LOW, PITCH, last_light, place_of, stride_of
 from vid2ev.physics.comparator import initial_phase

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN, least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.general import path_of, value

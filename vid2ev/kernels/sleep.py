@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.company import anyone
 from vid2ev.kernels.crossing import AT, LABEL, WHEN, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, few, lanes_with_more, next_rungs

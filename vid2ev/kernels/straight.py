@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
 from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH

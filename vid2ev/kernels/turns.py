@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import LANE_PITCH
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log32, log64
 from vid2ev.physics.photoreceptor import response, slope_zero

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.light.luminance import F, Steps, YuvCode, chroma_row, places
 
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.light.transfer import parse_transfer
 
 STEPS, FINE_STEPS = 4096, 32768  # table entries per unit of signal

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.light.resample import Taps, resampled
 
 

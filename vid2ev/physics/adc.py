@@ -24,8 +24,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import floor
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import floor
 from vid2ev.stream.exposed import Change, Exposed, LevelChange, level_change, normal_most, surely_square
 
 WHITE = 65535.0  # I16 of light 1.0

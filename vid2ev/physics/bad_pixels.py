@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 from vid2ev.physics.omission import kind_of, light_events, sent_share, trembling
 from vid2ev.physics.random import HOT_MAP, philox, unit
 from vid2ev.stream.bounds import added, together

@@ -18,7 +18,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field, field_validator
 
-from vid2ev.kernel_compiler import inlined
+from vid2ev.compiling.compiler import inlined
 from vid2ev.physics.random import PHASE, philox, unit
 
 LEAST_NATS = 1e-6  # of a threshold: crossings are solved to 2e-6 nat, and from 1e-16 on a level adds up to no other

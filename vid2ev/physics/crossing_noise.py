@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import inlined
+from vid2ev.compiling.compiler import inlined
 from vid2ev.physics.mismatch import clipped
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import CROSSING, normal_pair, philox

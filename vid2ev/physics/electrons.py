@@ -31,8 +31,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import floor, sqrt
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import floor, sqrt
 from vid2ev.physics.adc import WHITE, lsb_per_electron
 from vid2ev.physics.elementary import exp64
 from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain

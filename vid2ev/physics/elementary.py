@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import bits_32, bits_64, float_32, float_64, fma
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import bits_32, bits_64, float_32, float_64, fma
 
 F = np.float32
 _SQRT_HALF_32 = np.int32(0x3F3504F3)

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 from vid2ev.physics.elementary import exp64, log32, log64
 
 F = np.float32

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled, inlined
+from vid2ev.compiling.compiler import compiled, inlined
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
 from vid2ev.physics.thresholds import DEVIATIONS, FLOOR

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import inlined
+from vid2ev.compiling.compiler import inlined
 
 F = np.float32
 MORE = F(1.13)

@@ -31,8 +31,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled
-from vid2ev.kernel_intrinsics import fma
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import fma
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log64
 
 F = np.float32

@@ -34,7 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.kernel_compiler import compiled, inlined
+from vid2ev.compiling.compiler import compiled, inlined
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.omission import light_events, trembling
 from vid2ev.physics.photoreceptor import step_weights

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inlined
-from vid2ev.kernel_intrinsics import floor, fma, sqrt
+from vid2ev.compiling.compiler import compiled, inlined
+from vid2ev.compiling.intrinsics import floor, fma, sqrt
 from vid2ev.physics.elementary import log64
 
 PHASE, MISMATCH, CROSSING, SHOT, HOT, HOT_MAP, PHOTORECEPTOR, RICE, READOUT, FIXED_PATTERN = range(10)

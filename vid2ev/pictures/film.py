@@ -21,7 +21,7 @@ from typing import Any, Self
 import av
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.pictures.colours import BLUE, BLUE_SPAN, GREEN, NEUTRAL, RED, RED_SPAN
 
 BT709, LIMITED = 1, 1  # codes of ITU-T H.273 and of FFmpeg

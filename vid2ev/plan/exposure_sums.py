@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 LEAST, MOST, SUM, LIT_MOST, LIT_SUM, LIT_SQUARE = range(6)  # of the light behind the lens shading
 SHADED, CLIPPED, OVERFULL, NEAR = 6, 8, 10, 12  # changes, and how many values are near the full well

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.pictures.colours import MOST, NEUTRAL, codes, event_colours
 

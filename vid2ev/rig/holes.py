@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 F = np.float32
 NOTHING = -1

@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.rig.bands import Bands
 
 F = np.float32

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import bent, rays_of

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 
 F = np.float32
 ROUNDING = F(1e-4)  # of a triangle's area: by so much its edges reach out, lest rounding makes a crack

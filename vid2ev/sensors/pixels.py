@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.kernel_elsewhere import Elsewhere
+from vid2ev.compiling.elsewhere import Elsewhere
 from vid2ev.kernels.cpu import settle_tile, walk_tile
 from vid2ev.kernels.layout import BLOCK, CAPPED, NOT_FINITE, STRIP, SWALLOWED, TALLIES, Flags, Interval, Planes
 from vid2ev.kernels.naps import rouse

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.stream.still import BRIGHTEST, STRIP, strip_count
 
 _BRIGHTEST = np.float32(BRIGHTEST)

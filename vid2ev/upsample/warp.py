@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.stream.still import STRIP
 from vid2ev.upsample.cubic import look_up, places
 from vid2ev.upsample.stillness import is_kept

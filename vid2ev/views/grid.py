@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from vid2ev.compiling.cache import cached
 from vid2ev.errors import UsageError
-from vid2ev.kernel_cache import cached
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
 

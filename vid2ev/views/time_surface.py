@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.kernel_cache import cached
+from vid2ev.compiling.cache import cached
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within

@@ -21,14 +21,14 @@ ALWAYS = {
     "vid2ev.kernels.sink": "vid2ev.kernels.cuda.staged",
 }
 CARD = ALWAYS | {
-    "vid2ev.kernel_compiler": "vid2ev.kernels.cuda.device_compiler",
-    "vid2ev.kernel_extending": "vid2ev.kernels.cuda.device_extending",
-    "vid2ev.kernel_intrinsics": "vid2ev.kernel_intrinsics",  # (its own text, by the other way in)
+    "vid2ev.compiling.compiler": "vid2ev.kernels.cuda.device_compiler",
+    "vid2ev.compiling.extending": "vid2ev.kernels.cuda.device_extending",
+    "vid2ev.compiling.intrinsics": "vid2ev.compiling.intrinsics",  # (its own text, by the other way in)
     "vid2ev.kernels.cuda.counter": "vid2ev.kernels.cuda.device_counter",
     "vid2ev.kernels.company": "vid2ev.kernels.cuda.warp",
 }
 SIMULATED = ALWAYS | {
-    "vid2ev.kernel_compiler": "vid2ev.kernels.cuda.simulated_compiler",
+    "vid2ev.compiling.compiler": "vid2ev.kernels.cuda.simulated_compiler",
     "vid2ev.kernels.cuda.machine": "vid2ev.kernels.cuda.simulated_machine",
 }
 

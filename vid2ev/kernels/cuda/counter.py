@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 
 
 @inner

@@ -1,4 +1,4 @@
-"""In the place of `vid2ev.kernel_compiler` on a GPU: functions that its kernels call."""
+"""In the place of `vid2ev.compiling.compiler` on a GPU: functions that its kernels call."""
 
 from __future__ import annotations
 

@@ -1,3 +1,3 @@
-"""In the place of `vid2ev.kernel_extending` on a GPU."""
+"""In the place of `vid2ev.compiling.extending` on a GPU."""
 
 from numba.cuda.extending import intrinsic as intrinsic

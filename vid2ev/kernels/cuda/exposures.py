@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import cuda
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 from vid2ev.kernels.cuda.counter import take
 from vid2ev.kernels.cuda.machine import jit
 from vid2ev.kernels.exposures import add_rows, read_rows, take_rows

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.company import together
 from vid2ev.kernels.cuda.staged import Staged, send_waiting
 from vid2ev.kernels.forced import keep_likely

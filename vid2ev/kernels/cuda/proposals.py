@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 from vid2ev.kernels.forced import hot_of_cell, shot_of_cell
 from vid2ev.kernels.rows import sensor_of
 from vid2ev.physics.shot import CELL_NS, CELL_PIXELS

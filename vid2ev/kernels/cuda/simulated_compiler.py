@@ -1,4 +1,4 @@
-"""In the place of `vid2ev.kernel_compiler` where a GPU is simulated: compiled for the CPU, under names of its own.
+"""In the place of `vid2ev.compiling.compiler` where a GPU is simulated: compiled for the CPU, under names of its own.
 
 Machine code is linked by name: the function's, its types, and the number that it had among those compiled by its
 process.  Kernels from the cache bring numbers of other processes, so a function with the name of one for blocks of many
@@ -12,7 +12,7 @@ from typing import Any
 
 from numba import njit
 
-from vid2ev import kernel_compiler as cpu
+from vid2ev.compiling import compiler as cpu
 
 # (a simulated thread runs until it waits for others: what it counts needs no atomic operations, if it keeps the lock)
 OPTIONS = cpu.OPTIONS | {"nogil": False}

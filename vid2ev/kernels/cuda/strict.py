@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.kernel_flags import Numba, pass_over_flags
+from vid2ev.compiling.flags import Numba, pass_over_flags
 
 NO_MORE = "row_stack"
 _lock = threading.RLock()

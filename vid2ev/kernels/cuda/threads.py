@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.cuda.clips import Due
 from vid2ev.kernels.cuda.counter import take
 from vid2ev.kernels.cuda.pixel import glance, planes_of_clip, settle, walk

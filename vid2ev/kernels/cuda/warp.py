@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba import cuda
 
-from vid2ev.kernel_compiler import inner
+from vid2ev.compiling.compiler import inner
 
 ALL = 0xFFFFFFFF
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from numba import njit
 
-from vid2ev.kernel_compiler import OPTIONS, KernelCompiler, of_plain_types
+from vid2ev.compiling.compiler import OPTIONS, KernelCompiler, of_plain_types
 
 UNCOUNTED: dict[str, Any] = OPTIONS | {"_nrt": False, "pipeline_class": KernelCompiler}
 INLINED: dict[str, Any] = UNCOUNTED | {"no_cpython_wrapper": True, "forceinline": True}

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 
 LEAF = 4  # triangles
 BINS = 16

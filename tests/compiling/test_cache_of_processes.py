@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba.core.caching import IndexDataCacheFile
 
-import vid2ev.kernel_compiler  # noqa: F401  (marks the names of this process)
-from vid2ev import kernel_cache
+import vid2ev.compiling.compiler  # noqa: F401  (marks the names of this process)
+from vid2ev.compiling import cache as kernel_cache
 
 
 def test_two_processes_that_compile_at_once_never_get_each_others_code(tmp_path, monkeypatch):

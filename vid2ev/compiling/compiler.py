@@ -7,12 +7,12 @@ effects are on.  numba prunes branches that are constant before it infers types,
 **Inner functions.** numba optimises each function and makes machine code of it, and again wherever it is called.  What
 kernels call is here made ready to be inlined, and no more, also where Python calls it as well.
 
-**Arguments** are borrowed (`kernel_borrowing.py`).
+**Arguments** are borrowed (`compiling/borrowing.py`).
 
 **Passes.** Of numba's passes over a function those are left out that look for what kernels do not have: closures,
 `with`, `raise` with values, literals to be unrolled, expressions of whole arrays.
 
-**Caches** are of one version of all files that kernels are made of (`kernel_cache.py`).
+**Caches** are of one version of all files that kernels are made of (`compiling/cache.py`).
 
 **Types.** numba has a variant of a function for each literal that it is called with; here a literal is an int64.
 """
@@ -49,10 +49,10 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from vid2ev.kernel_borrowing import LoweringWithBorrowing
-from vid2ev.kernel_cache import of_this_version
-from vid2ev.kernel_call_types import kept_call_types
-from vid2ev.kernel_flags import Numba, pass_over_flags
+from vid2ev.compiling.borrowing import LoweringWithBorrowing
+from vid2ev.compiling.cache import of_this_version
+from vid2ev.compiling.call_types import kept_call_types
+from vid2ev.compiling.flags import Numba, pass_over_flags
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 INNER_OPTIONS = OPTIONS | {"no_cpython_wrapper": True}

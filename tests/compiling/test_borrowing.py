@@ -11,7 +11,7 @@ import pytest
 from numba.core.caching import NullCache
 from numba.core.runtime import _nrt_python, rtsys
 
-from vid2ev.kernel_compiler import compiled, inner
+from vid2ev.compiling.compiler import compiled, inner
 
 
 class Planes(NamedTuple):

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from vid2ev import kernel_cache, kernel_compiler
-from vid2ev.kernel_cache import COLOURS, KERNELS
+from vid2ev.compiling import cache
+from vid2ev.compiling.cache import COLOURS, KERNELS
 
-PACKAGE = Path(kernel_compiler.__file__).parent
+PACKAGE = Path(cache.__file__).parents[1]
 KERNEL = """
-from vid2ev.kernel_compiler import compiled
+from vid2ev.compiling.compiler import compiled
 
 @compiled
 def twice(x):
@@ -42,26 +42,26 @@ def test_a_kernel_is_compiled_again_where_any_of_its_files_has_changed(
     (tmp_path / "kernel.py").write_text(KERNEL)
     assert loaded(tmp_path / "kernel.py") == (0, 1)
     assert loaded(tmp_path / "kernel.py") == (1, 0)
-    stamp = kernel_cache._versions(tmp_path)
+    stamp = cache._versions(tmp_path)
     changed = (*stamp[:-1], (stamp[-1][0], stamp[-1][1] + 1, stamp[-1][2]))
-    monkeypatch.setattr(kernel_cache, "_versions", lambda *rooms: changed)
+    monkeypatch.setattr(cache, "_versions", lambda *rooms: changed)
     assert loaded(tmp_path / "kernel.py") == (0, 1)
 
 
-@pytest.mark.parametrize("decorator", ["kernel_compiler import compiled", "kernel_cache import cached"])
+@pytest.mark.parametrize("decorator", ["compiler import compiled", "cache import cached"])
 def test_a_number_of_a_file_beside_it_is_that_of_now(
     tmp_path: Path, decorator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     name = decorator.split()[-1]
     (tmp_path / "kernel.py").write_text(
-        f"from vid2ev.{decorator}\nfrom factor_of_a_test import FACTOR\n\n@{name}\ndef twice(x):\n"
+        f"from vid2ev.compiling.{decorator}\nfrom factor_of_a_test import FACTOR\n\n@{name}\ndef twice(x):\n"
         "    return FACTOR * x\n"
     )
     for factor in (2, 42, 21):
         (tmp_path / "factor_of_a_test.py").write_text(f"FACTOR = {factor}\n")
         os.utime(tmp_path / "factor_of_a_test.py", (factor, factor))
-        kernel_cache._versions.cache_clear()
+        cache._versions.cache_clear()
         sys.modules.pop("factor_of_a_test", None)
         importlib.invalidate_caches()
         spec = importlib.util.spec_from_file_location("kernel_of_a_test", tmp_path / "kernel.py")
@@ -84,24 +84,24 @@ def test_numbers_of_other_rooms_that_are_compiled_in_are_of_rooms_that_count() -
     looked_at = 0
     for path in (*PACKAGE.rglob("*.py"), *(PACKAGE.parent / "interp").rglob("*.py")):
         text = path.read_text()
-        kernel = "from vid2ev.kernel_compiler import" in text
-        if not kernel and "from vid2ev.kernel_cache import cached" not in text:
+        kernel = "from vid2ev.compiling.compiler import" in text
+        if not kernel and "from vid2ev.compiling.cache import cached" not in text:
             continue
         count = {path.parent, *(PACKAGE / room for room in (KERNELS if kernel else COLOURS))}
         for file in numbers_from(ast.parse(text)):
             looked_at += 1
-            assert file.name.startswith("kernel_") or file.parent in count, f"{path} takes numbers from {file}"
+            assert file.parent.name == "compiling" or file.parent in count, f"{path} takes numbers from {file}"
     assert looked_at > 30
 
 
 def test_nothing_is_cached_that_does_not_know_its_files() -> None:
     found = [path.name for path in PACKAGE.parent.glob("[vi]*/**/*.py") if "cache=True" in path.read_text()]
-    assert sorted(found) == ["kernel_cache.py", "kernel_compiler.py"]
+    assert sorted(found) == ["cache.py", "compiler.py"]
 
 
 def test_all_files_that_kernels_are_made_of_count() -> None:
-    made_of = [path for path in PACKAGE.rglob("*.py") if "kernel_compiler import" in path.read_text()]
+    made_of = [path for path in PACKAGE.rglob("*.py") if "compiling.compiler import" in path.read_text()]
     assert len(made_of) > 40
     for path in made_of:
         rooms = path.parent, *(PACKAGE / each for each in KERNELS)
-        assert f"{path.parent.name}/{path.name}" in {name for name, _, _ in kernel_cache._versions(*rooms)}
+        assert f"{path.parent.name}/{path.name}" in {name for name, _, _ in cache._versions(*rooms)}

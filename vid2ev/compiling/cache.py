@@ -24,6 +24,7 @@ from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
+_PACKAGE = _HERE.parent
 KERNELS = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream", "pictures")
 COLOURS = ("pictures",)  # of which functions of many rooms take numbers
 _MARK = uuid.uuid4().hex[:8]
@@ -46,14 +47,14 @@ def cached_with(**options: Any) -> Callable[[Callable], Any]:
 def of_this_version(dispatcher: Any, rooms: Iterable[str] = KERNELS) -> Any:
     """A cached function; what was compiled of other files in these rooms, or its own, is compiled again."""
     own = Path(dispatcher.py_func.__code__.co_filename).parent
-    dispatcher._cache._cache_file._source_stamp = _versions(own, *(_HERE / room for room in rooms))
+    dispatcher._cache._cache_file._source_stamp = _versions(own, *(_PACKAGE / room for room in rooms))
     return dispatcher
 
 
 @functools.cache
 def _versions(*rooms: Path) -> tuple[tuple[str, int, int], ...]:
     """Names, times and sizes of the files in rooms, and of what compiles them."""
-    files = {*_HERE.glob("kernel_*.py"), *(file for room in rooms for file in room.glob("*.py"))}
+    files = {*_HERE.glob("*.py"), *(file for room in rooms for file in room.glob("*.py"))}
     return tuple(
         sorted((f"{file.parent.name}/{file.name}", (stat := file.stat()).st_mtime_ns, stat.st_size) for file in files)
     )
@@ -73,9 +74,9 @@ def _save_if_possible(cache: IndexDataCacheFile, key: Any, data: Any) -> None:
 
 def drop_stale_kernels() -> None:
     """Delete the cached kernels if the sources are not those that they were compiled from; never fails."""
-    folders = [_HERE / room for room in KERNELS]
+    folders = [_PACKAGE / room for room in KERNELS]
     stamp = hashlib.sha256(repr(_versions(*folders)).encode()).hexdigest()
-    stamp_file = _HERE / KERNELS[0] / "__pycache__" / "kernels.stamp"
+    stamp_file = _PACKAGE / KERNELS[0] / "__pycache__" / "kernels.stamp"
     # A folder that cannot be written is not one in which sources change: numba then keeps its cache elsewhere.
     with contextlib.suppress(OSError):
         if stamp_file.exists() and stamp_file.read_text() == stamp:

@@ -8,7 +8,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from vid2ev.kernel_extending import intrinsic
+from vid2ev.compiling.extending import intrinsic
 
 
 def _bitcast(source: Any, target: Any) -> Any:

@@ -15,16 +15,17 @@ import pytest
 SEEN = """
 import json, sys
 import numpy as np
-from vid2ev import Dvs, kernel_elsewhere, load_sensor
+from vid2ev import Dvs, load_sensor
+from vid2ev.compiling import elsewhere
 from vid2ev.kernels.cpu import walk_tile
 
-kernel_elsewhere.sys.executable = sys.argv[2] or None
+elsewhere.sys.executable = sys.argv[2] or None
 dvs = Dvs(load_sensor("ideal", ["threshold_on=0.2"]), (4096, 2), threads=int(sys.argv[1]))
 light = np.full((2, 4096), 0.1, np.float32)
 events = [dvs.step(light * (1 + k), 1_000_000 * k) for k in range(3)]
 stats = walk_tile.stats
 print(json.dumps({
-    "here": sum(stats.cache_misses.values()), "events": [len(e) for e in events], "begun": len(kernel_elsewhere._begun),
+    "here": sum(stats.cache_misses.values()), "events": [len(e) for e in events], "begun": len(elsewhere._begun),
 }))
 """
 
@@ -79,6 +80,6 @@ def test_the_other_process_ends_with_this_one(tmp_path: Path) -> None:
 def compiles(pid: str) -> bool:
     """Whether a process compiles for another one."""
     try:
-        return b"kernel_elsewhere" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        return b"compiling.elsewhere" in Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
         return False

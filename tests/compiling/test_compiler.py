@@ -13,8 +13,8 @@ from numba import complex64, int8
 from numba.core.errors import TypingError
 from numba.core.types.functions import BaseFunction
 
-from vid2ev import kernel_call_types
-from vid2ev.kernel_compiler import compiled, inlined, inner
+from vid2ev.compiling import call_types
+from vid2ev.compiling.compiler import compiled, inlined, inner
 
 
 def cube(x: float) -> float:
@@ -41,13 +41,13 @@ def test_a_kernel_gives_what_python_does_whoever_calls_it() -> None:
 
 def test_numba_is_asked_once_for_the_type_of_a_call(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: Counter = Counter()
-    ask = kernel_call_types._ask
+    ask = call_types._ask
 
     def counting(function: Any, context: Any, args: tuple, kws: dict) -> Any:
         asked[function.typing_key, args] += 1
         return ask(function, context, args, kws)
 
-    monkeypatch.setattr(kernel_call_types, "_ask", counting)
+    monkeypatch.setattr(call_types, "_ask", counting)
 
     @inner
     def part(a: complex, b: int) -> complex:
