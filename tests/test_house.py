@@ -32,6 +32,7 @@ FLOORS = {
     "requests": 1,
     "untrusted": 1,
     "compiling": 0,
+    "bounds": 1,
     "stream": 1,
     "pictures": 1,
     "light": 2,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from vid2ev.bounds.scene import Omission
 from vid2ev.compare.by_pixel import by_pixel
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.instants import instants
@@ -14,7 +15,6 @@ from vid2ev.rig.camera import Camera, Rig
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Events, Frame
-from vid2ev.stream.scene import Omission
 
 VIDEOS = Path(__file__).parents[2] / ".." / "shared" / "data" / "videos"
 SIZE = "160x120"

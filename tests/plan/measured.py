@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from vid2ev.bounds.scene import Scene
 from vid2ev.plan.measure import Measure
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import Scene
 
 
 def scene_of(spec: DvsSpec, size: tuple[int, int], frames: Iterable[Frame]) -> Scene:

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from vid2ev.bounds.chances import _pixels, surely
+from vid2ev.bounds.scene import Scene
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream.chances import _pixels, surely
-from vid2ev.stream.scene import Scene
 
 from .clips import clip
 from .measured import scene_of

@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
 from vid2ev.errors import UsageError
 from vid2ev.instants import instants
 from vid2ev.plan.expose import Expose
@@ -23,7 +24,6 @@ from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import EFFECTS, CisSpec
 from vid2ev.sensors.presets import cis_names, load_cis
 from vid2ev.stream import Frame
-from vid2ev.stream.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
 
 from .clips import MADE, REAL, SCENES, VIDEOS, clip
 

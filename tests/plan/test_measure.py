@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from against.clips import clean
 
+from vid2ev.bounds.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.errors import UsageError
 from vid2ev.plan.measure import Measure
 from vid2ev.stream import Frame
-from vid2ev.stream.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.stream.still import Still, strip_count
 from vid2ev.upsample.stillness import still_strips
 

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from against.clips import clean
 
+from vid2ev.bounds.chances import at_least, at_most, surely
+from vid2ev.bounds.distance import added, delayed, off_by, together, unlike
+from vid2ev.bounds.scene import Scene
 from vid2ev.errors import UsageError
 from vid2ev.physics.omission import light_events
 from vid2ev.physics.peaks import taken
@@ -18,9 +21,6 @@ from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Frame
-from vid2ev.stream.bounds import added, delayed, off_by, together, unlike
-from vid2ev.stream.chances import at_least, at_most, surely
-from vid2ev.stream.scene import Scene
 
 from .clips import clip, distance, sent, without
 from .measured import scene_of

@@ -25,7 +25,7 @@ from numba.core.caching import IndexDataCacheFile
 
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parent
-KERNELS = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "stream", "pictures")
+KERNELS = ("physics", "kernels", "scenes/rays", "scenes/rays/cuda", "bounds", "stream", "pictures")
 COLOURS = ("pictures",)  # of which functions of many rooms take numbers
 _MARK = uuid.uuid4().hex[:8]
 

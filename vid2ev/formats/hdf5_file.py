@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vid2ev.errors import DataError
-from vid2ev.stream.eager import EagerFile
+from vid2ev.formats.eager import EagerFile
 from vid2ev.untrusted import check_bytes
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Measuring what a sensor sees, frame by frame: extremes and sums of a scene (`vid2ev.stream.scene`).
+"""Measuring what a sensor sees, frame by frame: extremes and sums of a scene (`vid2ev.bounds.scene`).
 
 A block's pixels go through two loops: one without branches, for what every pixel has (light, level, slope, bend), and
 the play of those that are pushed or were until now (`play`).  Extremes are taken of the bits of numbers >= 0, whose

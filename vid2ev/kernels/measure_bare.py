@@ -1,7 +1,7 @@
 """Measuring a second signal beside that of a scene: the light without the lens shading.
 
 Both signals have their own play from the same random start, so how many levels lie between them is known at every
-instant (`vid2ev.stream.scene`):
+instant (`vid2ev.bounds.scene`):
 
     E |N_a - N_b| <= |p_a - p_b| / theta
 

@@ -1,4 +1,4 @@
-"""The play of pixels that are pushed or were until now (`vid2ev.stream.scene`), and the sums that are taken of it.
+"""The play of pixels that are pushed or were until now (`vid2ev.bounds.scene`), and the sums that are taken of it.
 
 Those of a block go to lanes: first what takes numbers alone, for all of them in vector code, then the sums, pixel after
 pixel in their order.  What a pixel adds to a sum weighs as many mean thresholds as its own is part of: its travel is

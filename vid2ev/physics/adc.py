@@ -24,9 +24,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.exposed import Change, Exposed, LevelChange, level_change, normal_most, surely_square
 from vid2ev.compiling.compiler import compiled
 from vid2ev.compiling.intrinsics import floor
-from vid2ev.stream.exposed import Change, Exposed, LevelChange, level_change, normal_most, surely_square
 
 WHITE = 65535.0  # I16 of light 1.0
 

@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import at_most, surely
+from vid2ev.bounds.distance import added, together
+from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.compiling.compiler import compiled
 from vid2ev.physics.omission import kind_of, light_events, sent_share, trembling
 from vid2ev.physics.random import HOT_MAP, philox, unit
-from vid2ev.stream.bounds import added, together
-from vid2ev.stream.chances import at_most, surely
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
 class BadPixels(BaseModel, frozen=True, extra="forbid"):

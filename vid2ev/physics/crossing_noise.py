@@ -15,11 +15,11 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.compiling.compiler import inlined
 from vid2ev.physics.mismatch import clipped
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import CROSSING, normal_pair, philox
-from vid2ev.stream.scene import Omission, Scene
 
 
 class CrossingNoise(BaseModel, frozen=True, extra="forbid"):

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import surely
+from vid2ev.bounds.distance import unlike
+from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.physics.omission import late_noise, readout_shifts
-from vid2ev.stream.bounds import unlike
-from vid2ev.stream.chances import surely
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import events_of
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 FIELDS = ("t", "x", "y", "p", "label")
 

@@ -31,13 +31,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from vid2ev.compiling.compiler import compiled
-from vid2ev.compiling.intrinsics import floor, sqrt
-from vid2ev.physics.adc import WHITE, lsb_per_electron
-from vid2ev.physics.elementary import exp64
-from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain
-from vid2ev.physics.random import normal_pair
-from vid2ev.stream.exposed import (
+from vid2ev.bounds.exposed import (
     Change,
     Exposed,
     LevelChange,
@@ -46,6 +40,12 @@ from vid2ev.stream.exposed import (
     poisson_most,
     surely_square,
 )
+from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.intrinsics import floor, sqrt
+from vid2ev.physics.adc import WHITE, lsb_per_electron
+from vid2ev.physics.elementary import exp64
+from vid2ev.physics.fixed_pattern import LIMIT, greatest_gain, least_gain
+from vid2ev.physics.random import normal_pair
 
 FEW = 12.0  # electrons up to which probabilities are added up
 MOST = 200.0  # of FEW on average: what rounding leaves of a probability must not be searched for ever

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.exposed import Exposed, LevelChange, level_change, normal_most, surely_square
 from vid2ev.compiling.compiler import compiled
 from vid2ev.physics.adc import lsb_per_electron, lsb_per_light
 from vid2ev.physics.random import FIXED_PATTERN, normal_pair, philox
-from vid2ev.stream.exposed import Exposed, LevelChange, level_change, normal_most, surely_square
 
 LIMIT = 4.0  # standard deviations
 

@@ -19,10 +19,10 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field, field_validator
 
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.physics.omission import omitted
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import clock, entry, events_of
-from vid2ev.stream.scene import Omission, Scene
 
 SLOWEST_HZ = 1e-9  # of event frames: 32 years from one to the next
 KINDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}  # of events held back

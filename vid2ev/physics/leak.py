@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.distance import added, elsewhere, off_by
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.physics.omission import echoes, light_events, noise_events, omitted, sent_share
-from vid2ev.stream.bounds import added, elsewhere, off_by
-from vid2ev.stream.scene import Omission, Scene
 
 
 class Leak(BaseModel, frozen=True, extra="forbid"):

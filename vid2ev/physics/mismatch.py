@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.compiling.compiler import compiled, inlined
 from vid2ev.physics.omission import displaced, omitted
 from vid2ev.physics.random import MISMATCH, normal_pair, philox
 from vid2ev.physics.thresholds import DEVIATIONS, FLOOR
-from vid2ev.stream.scene import Omission, Scene
 
 CHUNK = 1024  # pixels drawn for at a time
 

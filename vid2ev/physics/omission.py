@@ -1,6 +1,6 @@
 """What the omissions of effects have in common: bounds on the mean distance, become those of two recordings.
 
-The bounds of `vid2ev.stream.scene` are for levels that lie anywhere, `random_phase`.  Where all pixels begin in step,
+The bounds of `vid2ev.bounds.scene` are for levels that lie anywhere, `random_phase`.  Where all pixels begin in step,
 levels are spread by mismatch and crossing noise alone: the chance that one is in a given interval is greater by up to
 
     crowding = threshold / (sigma sqrt(2 pi))        sigma^2 = mismatch^2 + crossing_noise^2
@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.bounds.chances import at_least, at_most, surely
+from vid2ev.bounds.distance import off_by, unlike
+from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 from vid2ev.physics.slopes import most_too_soon, slopes_of
 from vid2ev.physics.thresholds import DEVIATIONS, STEPS, soon, spread_of, spread_thresholds
-from vid2ev.stream.bounds import off_by, unlike
-from vid2ev.stream.chances import at_least, at_most, surely
-from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
 
 SPREAD_MOST = 1 / 3  # of a threshold: up to there levels lie as evenly as bounds take them to
 
@@ -40,7 +40,7 @@ def kind_of(spec: Any) -> Kind:
     """What kind of statement a distance is that counts events of light, or follows levels.
 
     Where memories jump to the signal it is an estimate.  That phases are even is so for slopes that stay the same, and
-    only nearly so where they change from cycle to cycle (`stream/scene.py`): noise brings phases back to even, but by
+    only nearly so where they change from cycle to cycle (`bounds/scene.py`): noise brings phases back to even, but by
     how much is not proven.
     """
     return "estimate" if tracks(spec) else "99.9 % bound"

@@ -34,14 +34,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import surely
+from vid2ev.bounds.distance import added, unlike
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.compiling.compiler import compiled, inlined
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.omission import light_events, trembling
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
-from vid2ev.stream.bounds import added, unlike
-from vid2ev.stream.chances import surely
-from vid2ev.stream.scene import Omission, Scene
 
 RESOLVED = 8.0
 NEAR, FAR = 2.0, 40.0  # standard deviations: nearer, all is one; farther, nothing is crossed

@@ -2,7 +2,7 @@
 
 An exponential of mean tau delays by tau on average, with variance tau^2, and as light is straight but for its bends,
 shifting the events by tau is all that happens away from these.  A bend of the slope by r is rounded off: within r reach
-of the shifted line, over an area of r variance / 2 (`stream/bounds.py: delayed`), with
+of the shifted line, over an area of r variance / 2 (`bounds/distance.py: delayed`), with
 
     variance = tau1^2 + tau2^2 of the poles left out
     reach = E (D - E D)+ = tau/e for one,   <= sqrt(variance)/2 for two
@@ -21,12 +21,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vid2ev.bounds.chances import at_most
+from vid2ev.bounds.distance import PIXELS_DIFFER, delayed, later, steeper
+from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import echoes, late_noise, levels_between, omitted, tau_at, taus_of, tracks
 from vid2ev.physics.slopes import slopes_at
-from vid2ev.stream.bounds import PIXELS_DIFFER, delayed, later, steeper
-from vid2ev.stream.chances import at_most
-from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 
 FOLLOWER_OFF: dict[str, Any] = {"follower_tau_us": 0.0}
 BOTH_OFF: dict[str, Any] = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0, "bandwidth": "constant"}

@@ -21,11 +21,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import at_most
+from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
 from vid2ev.physics.slopes import most_too_soon, slopes_of, steepest
 from vid2ev.physics.thresholds import soon
-from vid2ev.stream.chances import at_most
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 
 class Refractory(BaseModel, frozen=True, extra="forbid"):

@@ -23,14 +23,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import at_most
+from vid2ev.bounds.distance import added, bare
+from vid2ev.bounds.exposed import Exposed, LevelChange, level_change
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.omission import echoes, light_events, omitted, reset, set_anew
 from vid2ev.physics.photoreceptor_omission import lag_s, otherwise_late
-from vid2ev.stream.bounds import added, bare
-from vid2ev.stream.chances import at_most
-from vid2ev.stream.exposed import Exposed, LevelChange, level_change
-from vid2ev.stream.scene import Omission, Scene
 
 GREATEST = 1e6  # of a coefficient
 

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.chances import at_most
+from vid2ev.bounds.distance import added
+from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.compiling.compiler import compiled
 from vid2ev.physics.omission import kind_of, light_events, set_anew
-from vid2ev.stream.bounds import added
-from vid2ev.stream.chances import at_most
-from vid2ev.stream.scene import DISTANCE_TAU_S, Omission, Scene
 
 CELL_NS, CELL_PIXELS = 1_000_000, 2048
 

@@ -38,9 +38,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
+from vid2ev.bounds.exposed import Exposed, LevelChange, level_change
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
-from vid2ev.stream.exposed import Exposed, LevelChange, level_change
 
 
 class Shutter(BaseModel, frozen=True, extra="forbid"):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.bounds.scene import QUARTER_EDGES, Scene
 from vid2ev.physics.thresholds import per_nat
-from vid2ev.stream.scene import QUARTER_EDGES, Scene
 
 
 def steepest(scene: Scene, spec: Any) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.bounds.exposed import Change, Exposed
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.electrons import always_clipped, near_full_well
 from vid2ev.physics.fixed_pattern import greatest_gain
@@ -34,7 +35,6 @@ from vid2ev.plan.exposure_sums import (
 )
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
-from vid2ev.stream.exposed import Change, Exposed
 from vid2ev.stream.frames import Frame
 
 WITHOUT: dict[str, dict[str, Any]] = {"exposure": {"blur": False}, "rolling_shutter": {"line_us": 0.0}}

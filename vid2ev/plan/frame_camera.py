@@ -1,7 +1,7 @@
 """The plan of a frame camera: which of its effects a clip calls for.
 
 As for an event camera, `auto` leaves out what costs something and whose bounds together stay within the tolerance, here
-in the distance of `stream.exposed`: 0.01 lets no level of any exposure change by more than 0.029 LSB.  The exposure
+in the distance of `bounds.exposed`: 0.01 lets no level of any exposure change by more than 0.029 LSB.  The exposure
 gives way to the light in the middle of it.  A rolling shutter costs nothing and stays, and so do the range and the
 rounding of the ADC, which make what the camera sends.
 
@@ -18,12 +18,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from vid2ev.bounds.distance import together
+from vid2ev.bounds.exposed import ROUNDING, Exposed, LevelChange
 from vid2ev.physics import adc, electrons, fixed_pattern, shading, shutter
 from vid2ev.plan.plan import TOLERANCE, Plan, Row, check_tolerance, chosen, names_of
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.record import changed
-from vid2ev.stream.bounds import together
-from vid2ev.stream.exposed import ROUNDING, Exposed, LevelChange
 
 
 class FrameEffect(NamedTuple):
@@ -61,7 +61,7 @@ class FrameRow(Row):
 
 @dataclass(frozen=True)
 class FramePlan(Plan):
-    """What of a frame camera is simulated; `distance` is that of `stream.exposed`."""
+    """What of a frame camera is simulated; `distance` is that of `bounds.exposed`."""
 
     @property
     def max_lsb(self) -> float | None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vid2ev.bounds.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, SPREAD, Scene
 from vid2ev.errors import UsageError
 from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
@@ -21,7 +22,6 @@ from vid2ev.physics.thresholds import spread_thresholds, widest
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, SPREAD, Scene
 from vid2ev.stream.still import told_of
 
 BRIGHTNESS_EVERY = 8  # frames

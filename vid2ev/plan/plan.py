@@ -22,6 +22,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
+from vid2ev.bounds.distance import together
+from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.errors import UsageError, nearest
 from vid2ev.physics import (
     bad_pixels,
@@ -40,8 +42,6 @@ from vid2ev.physics.thresholds import spread_of
 from vid2ev.sensors.cis_spec import EFFECTS as OF_FRAMES
 from vid2ev.sensors.record import changed
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream.bounds import together
-from vid2ev.stream.scene import Omission, Scene
 
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
 FEW = 50  # events: their number is what it is said to be to a seventh, the standard deviation

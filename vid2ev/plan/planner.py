@@ -25,7 +25,7 @@ the recording may have to begin again, and beyond `KEPT` all effects are.  A cam
 it ends while it is held, else all is kept.  Effects cannot come and go while a recording is made, not even if each
 chunk of light is measured before the sensors see it.  Where thresholds differ from pixel to pixel or crossing to
 crossing, as in all real sensors, two recordings of a pixel that disagree about one event go on with other levels, and
-an effect that comes back does not bring them together (`stream.scene`: echo).  Let the chance of that be q > 0 in
+an effect that comes back does not bring them together (`bounds.scene`: echo).  Let the chance of that be q > 0 in
 some pixel, however few events it has had: if from then on that pixel alone sees light that changes, the distance of
 the whole tends, with probability q, to that of recordings with nothing in common, though nothing is left out any
 more.  So no bound on what was is one on the whole, unless q is 0 in every pixel.  Of an effect that costs something a

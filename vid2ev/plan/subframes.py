@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from vid2ev.bounds.scene import Omission
 from vid2ev.instants import Instant
 from vid2ev.plan.plan import Row
 from vid2ev.stream.frames import Frame
-from vid2ev.stream.scene import Omission
 from vid2ev.upsample.subframes import KAPPA_PER_PX
 
 NS_PER_PIXEL = 8.0  # of a sub-frame that is carried along the motion, of one thread; 26 for the motion, an interval

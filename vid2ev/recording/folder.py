@@ -29,10 +29,10 @@ from typing import Any, Self
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.formats.eager import EagerFile
 from vid2ev.recording.destination import begun_at, check_folder, partial_of
 from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
 from vid2ev.recording.manifest import is_of_job, read_manifest
-from vid2ev.stream.eager import EagerFile
 from vid2ev.untrusted import read_arrays
 
 FILES = re.compile(  # what a recording holds, and nothing else

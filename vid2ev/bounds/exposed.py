@@ -24,7 +24,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from vid2ev.stream.scene import Kind, Omission
+from vid2ev.bounds.scene import Kind, Omission
 
 ROUNDING = 12.0  # 1 / mean square of the error of rounding [1/LSB^2]
 RARELY = math.log(2000)  # two such chances make 99.9 %

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vid2ev.stream.scene import DISTANCE_TAU_S, QUARTER_EDGES, Scene
+from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Scene
 
 PIXELS_DIFFER = 4.0  # how much more than the mean of its tile a pixel's signals may differ for, where that counts
 

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from vid2ev.stream.scene import Scene
+from vid2ev.bounds.scene import Scene
 
 RARE = math.log(1000)  # a chance of 1 in 1000
 CELLS = 1 << 14

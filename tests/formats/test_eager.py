@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from vid2ev.stream import eager
-from vid2ev.stream.eager import EagerFile, beginner
+from vid2ev.formats import eager
+from vid2ev.formats.eager import EagerFile, beginner
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems begin when they like")
