@@ -81,7 +81,7 @@ def test_other_packets_and_invalid_events_are_passed_over(tmp_path: Path) -> Non
 
 def frame(t: int, pixels: np.ndarray, room: int, valid: int = 1) -> bytes:
     height, width, channels = pixels.shape
-    head = struct.pack("<I8i", channels << 1 | valid, t, t + 9, t + 2, t + 6, width, height, 0, 0)
+    head = struct.pack("<I8i", channels << 1 | valid, t, t + 29, t + 2, t + 6, width, height, 0, 0)
     return (head + pixels.astype("<u2").tobytes()).ljust(36 + 2 * room, b"\0")
 
 

@@ -35,10 +35,13 @@ from vid2ev.formats import describe_events, format_named, open_events, read_even
 from vid2ev.formats.event_file import Picture
 from vid2ev.formats.ros1 import EVENTS, IMAGES
 from vid2ev.formats.ros2 import DEFINITIONS
+from vid2ev.formats.ros_messages import Message, image
 from vid2ev.stream.events import Events
 
 TIMES = times_us()
 KINDS = ("ros1", "ros2")
+ARRAY = "dvs_msgs/msg/EventArray"
+BLUE_FIRST = ("bgr8", "bgra8", "8UC3")
 PACKET = """std_msgs/Header header
 uint32 height
 uint32 width
@@ -262,6 +265,47 @@ def test_words_of_evt3_go_on_in_the_next_packet(tmp_path: Path, kind: str) -> No
     assert events.t.tolist() == [4098, 4095 << 12, (1 << 24) + 7, (1 << 24) + 7]
     assert (events.x.tolist(), events.y.tolist(), events.p.tolist()) == ([4, 5, 6, 8], [3] * 4, [1, 0, 1, 1])
     assert_same(Events.concatenate(read_events(cut)), events)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_message_that_is_stamped_after_its_first_event_begins_with_that(tmp_path: Path, kind: str) -> None:
+    types = types_of(kind)
+    time, header, event, array = (
+        types.types[name]
+        for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", "dvs_msgs/msg/Event", ARRAY)
+    )
+    stamp = header(**({"seq": 0} if kind == "ros1" else {}), stamp=time(5, 0), frame_id="")
+    message = array(stamp, 10, 10, [event(1, 2, time(4, 7000), True)])
+    path = tmp_path / ("late.bag" if kind == "ros1" else "late")
+    bag: Any = rosbag1.Writer(path) if kind == "ros1" else rosbag2.Writer(path, version=9)
+    with bag:
+        connection = bag.add_connection("/dvs/events", ARRAY, typestore=types)
+        content = (types.serialize_ros1 if kind == "ros1" else types.serialize_cdr)(message, ARRAY)
+        bag.write(connection, 10**9, bytes(content))
+    assert open_events(path).start_us == 4_000_007
+
+
+def image_message(cdr: bool, encoding: str, pixels: bytes, width: int, big: int = 0) -> Picture:
+    """A picture of one row, which ends with what is in `pixels` beyond it."""
+    message = Message(cdr)
+    message.header(0, 5_000_006)
+    for number in (1, width):
+        message.number("I", number)
+    message.text(encoding)
+    message.number("B", big)
+    for _ in range(2):
+        message.number("I", len(pixels))
+    return image(message.whole(pixels), cdr)
+
+
+@pytest.mark.parametrize("cdr", [False, True])
+def test_images_of_other_encodings_are_read(cdr: bool) -> None:
+    for big, order in enumerate("<>"):
+        pixels = np.array([0x1234, 0xABCD]).astype(f"{order}u2").tobytes() + b"pad!"
+        assert image_message(cdr, "mono16", pixels, 2, big).pixels.tolist() == [[0x12, 0xAB]]
+    for encoding, seen in (("rgb8", [1, 2, 3]), ("rgba8", [1, 2, 3]), *((name, [3, 2, 1]) for name in BLUE_FIRST)):
+        pixels = bytes([1, 2, 3, 4][: 4 if "a" in encoding else 3])
+        assert image_message(cdr, encoding, pixels, 1).pixels.tolist() == [[seen]]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -65,6 +65,11 @@ def test_evt3_of_a_camera(tmp_path: Path) -> None:
     assert rows(file) == expected and len(file.warnings) == 5  # (again, and nothing is said twice)
 
 
+def test_vectors_of_evt3_move_the_column_on_by_their_length(tmp_path: Path) -> None:
+    words = [0x8002, 0x6000, 0x0007, 0x3805, 0x5001, 0x5001, 0x4001, 0x4001]  # of 8, 8, 12 and 12
+    assert [x for _, x, _, _ in rows(opened(tmp_path, raw("3.0", words, 16), "evt3"))] == [5, 13, 21, 33]
+
+
 def test_evt3_whose_upper_bits_go_back_by_less_than_half_and_whose_rows_are_of_exposures(tmp_path: Path) -> None:
     words = [0x8BB8, 0x6000, 0x0007, 0x2002, 0x85DC, 0x6000, 0x2003, 0x1007, 0x2004]
     file = opened(tmp_path, raw("3.0", words, 16), "evt3")
@@ -219,6 +224,17 @@ def test_a_clock_of_32_bits_is_followed_from_piece_to_piece(pieces: int) -> None
     t, clock = np.cumsum(np.random.default_rng(0).integers(0, 1 << 31, 400)), Unwrapped()
     read = [clock(part) for part in np.array_split((t & 0xFFFFFFFF).astype(np.uint32), pieces)]
     np.testing.assert_array_equal(np.concatenate(read), t)
+
+
+def test_events_that_are_late_where_a_clock_wraps_do_not_wrap_it_again() -> None:
+    turn, clock = 1 << 32, Unwrapped()
+    read = [
+        clock(np.array(part, np.uint32)) for part in ([1, turn - 1], [1, turn - 1], [2, 3, turn - 9, 4], [turn - 2])
+    ]
+    assert np.concatenate(read).tolist() == [
+        *(1, turn - 1, turn + 1, turn - 1),  # (silence of 71 minutes before the first turn; late after it)
+        *(turn + 2, turn + 3, turn - 9, turn + 4, turn - 2),
+    ]
 
 
 def test_nmnist(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid, rays_of
 from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.rig.triangles import draw_quads
 from vid2ev.rig.views import Views, filled_inverse
 
 SOURCE = pinhole()
@@ -134,6 +135,16 @@ def test_holes_are_not_streaked() -> None:
     hole = Views(SOURCE, [(SOURCE, BESIDE)]).see(light, depth_m)[0].light[45:75, 87:94]
     assert np.abs(np.diff(hole, axis=0)).mean() < 0.5 * np.abs(np.diff(light[:, :40], axis=0)).mean()
     assert abs(hole.mean() - 0.5) < 0.1
+
+
+def test_places_within_a_quad_are_those_of_its_perspective() -> None:
+    u, v = (edge.astype(np.float32) for edge in np.meshgrid([0, 8], [0, 8]))
+    inverse = np.array([[1, 2], [1, 2]], np.float32)  # (its right side is at half the distance)
+    ends = np.array([0, 1], np.float32)
+    x, y, seen = np.zeros((9, 9), np.float32), np.zeros((9, 9), np.float32), np.full((9, 9), -1, np.float32)
+    draw_quads(0, 9, u, v, inverse, inverse.copy(), ends, ends, np.zeros((1, 1), bool), np.float32(2), x, y, seen)
+    share = np.arange(9) / 8
+    np.testing.assert_allclose(x, np.broadcast_to(2 * share / (1 + share), (9, 9)), atol=1e-6)
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0, 3.0])

@@ -33,3 +33,8 @@ def test_beyond_the_rim_is_looked_at_on_the_same_surface(inverse: float, one: bo
 def test_surfaces_are_smoothed_apart(inverse: float, one: bool) -> None:
     found = filled([[1.0, -1], [inverse, -1]], [[FAR, HOLE], [NEAR, HOLE]], smoothings=1)[:, 1]
     assert found == pytest.approx([(FAR + NEAR) / 2] * 2 if one else [FAR, NEAR])
+
+
+def test_slivers_beside_a_surface_count_for_little() -> None:
+    found = filled([[1.0, 0.1, -1, 0.1, 0.1, 0.1]], [[5, 9, HOLE, 1, 1, 1]], inset=1)
+    assert found[0, 2] == pytest.approx((0.02 * 9 + 1) / 1.02)  # (9 is between the near surface and the hole)

@@ -38,6 +38,7 @@ def test_half_of_a_way_is_half_of_the_turn_and_half_of_the_line() -> None:
     middle = start.between(end, 0.5)
     np.testing.assert_allclose(rotation_vector_deg(middle.rotation), (0, 40, 0), atol=1e-9)
     np.testing.assert_allclose(middle.translation_m, (1, 0, 1))
+    np.testing.assert_allclose(start.between(end, 0.25).translation_m, (0.5, 0, 1))
     np.testing.assert_allclose(start.between(end, 1).rotation, end.rotation, atol=1e-12)
 
 

@@ -176,8 +176,8 @@ def _unpacked(packet: EventPacket, path: Path) -> Events:
         return _columns(t, high & 0xFFFF, high >> 16 & 0x7FFF, high >> 31)
     if packet.encoding == "libcaer":
         after = high.astype(np.int64)
-        # The time of libcaer has 31 bits: where it goes back, it has begun anew.
-        after[1:] += np.cumsum(after[1:] < after[:-1]) << 31
+        # The time of libcaer has 31 bits: where it goes back by half of that, it has begun anew.
+        after[1:] += np.cumsum(np.diff(after) < -(1 << 30)) << 31
         return _columns(packet.time_base // 1000 + after, low >> 17, low >> 2 & 0x7FFF, low >> 1 & 1)
     raise DataError(
         f"{path} holds events in the encoding '{packet.encoding}'; expected evt3, libcaer_cmp, libcaer or mono, so"

@@ -15,6 +15,7 @@ from vid2ev.stream.events import Events
 
 PIECE = 1 << 20  # bytes read at a time
 ROOM = 32  # events that the word of most events can hold
+LATE_US = 10_000_000  # more than cameras send late, and less than most silences of 71.6 minutes less so much
 
 
 class Sequential:
@@ -65,7 +66,10 @@ class Sequential:
 
 
 class Unwrapped:
-    """A clock of 32 bits, followed beyond its end: from a time to one that is 2**31 us less, it has wrapped."""
+    """A clock of 32 bits, followed beyond its end: from a time to one that is 2**31 us less, it has wrapped.
+
+    An event of up to LATE_US before that which comes after it is late, and not of a turn of the clock later.
+    """
 
     def __init__(self) -> None:
         self._last, self._turns = 0, 0
@@ -73,8 +77,10 @@ class Unwrapped:
     def __call__(self, t: np.ndarray) -> np.ndarray:
         """int64 times that follow those of the calls before."""
         t = t.astype(np.int64)
-        turns = np.diff(t, prepend=self._last) < -(1 << 31)
+        steps = np.diff(t, prepend=self._last)
+        turns = (steps < -(1 << 31)).astype(np.int64) - (steps > (1 << 32) - LATE_US)
         starts = self._turns + (np.cumsum(turns) if turns.any() else np.zeros(1, np.int64))
+        starts -= np.minimum(np.minimum.accumulate(starts), 0)  # (before the first turn there is silence, and no other)
         if len(t):
             self._last, self._turns = int(t[-1]), int(starts[-1])
         return t + (starts << 32)
