@@ -142,7 +142,9 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
         (["noise.raw", "out.h5"], 1, "no event file"),
         (["whole.h5", "whole.h5/out.h5"], 1, "cannot be written"),
         (["wide.h5", "out.raw"], 2, "cannot hold 4000x3 pixels, at most 2048x2048; choose --format hdf5"),
-        (["long.h5", "out.h5", "--format", "v2e-hdf5"], 2, "minutes"),
+        (["long.h5", "out.h5", "--format", "v2e-hdf5"], 2, "hold 8589.934592 s, at most 4294.967295 s"),
+        (["edge.npz", "out.h5"], 2, "65536x2 pixels, at most 65535x65535; choose --format npz"),
+        (["edge.npz", "out.aedat4"], 2, "choose --format npz"),
         (["far.csv", "out.h5"], 1, "11,574 days as hdf5 would take"),
         (["far.csv", "out.raw", "--format", "evt3"], 1, "choose --format aedat4"),
     ],
@@ -157,6 +159,7 @@ def test_what_cannot_be_is_one_sentence(recording: Path, arguments: list[str], e
     for name, size, t in (("wide.h5", (4000, 3), 0), ("long.h5", (1, 1), 2**33)):
         events = Events(np.array([0, t]), one, one, one.astype(np.uint8))
         write(Path(name), Recording(size, 0, t, 2, lambda events=events: iter([events])))
+    np.savez("edge.npz", t=[0], x=[65535], y=[1], p=[1])
     before = {path.name for path in Path().iterdir()}
     result = run(*arguments)
     assert result.exit_code == exit_code and sentence in result.stderr, result.output

@@ -222,7 +222,7 @@ class Filmed:
     """An event file with frames: frame k, at 50 ms k, is gray or coloured at level 40 k."""
 
     warnings: tuple[str, ...] = ("a cable was loose",)
-    labelled, has_frames = False, True
+    says_start, labelled, has_frames = True, False, True
 
     def __init__(self, size: tuple[int, int], colour: bool = False):
         self.path, self.size, self.start_us, self.colour = Path("davis.aedat4"), size, 0, colour

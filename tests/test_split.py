@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,7 +16,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from vid2ev import UsageError, convert
+from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster.task import Task
 from vid2ev.commands import main
 from vid2ev.conversion import Paused
@@ -91,7 +93,7 @@ def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(tmp_path:
     parts = [tmp_path / "0.csv", tmp_path / "1.csv"]
     for part, text in zip(parts, texts, strict=True):
         part.write_text(text)
-    mount: Any = SimpleNamespace(size=(8, 2), sensor=SimpleNamespace(spec=DvsSpec()))
+    mount: Any = SimpleNamespace(size=(8, 2), within="", sensor=SimpleNamespace(spec=DvsSpec()))
     frames = [Frame(np.empty((2, 8)), t_us * 1000) for t_us in (10, 20, 25, 30)]
     first, second = Replayed(mount, parts, False), Replayed(mount, parts, False)
     sent = [(events.t.tolist(), events.x.tolist()) for events in first.see_all(frames[:2])]
@@ -134,6 +136,48 @@ def test_what_is_interrupted_anywhere_goes_on_to_the_same_bytes(clip: str, tmp_p
     for name in FILES[:2]:
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
     assert {path.name for path in tmp_path.iterdir()} == {"whole", "made"}
+
+
+@pytest.mark.parametrize("kind", ["tiles", "approximate"])
+def test_a_seed_that_is_drawn_is_that_of_all_parts_and_of_those_made_later(
+    clip: str, tmp_path: Path, kind: str
+) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "preview": False}
+
+    def only_one(tasks: Sequence[Task]) -> None:
+        tasks[0].call(lambda _: None)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        convert_split(clip, tmp_path / "made", kind, 2, only_one, seed=None, **options)
+    seed = json.loads((tmp_path / "made.parts/0-of-2/manifest.json").read_text())["seed"]
+    made = convert_split(clip, tmp_path / "made", kind, 2, here, resume=True, seed=None, **options)
+    assert made["seed"] == seed
+    convert_split(clip, tmp_path / "again", kind, 2, here, seed=seed, **options)
+    assert (tmp_path / "made/events.h5").read_bytes() == (tmp_path / "again/events.h5").read_bytes()
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone", "no manifest"])
+def test_a_part_that_is_damaged_is_made_again_once_it_is_removed(clip: str, tmp_path: Path, damage: str) -> None:
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "preview": False, "resume": True}
+    part = tmp_path / "made.parts" / "1-of-2"
+
+    def damaged(tasks: Sequence[Task]) -> None:
+        here(tasks)
+        if damage == "no manifest":
+            (part / "manifest.json").write_text("")
+            here(tasks)
+        elif damage == "gone":
+            (part / "events.h5").unlink()
+        else:
+            os.truncate(part / "events.h5", (part / "events.h5").stat().st_size // 2)
+
+    with pytest.raises(DataError, match=r"1-of-2, a part that was made, is damaged .*; remove it and --resume$"):
+        convert_split(clip, tmp_path / "made", "tiles", 2, damaged, **options)
+    shutil.rmtree(part)
+    convert_split(clip, tmp_path / "made", "tiles", 2, here, **options)
+    convert(clip, tmp_path / "whole", **options)
+    assert (tmp_path / "made/events.h5").read_bytes() == (tmp_path / "whole/events.h5").read_bytes()
 
 
 @pytest.mark.parametrize("name", ["thesis.txt", "0-of-2", "notes/thesis.txt"])

@@ -7,12 +7,14 @@ ordered by (t, y, x), so there is one way to put them together.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import read_events
 from vid2ev.mounts import Mount
 from vid2ev.physics.fixed_rate import EventFrames
@@ -39,7 +41,7 @@ class Made:
 
     def sensor(self, mount: Mount, labels: bool) -> Dvs:
         """What sends the events of a camera; to a track it is the camera."""
-        return Replayed(mount, [folder / mount.within for folder in self.folders], labels)  # type: ignore[return-value]
+        return Replayed(mount, self.folders, labels)  # type: ignore[return-value]
 
     def probed(self, mount: Mount, pixels: Sequence[tuple[int, int]]) -> Iterator[bytes]:
         """The lines of probe.csv of a camera."""
@@ -56,8 +58,23 @@ class Made:
     @property
     def subframes(self) -> tuple[int, int]:
         """How many there were, and how many intervals were limited."""
-        counts = [_counts(read_manifest(folder)) for folder in (self.folders if self.in_time else self.folders[:1])]
+        counts = [_counts(_manifest(part)) for part in (self.folders if self.in_time else self.folders[:1])]
         return sum(each["subframes"] for each in counts), sum(each["limited_intervals"] for each in counts)
+
+
+@contextmanager
+def reading(part: Path) -> Iterator[None]:
+    """What is wrong with the recording of a part is said with how to go on: DataError."""
+    try:
+        yield
+    except (DataError, UsageError) as error:
+        raise DataError(f"{part}, a part that was made, is damaged ({error}); remove it and --resume") from error
+
+
+def _manifest(part: Path, within: str = "") -> dict[str, Any]:
+    """The manifest of a part, or of one of its cameras."""
+    with reading(part):
+        return read_manifest(part / within)
 
 
 def _counts(manifest: dict[str, Any]) -> dict[str, int]:
@@ -71,17 +88,17 @@ class Replayed:
     at_once = 1
     slept = (0, 0)
 
-    def __init__(self, mount: Mount, folders: Sequence[Path], labels: bool):
+    def __init__(self, mount: Mount, parts: Sequence[Path], labels: bool):
         assert isinstance(mount.sensor.spec, DvsSpec)
         self.size, self.spec, self.labels = mount.size, mount.sensor.spec, labels
-        self._mount, self._folders = mount, folders
-        self._parts = [_Stream(folder) for folder in folders]
+        self._mount, self._folders = mount, parts
+        self._parts = [_Stream(part, mount.within) for part in parts]
         self._frames = EventFrames(self.spec, *self.size, labels) if self.spec.frame_rate_hz > 0 else None
 
     @property
     def counts(self) -> dict[str, int]:
         """See `Dvs.counts`."""
-        of_parts = [read_manifest(folder)["counts"] for folder in self._folders]
+        of_parts = [_manifest(part, self._mount.within)["counts"] for part in self._folders]
         names = ("on", "off", "swallowed", "capped", "not_finite")
         return {name: sum(counts[name] for counts in of_parts) for name in names}
 
@@ -111,7 +128,10 @@ class Replayed:
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Take up a state."""
         origin_us = int(state["origin"]) if self._frames else None
-        self._parts = [_Stream(folder, int(sent)) for folder, sent in zip(self._folders, state["sent"], strict=True)]
+        self._parts = [
+            _Stream(part, self._mount.within, int(sent))
+            for part, sent in zip(self._folders, state["sent"], strict=True)
+        ]
         if self._frames:
             self._frames.origin_us = origin_us
 
@@ -129,11 +149,11 @@ class Replayed:
 
 
 class _Stream:
-    """The events of one part, in their order; the first `sent` are left out."""
+    """The events of a camera in one part, in their order; the first `sent` are left out."""
 
-    def __init__(self, folder: Path, sent: int = 0):
-        self.sent = 0
-        self._blocks: Iterator[Events] = read_events(folder, block=BLOCK)
+    def __init__(self, part: Path, within: str, sent: int = 0):
+        self.sent, self._part = 0, part
+        self._blocks: Iterator[Events] = read_events(part / within, block=BLOCK)
         self._held = Events.empty()
         while self.sent < sent:
             self._fill()
@@ -152,7 +172,8 @@ class _Stream:
     def _fill(self) -> bool:
         """Whether there are events, after reading some if need be."""
         while not len(self._held):
-            block = next(self._blocks, None)
+            with reading(self._part):
+                block = next(self._blocks, None)
             if block is None:
                 return False
             self._held = block

@@ -29,10 +29,11 @@ from vid2ev.conversion import Report, check_outputs, convert, telling
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import BLOCK
 from vid2ev.outputs import Outputs
-from vid2ev.parts import Made
+from vid2ev.parts import Made, reading
 from vid2ev.recipe import Recipe
 from vid2ev.recording.disk import lock, undisturbed, unlock, writing
 from vid2ev.recording.folder import begun_job, check_free
+from vid2ev.recording.manifest import read_manifest
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
 from vid2ev.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
@@ -65,7 +66,7 @@ def convert_split(
     check_parts_free(directory, overwrite, resume)
     if resume and directory.exists() and not _begun(parts_of(directory)):
         return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
-    parts, notes = _parts(video, kind, count, dict(options), look)
+    parts, notes = _parts(video, kind, count, options | {"seed": options.get("seed") or 0}, look)
     with _held(directory) as beside:
         check_parts_free(directory, overwrite, resume)  # (once more: another may have written there until now)
         if overwrite and not resume:
@@ -145,11 +146,17 @@ def parts_of(directory: Path) -> Path:
 def begun_part(directory: Path) -> dict[str, Any]:
     """The job of the first part of a recording, if it was begun; otherwise empty."""
     found = sorted(parts_of(directory).glob("0-of-*"))
-    return begun_job(found[0].with_name(found[0].name.removesuffix(".partial"))) if found else {}
+    if not found:
+        return {}
+    with reading(found[0]):
+        return begun_job(found[0].with_name(found[0].name.removesuffix(".partial")))
 
 
 def _part(tell: Tell, video: str, folder: Path, options: dict[str, Any]) -> None:
     """The recording of a part, as a task."""
+    if folder.exists():
+        with reading(folder):
+            read_manifest(folder)
     convert(video, folder, resume=True, report=telling(tell), preview=False, **options)
 
 

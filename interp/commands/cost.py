@@ -34,9 +34,10 @@ def rebuild(
     from interp.cost.measure import rebuilding
     from interp.cost.shown import plot, table
     from interp.evaluate.simulated import Simulated
+    from vid2ev.commands.progress import option
 
     if strange := sorted({*given} - OF_BOTH - OF_OUTPUT):
-        raise UsageError(f"--{strange[0].replace('_', '-')} is of conversions; leave it out, or --rebuild")
+        raise UsageError(f"{option(strange[0])} is of conversions; leave it out, or --rebuild")
     edits = {key: value for key in OPTIONS if (value := options.get(key)) is not None}
     simulated = Simulated.of(sensor if "sensor" in given else "clean", overrides, seed, **edits)
     found = rebuilding(

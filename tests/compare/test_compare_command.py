@@ -138,6 +138,28 @@ def test_what_says_no_beginning_is_laid_on_another_by_its_first_event(name: str)
         assert found["distance"] == 0 and found["reference_shifted_us"] == shift_us and found["events"] == 1000
 
 
+def test_what_could_say_its_beginning_and_does_not_is_laid_on_another_by_its_first_event() -> None:
+    events = busy(1000, SIZE)
+    here = write(events, "here.h5")
+    later = moved(events, 20_000_000)
+    columns = {name: getattr(later, name) for name in ("t", "x", "y", "p")}
+    np.savez("later.npz", size=SIZE, **columns)
+    np.savez("begun.npz", size=SIZE, start_us=0, **columns)  # (says one, long before its first event)
+    np.savez("long.npz", size=SIZE, start_us=0, **columns | {"t": later.t + 10**12})
+    for path, shift_us in (("later.npz", -20_000_000), ("begun.npz", 0), ("long.npz", -20_000_000 - 10**12)):
+        found = compare(here, path, "--align", "start")
+        assert found["reference_shifted_us"] == shift_us
+        assert (found["distance"] == 0) == (shift_us != 0)
+
+
+def test_a_last_event_at_the_beginning_of_the_clock_is_one() -> None:
+    Path("early.csv").write_text("t,x,y,p\n-5,1,1,1\n0,2,2,0\n")
+    found = compare("early.csv", "early.csv")
+    assert (found["events"], found["reference_left_out"]) == (2, 0)
+    reformat("early.csv", "early.npz")
+    assert np.load("early.npz")["t"].tolist() == [-5, 0]
+
+
 def test_sensors_of_different_sizes_are_refused_but_not_a_file_that_does_not_say() -> None:
     events = busy(100, (10, 10))
     small, large = write(events, "small.h5", (10, 10)), write(events, "large.h5", (12, 10))

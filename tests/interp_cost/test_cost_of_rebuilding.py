@@ -123,6 +123,7 @@ def test_frames_smaller_than_the_window_of_ssim_have_none(quick: None, tmp_path:
         (["--gaps", "2"], "--gaps is for --rebuild"),
         (["--rebuild", "8", "--upsample", "none"], "--upsample is of conversions"),
         (["--rebuild", "8", "--budget", "vR=1"], "--budget is of conversions"),
+        (["--rebuild", "8", "--duration", "0.1"], "error: --duration is of conversions"),
         (["--rebuild", "8", "--network", "nobody"], "no such file"),
         (["--rebuild", "1000"], "no two key frames with 999 frames between them"),
     ],

@@ -124,6 +124,12 @@ def pass_bar(quiet: bool) -> AbstractContextManager[Report]:
     return counting(quiet, PASSES)
 
 
+def option(name: str) -> str:
+    """An option of the command that runs, as a command line has it, by the name that the program knows it by."""
+    command = click.get_current_context().command
+    return next(max(each.opts, key=len) for each in command.params if each.name == name)
+
+
 def given() -> set[str]:
     """The options of the command that runs which were given on its command line."""
     context = click.get_current_context()

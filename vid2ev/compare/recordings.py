@@ -23,7 +23,7 @@ from vid2ev.compare.comparison import Comparison, Tally
 from vid2ev.compare.matching import WINDOW_US
 from vid2ev.compare.statistics import Statistics, statistics_of
 from vid2ev.errors import UsageError
-from vid2ev.formats import open_events, recognise, survey
+from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.stream.events import Events
 
@@ -106,7 +106,7 @@ def compare_recordings(
     """Compare an event file or recording's folder with a reference; both are read, whatever their formats.
 
     align       "clock": times are on one clock; "start": the beginnings are laid on one another, or the first events
-                where a format says no beginning
+                where a file says no beginning
     statistics  whether to gather those of each recording alone, too; the files are read once more
     report      called with a recording of as many events as will be read, and how many were read
 
@@ -141,9 +141,11 @@ def compare_recordings(
 
 
 def _beginnings(sides: tuple[_Side, _Side], files: tuple[EventFile, EventFile]) -> list[int]:
-    """When each begins by its own clock: as it says, or with its first event where one of them cannot say."""
-    kinds = [recognise(file.path) for file in files]
-    said = all(kind is None or "start" in kind.keeps for kind in kinds)
+    """When each begins by its own clock: as it says, or with its first event where one of them does not say, or counts
+    from an instant long before that."""
+    said = all(
+        file.says_start and file.start_us == side.recording.start_us for side, file in zip(sides, files, strict=True)
+    )
     firsts = [None if said else next(side.recording.blocks(), None) for side in sides]
     return [
         side.recording.start_us if first is None else int(first.t[0]) for side, first in zip(sides, firsts, strict=True)

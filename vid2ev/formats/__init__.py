@@ -146,7 +146,11 @@ def survey(file: EventFile) -> Recording:
     if first_us is not None and first_us - start_us > LONG_SILENCE_US:
         start_us = first_us
     frame_us = getattr(file, "frame_us", None)
-    ends = [start_us, disorder.latest_us or start_us, *(frame_us[-1:].tolist() if frame_us is not None else ())]
+    ends = [
+        start_us,
+        start_us if disorder.latest_us is None else disorder.latest_us,
+        *(frame_us[-1:].tolist() if frame_us is not None else ()),
+    ]
 
     def blocks() -> Iterator[Events]:
         return regrouped(ordered(file.events(), disorder.depth_us))
@@ -175,14 +179,18 @@ def check_holds(
     _check_idle(kind, duration_us or 0)
     if kind.clock_us and start_us is not None:
         _check_clock(kind, kind.clock_us, start_us, start_us + (duration_us or 0))
-    limits = kind.largest
-    if limits and (size[0] > limits[0] or size[1] > limits[1]):
-        what, most = f"{size[0]}x{size[1]} pixels", f"{limits[0]}x{limits[1]}"
+    if kind.largest and not _has_room(kind, size):
+        what, most = f"{size[0]}x{size[1]} pixels", f"{kind.largest[0]}x{kind.largest[1]}"
     elif kind.longest_us is not None and duration_us is not None and duration_us > kind.longest_us:
-        what, most = f"{duration_us / 6e7:.4g} minutes", f"{kind.longest_us / 6e7:.4g} minutes"
+        what, most = f"{duration_us / 1e6:.10g} s", f"{kind.longest_us / 1e6:.10g} s"
     else:
         return
-    raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format hdf5")
+    holds = "hdf5" if _has_room(format_named("hdf5"), size) else "npz"
+    raise UsageError(f"format {kind.name} cannot hold {what}, at most {most}; choose --format {holds}")
+
+
+def _has_room(kind: Format, size: tuple[int, int]) -> bool:
+    return kind.largest is None or (size[0] <= kind.largest[0] and size[1] <= kind.largest[1])
 
 
 def _check_clock(kind: Format, clock_us: tuple[int, int], first_us: int, last_us: int) -> None:

@@ -58,7 +58,7 @@ class Aedat3Events:
     """
 
     labelled = False
-    start_us = 0
+    start_us, says_start = 0, False
 
     def __init__(self, path: Path):
         self.path = path

@@ -76,8 +76,10 @@ class Aedat4Events:
         self.has_frames = bool(frames)
         self.size = _size(about)
         self._camera = about.get("source")
-        first = None if _number(about.get(START)) is not None else next(self._raw_events(), None)
-        self.start_us = int(first["t"][0]) if first is not None else _number(about.get(START)) or 0
+        start_us = _number(about.get(START))
+        first = next(self._raw_events(), None) if start_us is None else None
+        self.start_us = int(first["t"][0]) if first is not None else start_us or 0
+        self.says_start = start_us is not None
 
     def describe(self) -> dict[str, Any]:
         """Camera and compression."""

@@ -44,7 +44,8 @@ class DatEvents(Sequential):
         header = _header(head)
         if header is None:
             raise DataError(f"{path} does not begin as a DAT file of CD events does; expected one")
-        self.size, self.start_us, self._header = header.size, header.start_us, header
+        self.size, self.start_us, self.says_start = header.size, header.start_us or 0, header.start_us is not None
+        self._header = header
         self._bits = BITS.get(header.fields.get("version", "2"), BITS["2"])
 
     def describe(self) -> dict[str, Any]:

@@ -58,6 +58,7 @@ class EventFile(Protocol):
     path: Path
     size: tuple[int, int] | None  # (width, height) [px] if the file states it
     start_us: int  # the instant from which the file counts, on the clock of its source; 0 if it does not say
+    says_start: bool  # whether it does
     labelled: bool  # whether its events have labels
     has_frames: bool  # whether there are frames beside the events
     warnings: list[str]  # what a person should know, one sentence each; more may come while the events are read

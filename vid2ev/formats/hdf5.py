@@ -58,7 +58,8 @@ class Hdf5Events:
         self.path = path
         self.warnings: list[str] = []
         with opened(path, _check) as file:
-            self.start_us = int(file["t_offset"][()]) if "t_offset" in file else 0
+            self.says_start = "t_offset" in file
+            self.start_us = int(file["t_offset"][()]) if self.says_start else 0
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self.labelled = "label" in file["events"]
             self.frame_us = file["frames/t"][:] + self.start_us if "frames/t" in file else None

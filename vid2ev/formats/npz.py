@@ -55,7 +55,7 @@ class NpzEvents(Sequential):
             self._types = {name: str(array.dtype) for name, (array, _) in columns.items()}
             size, start = (_small(arrays.get(name), count) for name, count in (("size", 2), ("start_us", 1)))
             self.size = (size[0], size[1]) if size and min(size) > 0 else None
-            self.start_us = start[0] if start else 0
+            self.start_us, self.says_start = start[0] if start else 0, bool(start)
 
     def describe(self) -> dict[str, Any]:
         """The types of the arrays."""

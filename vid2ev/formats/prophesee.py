@@ -52,9 +52,10 @@ class Header(NamedTuple):
         return (width, height) if width and height else None
 
     @property
-    def start_us(self) -> int:
-        """The instant from which times count; 0 if it is not there."""
-        return int(_number(r"(-?\d{1,18})", self.fields.get("start_us", self.fields.get("t0", ""))) or 0)
+    def start_us(self) -> int | None:
+        """The instant from which times count, if it is there."""
+        found = _number(r"(-?\d{1,18})", self.fields.get("start_us", self.fields.get("t0", "")))
+        return None if found is None else int(found)
 
 
 def read_header(head: bytes) -> Header | None:
@@ -82,7 +83,8 @@ class RawEvents(Sequential):
             header = read_header(file.read(HEAD))
         if header is None or header.version not in kinds:
             raise DataError(f"{path} has no header that says EVT {' or '.join(kinds)}; expected a RAW file")
-        self.size, self.start_us, self._header = header.size, header.start_us, header
+        self.size, self.start_us, self.says_start = header.size, header.start_us or 0, header.start_us is not None
+        self._header = header
         dtype, self._decoder = kinds[header.version]
         self._dtype = np.dtype(dtype).newbyteorder(">" if header.fields.get("endianness") == "big" else "<")
 

@@ -72,7 +72,7 @@ class RosEvents:
             self.has_frames = self._images is not None
             self.size: tuple[int, int] | None = None
             self._encoding: str | None = None
-            self.start_us = 0
+            self.start_us, self.says_start = 0, False
             self._look()
 
     def describe(self) -> dict[str, Any]:
@@ -105,7 +105,7 @@ class RosEvents:
             return
         first = next((int(events.t[0]) for events in self._decoded() if len(events)), stamp_us or 0)
         near = stamp_us is not None and first - DAY_US <= stamp_us <= first
-        self.start_us = stamp_us if near and stamp_us is not None else first
+        self.start_us, self.says_start = stamp_us if near and stamp_us is not None else first, near
 
     def _messages(self) -> Iterator[EventArray | EventPacket]:
         decode = event_array if KINDS[self._topic.type] == "array" else event_packet

@@ -22,7 +22,7 @@ class Sequential:
     """What such files have in common; a format says in `_decoded` how its events are found."""
 
     size: tuple[int, int] | None = None
-    start_us = 0
+    start_us, says_start = 0, False
     labelled = False
     has_frames = False
 

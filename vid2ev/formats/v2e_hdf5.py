@@ -39,7 +39,7 @@ class V2eEvents(Sequential):
     def __init__(self, path: Path):
         super().__init__(path)
         with opened(path, _check) as file:
-            self.start_us = int(file.attrs.get("start_us", 0))
+            self.start_us, self.says_start = int(file.attrs.get("start_us", 0)), "start_us" in file.attrs
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self._shape = file["events"].shape
             self._dtype = str(file["events"].dtype)

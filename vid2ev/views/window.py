@@ -47,7 +47,7 @@ class _Window:
     def __init__(self, file: EventFile, start_us: int, stop_us: int | None, as_seen: bool):
         self._file, self.start_us, self._stop_us, self._as_seen = file, start_us, stop_us, as_seen
         self.path, self.size, self.labelled, self.has_frames = file.path, file.size, file.labelled, file.has_frames
-        self.warnings, self.describe = file.warnings, file.describe
+        self.says_start, self.warnings, self.describe = True, file.warnings, file.describe
         known: np.ndarray | None = getattr(file, "frame_us", None)
         self.frame_us = None if known is None else known[(known >= start_us) & ~self._is_later(known)]
 
