@@ -27,7 +27,7 @@ def card_text(facts: dict[str, Any]) -> str:
         "Scenes": facts["scenes"],
         "CIS fps": f"{facts['cis_fps']:g}",
         "Interpolated fps": f"{facts['interpolated_fps']:g}",
-        "Samples": f"{facts['samples']} ({spec['frames']} CIS frames a scene)",
+        "Samples": f"{facts['samples']} ({_keys(facts)} CIS frames a scene)",
         "DVS/CIS disparity": f"<= {facts['disparity_mm']:g} mm" if facts["disparity_mm"] else "0 mm",
         "Events": facts["events"],
         "Sensors": sensors_of(spec),
@@ -52,6 +52,12 @@ def sensors_of(spec: dict[str, Any]) -> str:
     if spec["preset"] == "paper":
         return "those of the paper"
     return f"drawn anew for every {'video' if spec['videos'] else 'scene'}"
+
+
+def _keys(facts: dict[str, Any]) -> str:
+    """How many frames scenes have of their frame camera; parts of films have as many as there is room for."""
+    least, most = (extreme(scene["key_frames"] for scene in facts["of_scenes"].values()) for extreme in (min, max))
+    return f"{least} to {most}" if least < most else str(least)
 
 
 def _used(facts: dict[str, Any]) -> str:

@@ -70,7 +70,9 @@ class Drawn(Dataset[Sample]):
             raise IndexError(index)
         self.pool.step(index)
         clip, draw = drawn_clip(self.pool, self.settings, index)
-        return tensors(clip, self.pool.settings) | self.truth(clip, draw)
+        sample = tensors(clip, self.pool.settings) | self.truth(clip, draw)
+        # (networks add up in the order of memory, which that of processes is, too, and so does not depend on them)
+        return {name: each.contiguous() for name, each in sample.items()}
 
     def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
         """What else a sample has of its clip."""

@@ -46,7 +46,8 @@ def choice(
     """
     if name and network:
         raise UsageError(f"--method {name} and --network {network} each say what interpolates; leave out one of them")
-    network, why = pretrained.path_of(network) if network else None, "as asked"
+    asked, why = f"network '{network}'" if network else f"method '{name}'", "as asked"
+    network = pretrained.path_of(network) if network else None
     if not (name or network):
         # (of frames alone there is a network, too, but it does not beat optical flow; and the one with events has not
         # learnt from coarse ones, of which `guided` makes 1 dB more)
@@ -57,7 +58,7 @@ def choice(
         why = f"{best}, since {seen}"
     method = open_method(str(network or name), device, running)
     if method.needs_events and not events:
-        raise UsageError(f"method '{method.name}' needs events, and {where} has none; choose flow, or leave it out")
+        raise UsageError(f"{asked} needs events, and {where} has none; choose --method {FALLBACK}, or leave it out")
     about: dict[str, Any] = {"method": method.name}
     if network:
         about |= {"weights": str(network), "sha256": sha256(network), **running.describe()}

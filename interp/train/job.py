@@ -96,7 +96,8 @@ class Job(BaseModel):
         asked = _by_part(settings)
         network, size = network_and_size(network, size, starts)
         options = (network_of(starts[WHOLE])[2] if WHOLE in starts else {}) | asked["network"]
-        spec_of(network, size, **options)
+        if getattr(spec_of(network, size, **options), "colours", 3) != 3:
+            raise UsageError("network.colours = 1: training has frames of three colours; leave it out")
         check_frozen(network, size, options, starts)
         clips = _clip_defaults(network, videos, recordings) | asked["clips"]
         recipe = (RECURRENT if network in SEQUENTIAL else {}) | asked["recipe"]

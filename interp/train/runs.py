@@ -55,6 +55,7 @@ def run(
     folder = RunFolder(path, job.kept(), resume, machines.first, starts)
     try:
         if resume and (done := folder.finished()) is not None:
+            folder.forget_clips()  # (where it was killed just as it was done)
             with as_stated(folder.path / FINISHED):
                 return told.outcome_of(done)
         if resume:

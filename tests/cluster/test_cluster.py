@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import shared_tasks as made
 
-from vid2ev import UsageError, convert
+from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster import workers as workers_module
 from vid2ev.cluster.processes import processes
 from vid2ev.cluster.task import Task, share_of
@@ -46,6 +46,11 @@ def test_processes_do_not_begin_what_is_queued_where_something_goes_wrong(
             submit(os.mkdir, tmp_path / str(number))
         raise error
     assert (tmp_path / "first").exists() and len(list(tmp_path.iterdir())) < 5  # (a few are on their way already)
+
+
+def test_a_process_that_is_killed_is_one_sentence() -> None:
+    with pytest.raises(DataError, match=r"want of memory as a rule; .* --resume"), processes(2) as submit:
+        submit(os.kill, submit(os.getpid).result(), signal.SIGKILL).result()
 
 
 def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(

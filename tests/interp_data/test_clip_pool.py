@@ -213,6 +213,7 @@ def test_counts_of_cameras_that_stand_elsewhere_lie_on_the_frames(tmp_path: Path
     for index in range(20):
         assert samples[index]["off_on"].shape == (2, 32, 24, 24)
         assert samples[index]["off_on"].dtype == torch.float16
+        assert all(each.is_contiguous() for each in samples[index].values())
 
 
 def test_sequences_of_hdr_light_are_clipped_as_the_paper_says(tmp_path: Path) -> None:
@@ -221,6 +222,8 @@ def test_sequences_of_hdr_light_are_clipped_as_the_paper_says(tmp_path: Path) ->
     for index in range(12):
         one = sequences[index]
         assert one["truth"].shape == one["clipped"].shape == (9, 3, 24, 24)
+        # (as they come out of the memory that workers share: sums of networks go by the order of memory)
+        assert all(each.is_contiguous() for each in one.values())
         codes = one["clipped"] * 1023
         assert (codes - codes.round()).abs().max() < 1e-3 and codes.min() >= 0 and codes.max() <= 1023
         # Where codes are in the midst of their range, light is a straight line of them: slope 15 to 60, noise 5.2 LSB.

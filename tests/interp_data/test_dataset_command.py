@@ -161,9 +161,10 @@ def test_the_card_counts_the_videos_that_there_are_scenes_of(film: Path, count: 
     facts = {
         "spec": spec.model_dump(mode="json"), "versions": {"vid2ev": "1"}, "scenes": len(scenes), "samples": 0,
         "cis_fps": 30.0, "interpolated_fps": 240.0, "events": 0, "disparity_mm": 0.0, "left_out": unusable,
-        "of_scenes": {scene.name: {} for scene in scenes},
+        "of_scenes": {scene.name: {"key_frames": 4 + (count is None and k == 0)} for k, scene in enumerate(scenes)},
     }  # fmt: skip
-    assert f"| Source | {said}" in card_text(facts)
+    card = card_text(facts)
+    assert f"| Source | {said}" in card and f"({'4 to 5' if count is None else 4} CIS frames a scene)" in card
 
 
 def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -230,7 +230,7 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--hdr-network", "nothing"], 2, "none of those that come"),
         (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
         (["a", "--network", "hdr.safetensors"], 2, "rebuilds no frames"),
-        (["a", "--network", "events.safetensors"], 2, "needs events"),
+        (["a", "--network", "events.safetensors"], 2, "network 'events.safetensors' needs events"),
         (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
         (["b", "--hdr-network", "events.safetensors"], 2, "network hdr"),
         (["b", "--hdr-network", "grey.safetensors"], 2, "these have colours"),

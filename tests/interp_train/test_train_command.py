@@ -86,6 +86,7 @@ def test_a_run_that_is_finished_says_so_without_its_clips(monkeypatch: pytest.Mo
     made = run(*FEW, "-o", "run", "--json")
     before = {path: path.stat().st_mtime_ns for path in Path("run").rglob("*") if path.is_file()}
     monkeypatch.setattr(runs, "feed_of", lambda *_: pytest.fail("clips are made"))
+    (Path("run/clips") / "left").mkdir(parents=True)  # (by a run that was killed just as it was done)
     again = run("-o", "run", "--resume", "--json")
     assert again.exit_code == 0 and again.output == made.output
     assert run("-o", "run", "--resume").output.startswith("run: step 3 of 3\nweights.safetensors: ")
