@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -48,6 +49,15 @@ def test_depth_reads_back_to_the_bit(tmp_path_factory: pytest.TempPathFactory, s
     depth[::3, ::2] = np.nan
     write_depth(path, depth)
     np.testing.assert_array_equal(read_depth(path), depth)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names of files are text there")
+@pytest.mark.parametrize("suffix", [".npy", ".exr", ".png"])
+def test_depth_in_a_folder_whose_name_is_no_text_reads_back(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / os.fsdecode(b"of \xff") / f"depth{suffix}"
+    path.parent.mkdir()
+    write_depth(path, np.full((2, 3), 4, np.float32), 0.5)
+    assert np.array_equal(read_depth(path), np.full((2, 3), 4)) and {*path.parent.iterdir()} >= {path}
 
 
 @pytest.mark.parametrize("m_per_code", [0.001, 1 / 256, 0.1])

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.light.exr_writing import write_exr
 from vid2ev.recording.disk import whole_file, whole_path, write_npy
 from vid2ev.recording.truth_arrays import (
     LARGEST,
@@ -73,13 +74,8 @@ def _read_npy(path: Path) -> np.ndarray:
 
 
 def _write_exr(path: Path, depth: np.ndarray) -> None:
-    library = openexr(path)
-    file = library.File({"compression": library.ZIP_COMPRESSION}, {"Z": depth})
     with whole_path(path) as beside:
-        try:
-            file.write(str(beside))
-        except RuntimeError as error:  # (of the library, for whatever the disk says)
-            raise OSError(f"{path} cannot be written") from error
+        write_exr(beside, {"Z": depth})
 
 
 def _read_exr(path: Path) -> np.ndarray:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.light.exr_writing import write_exr
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.untrusted import openexr
 
@@ -45,10 +46,7 @@ def _write_tiff(light: np.ndarray, path: Path) -> None:
 
 
 def _write_exr(light: np.ndarray, path: Path) -> None:
-    channels = {name: np.ascontiguousarray(light[..., k], np.float32) for k, name in enumerate("RGB")}
-    exr = openexr(path)
-    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
-    exr.File(header, channels).write(str(path))
+    write_exr(path, {name: light[..., k] for k, name in enumerate("RGB")})
 
 
 def _write(codes: np.ndarray, path: Path) -> None:
