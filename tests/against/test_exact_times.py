@@ -255,7 +255,7 @@ def clips(draw):
     return pixel, t_ns, np.array(light, np.float32).reshape(frames, 1, 2)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, derandomize=True)
 @given(clips())
 def test_any_piecewise_linear_light(clip):
     pixel, t_ns, light = clip

@@ -67,7 +67,7 @@ def both(spec: CisSpec, memory: Any, linear: bool = False) -> tuple[Cis, CisOnCa
     )
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.data())
 def test_exposures_counts_and_state_are_those_of_the_sensor_on_a_cpu(data: st.DataObject) -> None:
     on = data.draw(st.sets(st.sampled_from(sorted(EVERYTHING))))

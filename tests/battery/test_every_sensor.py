@@ -102,7 +102,7 @@ def hold_bits(sensor: Sensor, clip: Clip, whole: Events, dvs: Dvs) -> None:
 
 
 @sensors
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12, derandomize=True)
 @given(data=st.data())
 def test_every_sensor_stays_finite_ordered_bounded_and_the_same_to_the_bit(sensor, data):
     hold(sensor, data.draw(clips(sensor.light)))
@@ -111,7 +111,7 @@ def test_every_sensor_stays_finite_ordered_bounded_and_the_same_to_the_bit(senso
 @pytest.mark.slow
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("sensor", slow_ones(), ids=lambda sensor: sensor.name)
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, derandomize=True)
 @given(data=st.data())
 def test_every_pair_of_options_does_so_too(sensor, data):
     hold(sensor, data.draw(clips(sensor.light)))

@@ -35,7 +35,7 @@ def two_of_each(times_us: list[int], windows_us: list[list[int]]) -> list[tuple]
 
 
 @pytest.mark.parametrize("sensor", everyday(), ids=lambda sensor: sensor.name)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(data=st.data())
 def test_straight_into_grids_is_through_events_of_every_sensor(sensor: Sensor, data: st.DataObject) -> None:
     clip: Clip = data.draw(clips(sensor.light))

@@ -71,7 +71,7 @@ def apart(spec: DvsSpec, t_ns: np.ndarray, light: np.ndarray, times: int = 1) ->
 
 
 @pytest.mark.parametrize("keys", LINES.values(), ids=LINES.keys())
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12, derandomize=True)
 @given(st.integers(0, 2**32 - 1), st.floats(1, 4.3), st.sampled_from([1, 3]))
 def test_linear_light_may_be_cut_in_halves(keys, seed, length, times):
     """The filter before the log: to 1e-6 nat at the frames, and 1 us in every event."""

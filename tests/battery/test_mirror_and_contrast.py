@@ -36,7 +36,7 @@ def assert_mirrored(up: Events, down: Events) -> None:
 
 @pytest.mark.parametrize("keys", [value for name, value in AFTER.items() if name != "quantised"],
                          ids=[name for name in AFTER if name != "quantised"])  # fmt: skip
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(octaves, steps, st.floats(0.05, 1), st.floats(0.05, 1), st.sampled_from(["offset", "toe", "v2e"]))
 def test_a_mirrored_signal_gives_mirrored_events_to_the_bit(keys, octaves, steps, one, other, curve):
     """y -> -y and the thresholds exchanged: ON for OFF, at the very microsecond.
@@ -65,7 +65,7 @@ contrasts = st.lists(st.floats(0, 4), min_size=2, max_size=6).map(sorted)
     {}, {"filter": "after"}, TWO_POLES, {"filter": "after", **TWO_POLES}, {"timing": "linear", **TWO_POLES},
     {"photoreceptor_tau_us": 300}, {"photoreceptor_tau_us": 300, "filter": "after"},
 ], ids=lambda keys: ", ".join(f"{key} {value}" for key, value in keys.items()) or "nothing")  # fmt: skip
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=8), steps, contrasts, st.sampled_from(["offset", "toe", "v2e"]))
 def test_more_contrast_never_gives_fewer_events(keys, way, path, steps, contrasts, curve):
     """Of light that only rises (or falls), in each pixel at every instant: ln light is way x contrast x a path."""

@@ -83,7 +83,7 @@ def seen(dvs: Dvs, clip: Clip, first: int = 0) -> list[Events]:
 
 
 @specs
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(data=st.data())
 def test_events_counts_and_state_are_those_of_the_walk_on_a_cpu(name, data):
     clip = data.draw(clips(np.dtype(data.draw(st.sampled_from(["float32", "float64", "uint8"])))))

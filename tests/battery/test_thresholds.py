@@ -23,7 +23,7 @@ def thresholds(sigma: float, pixels: int, seed: int = 0) -> np.ndarray:
     return theta
 
 
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 @given(st.floats(1e-3, 10), st.floats(1e-9, 100), st.floats(-6.8, 6.8))
 def test_thresholds_are_above_zero_and_as_far_above_the_mean_as_below(mean, sigma, z):
     """So their mean is the one asked for, whatever the spread."""

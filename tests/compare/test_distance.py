@@ -36,7 +36,7 @@ def term_by_term(a: Events, b: Events, tau_us: float) -> float:
 
 
 @given(a=streams(), b=streams(), tau_us=st.sampled_from([1.0, 37.5, 1000.0, 1e6]))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_is_the_double_sum(a: Events, b: Events, tau_us: float) -> None:
     assert squared(a, b, tau_us) == pytest.approx(term_by_term(a, b, tau_us), rel=1e-9, abs=1e-9)
 
@@ -112,7 +112,7 @@ def test_pixels_know_nothing_of_each_other() -> None:
 
 
 @given(a=streams(), b=streams(), c=streams(), tau_us=st.sampled_from([20.0, 1000.0]))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_its_root_is_a_metric(a: Events, b: Events, c: Events, tau_us: float) -> None:
     sides = [math.sqrt(squared(*pair, tau_us)) for pair in ((a, b), (b, c), (a, c))]
     assert squared(a, b, tau_us) == squared(b, a, tau_us) >= 0
@@ -121,21 +121,21 @@ def test_its_root_is_a_metric(a: Events, b: Events, c: Events, tau_us: float) ->
 
 
 @given(a=streams(), b=streams(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_the_order_of_events_at_one_instant_is_of_no_account(a: Events, b: Events, seed: int) -> None:
     mixed = np.lexsort((np.random.default_rng(seed).random(len(a)), a.t))
     assert squared(a.select(mixed), b, 100) == squared(a, b, 100)
 
 
 @given(a=streams(), b=streams(), later_us=st.sampled_from([-(10**15), 86_400_000_000, 10**17]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_clocks_of_any_beginning_give_the_same(a: Events, b: Events, later_us: int) -> None:
     moved = (Events(side.t + later_us, side.x, side.y, side.p) for side in (a, b))
     assert squared(*moved, 100) == squared(a, b, 100)
 
 
 @given(events=streams(most=60), cuts=st.lists(st.integers(0, 60), max_size=5))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_blocks_and_bands_may_be_cut_anywhere(events: Events, cuts: list[int]) -> None:
     edges = sorted({0, len(events), *(min(cut, len(events)) for cut in cuts)})
     whole = by_pixel([events], SIZE[0], range(SIZE[1]))

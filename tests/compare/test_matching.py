@@ -37,7 +37,7 @@ def least_cost(a: np.ndarray, b: np.ndarray, window: int) -> int:
 
 
 @given(a=TIMES, b=TIMES, window=st.sampled_from([1, 2, 3, 7, 20, 200]))
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 def test_no_way_to_pair_is_cheaper(a: np.ndarray, b: np.ndarray, window: int) -> None:
     i, j = partners(a, b, window)
     apart = np.abs(a[i] - b[j])
@@ -73,7 +73,7 @@ def as_pairs(found: Comparison) -> list[int]:
 
 
 @given(a=streams(), b=streams(), window_us=st.sampled_from([1, 40, 5000]))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_each_pixel_and_polarity_for_itself(a: Events, b: Events, window_us: int) -> None:
     found = compare(a, b, SIZE, window_us=window_us)
     errors, crossed = [], 0
@@ -96,7 +96,7 @@ def test_each_pixel_and_polarity_for_itself(a: Events, b: Events, window_us: int
 
 
 @given(a=streams(), b=streams())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_the_other_way_round_errors_have_the_other_sign(a: Events, b: Events) -> None:
     one, other = compare(a, b, SIZE), compare(b, a, SIZE)
     np.testing.assert_array_equal(one.timing_errors, other.timing_errors[::-1])

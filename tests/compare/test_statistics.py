@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from event_streams import busy, events_of, streams
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.compare.statistics import EDGES_US, Statistics, statistics_of
@@ -47,7 +47,6 @@ def by_hand(events: Events, size: tuple[int, int], reach_us: int) -> tuple[list[
     return found, intervals, [gap for kind in intervals for gap in kind]
 
 
-@settings(deadline=None)
 @given(streams(), st.sampled_from([0, 1, 40, 3000]))
 def test_each_event_is_counted_as_by_hand(events: Events, reach_us: int) -> None:
     isolated, intervals, gaps = by_hand(events, SIZE, reach_us)
@@ -58,7 +57,6 @@ def test_each_event_is_counted_as_by_hand(events: Events, reach_us: int) -> None
         assert np.array_equal(found.intervals[kind], np.histogram(intervals[kind], EDGES_US)[0])
 
 
-@settings(deadline=None)
 @given(streams(), st.lists(st.integers(0, 30), max_size=4))
 def test_blocks_may_be_cut_anywhere(events: Events, cuts: list[int]) -> None:
     ends = [0, *sorted(min(cut, len(events)) for cut in cuts), len(events)]
@@ -154,3 +152,11 @@ def test_numbers_are_ready_for_json() -> None:
     numbers = statistics_of([busy(500)], (3, 2)).as_dict()
     assert json.loads(json.dumps(numbers)) == numbers
     assert sum(numbers["intervals_same"]) + sum(numbers["intervals_opposite"]) == 500 - 6
+
+
+@pytest.mark.parametrize(("shortest_us", "low_us"), [(1, EDGES_US[25]), (1400, 1400)])
+def test_about_is_even_in_logarithms_within_its_bin(shortest_us: int, low_us: float) -> None:
+    intervals = np.zeros((2, len(EDGES_US) - 1), np.int64)
+    intervals[0, 25] = 4
+    made = Statistics((1, 1), (0, 10**6), np.zeros((2, 1, 1), np.int64), intervals, (0, 0), shortest_us, 5000)
+    assert made.about_us(50) == pytest.approx(np.sqrt(low_us * EDGES_US[26]))

@@ -23,7 +23,7 @@ def blocks_of(t: list[int], block: int) -> list[Events]:
 
 
 @given(st.lists(st.integers(0, 60), max_size=80), st.integers(1, 20))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_disorder_is_put_in_order(t: list[int], block: int) -> None:
     blocks, disorder = blocks_of(t, block), Disorder()
     for events in blocks:

@@ -71,7 +71,7 @@ def test_plain_h5py_reads_what_was_written(tmp_path: Path, labelled: bool) -> No
 gaps = st.lists(st.integers(0, 3000) | st.sampled_from([0, 1, 999, 1000, 1001, 2_500_000]), max_size=60)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     gaps=gaps, offset=st.integers(0, 2**50), rest=st.integers(0, 5000), window=st.tuples(*[st.integers(-9, 10**7)] * 2)
 )
@@ -92,7 +92,7 @@ def test_any_window_of_any_times_is_found(
     assert_same(Events.concatenate(read_events(tmp_path / "events.h5", block=7)), events)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(gaps=gaps, frame_gaps=gaps, offset=st.integers(0, 2**50), block=st.integers(1, 70))
 def test_events_are_counted_frame_by_frame(
     tmp_path: Path, gaps: list[int], frame_gaps: list[int], offset: int, block: int

@@ -70,7 +70,7 @@ def test_what_is_read_and_written_again_is_the_same_file(tmp_path: Path, name: s
 
 
 @pytest.mark.parametrize("name", WRITABLE)
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_events(tmp_path: Path, name: str, data: st.DataObject) -> None:
     kind = format_named(name)

@@ -54,7 +54,7 @@ def check(spec: CisSpec, made: list[Exposure], first_ns: int, last_ns: int) -> N
     assert abs(len(made) - max(0.0, (last_ns - first_ns - window_ns) / period_ns + 1)) <= 1
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200, derandomize=True)
 @given(
     st.sampled_from(EVERY), st.integers(-(10**17), 10**17), steps, st.lists(lights, min_size=5, max_size=5),
     st.integers(1, 6), st.integers(0, 2**64 - 1),
@@ -80,7 +80,7 @@ def test_every_frame_sensor_stays_finite_ordered_and_the_same_to_the_bit(spec, s
 CLEAN = [spec for spec in EVERY if spec == spec.noiseless()]
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80, derandomize=True)
 @given(st.sampled_from(CLEAN), st.integers(0, 2**32 - 1), st.floats(1, 1e6))
 def test_more_light_never_gives_a_lower_code(spec, seed, gain):
     """Without noise, in every pixel of every exposure."""

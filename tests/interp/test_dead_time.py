@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from interp.interpolate.take import Options
@@ -48,7 +48,6 @@ def test_light_that_was_not_seen_is_made_good(law: Law, span_us: int) -> None:
         assert abs(made_good.mean()) < left * plain.mean() and np.abs(made_good).mean() < (left + 0.1) * plain.mean()
 
 
-@settings(deadline=None)
 @given(st.floats(1e-4, 0.9), st.integers(2, 40))
 def test_of_an_even_slope_a_memory_that_tracks_makes_all_good(share: float, number: int) -> None:
     """After each event the signal goes on for R unseen, then a threshold more; `share` is R's of that time."""
@@ -60,7 +59,6 @@ def test_of_an_even_slope_a_memory_that_tracks_makes_all_good(share: float, numb
     np.testing.assert_allclose(worth, [1, *[crossings] * (number - 1)], rtol=2e-3)
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3), st.integers(0, 1)), max_size=80), st.integers(1, 4))
 def test_pixels_and_signs_have_nothing_to_do_with_each_other(sent: list[tuple[int, int, int]], blind_us: int) -> None:
     """But that of all of them it is told how often light changes how fast."""

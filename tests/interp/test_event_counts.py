@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from exact_voxels import exact_voxels
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pairs import counts, events
 from voxel_grid import voxel_grid
@@ -32,7 +32,6 @@ def windows(*edges: float) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.tensor([edges[0::2]]), torch.tensor([edges[1::2]])
 
 
-@settings(deadline=None)
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(1, 9), st.integers(1, 40))
 def test_a_sub_interval_counts_as_much_as_lies_in_the_window(a: float, b: float, bins: int, steps: int) -> None:
     start, stop = torch.tensor([min(a, b)]), torch.tensor([max(a, b)])

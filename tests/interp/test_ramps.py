@@ -47,7 +47,7 @@ def slowly(off_on: np.ndarray, contrast: tuple[float, float], t: float) -> tuple
     return change, number
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.floats(0, 1))
 def test_it_is_the_law_pixel_by_pixel(seed: int, steps: int, t: float) -> None:
     draw = np.random.default_rng(seed)
@@ -117,7 +117,7 @@ def test_light_that_rises_steadily_is_nearer_than_by_stairs() -> None:
     assert errors["ramps"] < 0.7 * errors["bridge"]  # (0.62: straight lines, which parabolas are not)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 1), st.floats(0, 1))
 def test_parts_of_events_are_parts_of_what_events_say(seed: int, part: float, t: float) -> None:
     """Counts from between pixels: E and N of a pixel's lone events are in proportion, and no count is below zero."""

@@ -58,7 +58,7 @@ def test_what_is_beside_comes_to_its_place(shift: tuple[int, int], coarser: int)
     assert apart(brought(first, last, beside), here) < 0.35 * apart(over(beside, size), here)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6))
 def test_what_is_in_its_place_stays_there(seed: int) -> None:
     first, last, counts = seen(seed, (0, 0))

@@ -68,7 +68,7 @@ places = st.tuples(st.floats(-40, 60), st.floats(-40, 60), st.floats(-1.2, 1.2),
 waves = st.tuples(st.floats(0, 3), st.floats(2, 40), st.floats(0, 1))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.tuples(places, waves), min_size=1, max_size=3), st.booleans(), st.integers(1, 20), st.integers(1, 20)
 )

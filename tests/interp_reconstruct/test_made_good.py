@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from interp.networks import make
@@ -66,7 +66,6 @@ def pieces(events: Events, edges: list[int]) -> list[Events]:
     return [events.stretch(int(a), int(b)) for a, b in pairwise(places)]
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(0, 60_000), max_size=12), st.integers(0, 12))
 def test_of_a_memory_that_tracks_events_count_the_same_however_the_stream_is_cut(edges: list[int], at: int) -> None:
     """Also where it is gone on with by another process."""

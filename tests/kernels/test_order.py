@@ -22,7 +22,7 @@ PIXELS_OF_GROUP = 40
     seed=st.integers(0, 2**32 - 1),
     worth=st.sampled_from([(1 << 16, 1 << 18, 1 << 16), (0, 0, 200), (0, 200, 50), (0, 1 << 18, 1)]),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_ordered_by_time_row_column(groups, last_us, mean, crowded, seed, worth):
     """Events by few or many threads, frame by frame, all together or in runs of frames beside each other."""
     rng = np.random.default_rng(seed)

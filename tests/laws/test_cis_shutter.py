@@ -52,7 +52,7 @@ times = st.lists(st.integers(1, 40_000_000), min_size=3, max_size=12).map(lambda
 decimals = st.sampled_from([0.0, 0.001, 1.0, 37.25, 512.0, 2000.5, 8333.0, 33333.3, 70000.0])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     t_ns=times,
     rate=st.sampled_from([7.0, 24.0, 29.97, 59.94, 100.0, 333.3, 1000.0]),

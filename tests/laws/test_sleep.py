@@ -134,7 +134,7 @@ def play_both(
 
 
 @sensors
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(happenings, st.integers(0, 1000), st.sampled_from([1, 2]), st.booleans())
 def test_sleep_changes_no_bit(spec, scene, seed, threads, told):
     play_both(spec, scene, np.float32, seed, threads, told=told)
@@ -143,7 +143,7 @@ def test_sleep_changes_no_bit(spec, scene, seed, threads, told):
 @pytest.mark.parametrize(
     "name", ["ideal", *(pytest.param(name, marks=pytest.mark.slow) for name in [*SENSORS, *MORE][1:])]
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(happenings, st.integers(0, 1000), st.booleans())
 def test_nor_does_it_with_codes_and_labels(name, scene, seed, labels):
     spec = (SENSORS | MORE)[name]

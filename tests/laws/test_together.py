@@ -58,7 +58,7 @@ def assert_same_state(one: dict[str, Any], other: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("spec", SENSORS.values(), ids=SENSORS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @example(seed=510510, told=False, skip=False, threads=1, some=[2])  # (a crossing that took one more step for others)
 @given(
     seed=st.integers(0, 2**32),

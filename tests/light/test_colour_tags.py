@@ -167,7 +167,7 @@ def test_a_profile_that_is_not_read_is_named(
     assert len(warnings) == said and ("its ICC profile 'Display P3' is not read" in "".join(warnings)) == said
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=200), st.sampled_from(["desc", "mluc"]), st.integers(0, 180))
 def test_damaged_profiles_are_names_or_nothing(noise: bytes, text: str, at: int) -> None:
     held = bytearray(profile("Display P3", text))

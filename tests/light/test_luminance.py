@@ -142,7 +142,7 @@ def test_weights_follow_from_the_primaries(tag: int) -> None:
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_rgb_is_a_sum_of_light(red: int, green: int, blue: int) -> None:
     table = code_table("srgb", 8)
     channels = [np.full((1, 1), c, np.uint8) for c in (red, green, blue)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.errors import DataError, UsageError
@@ -18,7 +18,6 @@ component = st.floats(-1e6, 1e6)
 poses = st.tuples(st.integers(-(10**18), 10**18), st.tuples(*[component] * 3), st.tuples(*[st.floats(-180, 180)] * 3))
 
 
-@settings(deadline=None)
 @given(st.lists(poses, max_size=5))
 def test_poses_read_back(tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple]) -> None:  # type: ignore[type-arg]
     path = tmp_path_factory.getbasetemp() / "poses.txt"

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -42,7 +42,6 @@ def flow_of(shape: tuple[int, int] = (24, 32)) -> np.ndarray:
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".exr"])
-@settings(deadline=None)
 @given(depth=arrays.arrays(np.float32, SHAPES, elements=st.floats(2.0**-60, np.inf, exclude_min=True, width=32)))
 def test_depth_reads_back_to_the_bit(tmp_path_factory: pytest.TempPathFactory, suffix: str, depth: np.ndarray) -> None:
     path = tmp_path_factory.getbasetemp() / f"depth{suffix}"
@@ -109,7 +108,6 @@ def test_a_folder_has_one_scale(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".flo"])
-@settings(deadline=None)
 @given(flow=arrays.arrays(np.float32, FLOWS, elements=st.floats(-(2.0**29), 2.0**29, width=32)))
 def test_flow_reads_back_to_the_bit(tmp_path_factory: pytest.TempPathFactory, suffix: str, flow: np.ndarray) -> None:
     path = tmp_path_factory.getbasetemp() / f"flow{suffix}"

@@ -72,7 +72,7 @@ def projected(view: Viewpoint, rig_points_m: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_calibration_reads_back(tmp_path: Path, name: str, data: st.DataObject) -> None:
     rig = data.draw(calibrated_rigs(HELD[name]))

@@ -206,7 +206,7 @@ numbers = st.floats(allow_nan=True, allow_infinity=True, width=32)
 lenses = st.sampled_from([SOURCE, BENT, FISHEYE])
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @example(  # (a pixel just beyond an edge, one corner of which is near the camera's plane)
     seed=225, values=[0.0] * 6, turn=(0.0, 1.5, 1.0), way=(0.96875, 0.0, 1.662109375), source=SOURCE, camera=SOURCE,
     size=(5, 9),

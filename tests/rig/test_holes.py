@@ -38,3 +38,14 @@ def test_surfaces_are_smoothed_apart(inverse: float, one: bool) -> None:
 def test_slivers_beside_a_surface_count_for_little() -> None:
     found = filled([[1.0, 0.1, -1, 0.1, 0.1, 0.1]], [[5, 9, HOLE, 1, 1, 1]], inset=1)
     assert found[0, 2] == pytest.approx((0.02 * 9 + 1) / 1.02)  # (9 is between the near surface and the hole)
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_what_fills_a_hole_comes_from_beyond_its_rim_on_every_side(turns: int) -> None:
+    inverse, light = (np.rot90([row], turns).tolist() for row in ([1.0, 1.0, -1], [FAR, NEAR, HOLE]))
+    assert np.rot90(filled(inverse, light, inset=1), -turns)[0, 2] == pytest.approx(FAR)
+
+
+def test_rims_count_by_the_square_of_how_near_they_are() -> None:
+    found = filled([[1, -1, -1, 1]], [[0.2, HOLE, HOLE, 0.8]])
+    assert found[0, 1] == pytest.approx((0.2 + 0.8 / 4) / (1 + 1 / 4))

@@ -99,7 +99,7 @@ def test_what_no_lens_sees_has_no_pixel() -> None:
     assert np.isnan(rays_of(np.array([[outside, 240.0]]), folding)[0, :2]).all()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.lists(st.floats(-1, 1), min_size=8, max_size=8),
     st.sampled_from([("radtan", 4), ("radtan", 5), ("radtan", 8), ("equidistant", 4)]),

@@ -24,7 +24,7 @@ def rig_file(folder: Path, text: str) -> Path:
     return path
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rigs())
 def test_a_rig_reads_back_equal(tmp_path: Path, rig: Rig) -> None:
     write_rig(tmp_path / "rig.toml", rig, overwrite=True)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.ndimage
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vid2ev.rig.bands import Bands
+from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid
 from vid2ev.rig.sampling import pixel_means, sampled
 from vid2ev.rig.spline import Spline
+from vid2ev.rig.surface import corners_of, surface_of
 
 ONE = Bands(1)
 
@@ -48,7 +50,6 @@ def test_flat_light_stays_exactly_flat(value: float, seed: int) -> None:
     assert (pixel_means(fine[..., None], 3) == np.float32(value)).all()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_a_lamp_neither_rings_far_away_nor_darkens_below_zero(seed: int) -> None:
     light, random = np.full((21, 21), 0.01, np.float32), np.random.default_rng(seed)
@@ -86,3 +87,15 @@ def test_light_that_is_nowhere_negative_stays_so() -> None:
     x, y = np.random.default_rng(5).uniform(-1, 51, (2, 60, 70)).astype(np.float32)
     spline = Spline(light, Bands(1))
     assert sampled(spline, x, y, Bands(1)).min() >= 0
+
+
+def test_light_behind_a_cut_two_pixels_away_changes_nothing() -> None:
+    source = Intrinsics(size=(32, 12), focal_px=(30.0, 30.0), centre_px=(15.5, 5.5))
+    columns = np.arange(32, dtype=np.float32)
+    inverse = np.tile(np.where(columns < 16, 1, 0.1), (12, 1)).astype(np.float32)
+    light = np.tile(0.2 + 0.01 * columns + np.where(columns < 16, 0, 5), (12, 1)).astype(np.float32)
+    surface = surface_of(inverse, corners_of(source), source)
+    x, y = np.meshgrid(columns + np.float32(0.3), np.arange(12, dtype=np.float32))
+    cuts = surface.near_cut, surface.inverse[1:-1, 1:-1], surface.steep
+    found = sampled(Spline(light, Bands(1)), x, y, Bands(1), *cuts)
+    np.testing.assert_allclose(found[5, 14, 0], 0.2 + 0.01 * 14.3, atol=2e-3)  # (the cut is between 15 and 16)

@@ -81,7 +81,7 @@ def cameras(draw: st.DrawFn) -> tuple[Intrinsics, Pose]:
     return camera, Pose.of(turn, draw(st.tuples(*[st.sampled_from([0.0, 0.05, -0.3])] * 3)))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.data())
 def test_a_view_of_a_tensor_is_that_of_an_array(data: st.DataObject) -> None:
     light, source = data.draw(lights()), pinhole(SIZE, 40).model_copy(update=data.draw(st.sampled_from(LENSES)))

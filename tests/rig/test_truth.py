@@ -93,3 +93,20 @@ def test_views_and_truth_agree() -> None:
     back = pixel_map(camera, pose, depth_seen(A, depth_m, camera, pose), A, IDENTITY)
     assert place.seen.mean() > 0.5
     np.testing.assert_allclose(back[place.seen], np.stack([place.x, place.y], -1)[place.seen], atol=0.02)
+
+
+def test_depth_is_unknown_where_the_nearest_pixel_of_the_source_has_none() -> None:
+    camera = Intrinsics(size=(16, 12), focal_px=(15.0, 15.0), centre_px=(7.5, 5.5))
+    depth_m = np.full((12, 16), 2, np.float32)
+    depth_m[4, 6] = np.nan
+    seen = depth_seen(camera, depth_m, camera, IDENTITY)
+    assert np.argwhere(np.isnan(seen)).tolist() == [[4, 6]]
+    beside = Pose.of((0, 0, 0), (0.7 * 2 / 15, 0, 0))  # by 0.7 px: its pixel 5 looks at 5.7
+    seen = depth_seen(camera, depth_m, camera, beside)
+    assert np.argwhere(np.isnan(seen[:, :15])).tolist() == [[4, 5]]
+
+
+def test_what_is_behind_a_camera_has_no_depth() -> None:
+    camera = Intrinsics(size=(16, 12), focal_px=(15.0, 15.0), centre_px=(7.5, 5.5))
+    assert np.isnan(depth_of_plane(camera, IDENTITY, -2.0)).all()
+    assert np.isnan(depth_of_plane(camera, Pose.of((0, 0, 0), (0, 0, 3)), 2.0)).all()

@@ -51,7 +51,7 @@ worlds = st.builds(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(worlds, st.builds(Pose.of, turn, point), st.sampled_from([1, 2, 3]))
 def test_there_is_light_everywhere_and_no_nan(world, pose, samples):
     light, depth, thing = render(world, CAMERA, pose, samples=samples, threads=1)
@@ -60,7 +60,7 @@ def test_there_is_light_everywhere_and_no_nan(world, pose, samples):
     assert thing.min() >= -1 and thing.max() < len(world.things)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(worlds, st.builds(Pose.of, turn, point), st.builds(Pose.of, turn, point))
 def test_what_stays_is_seen_again(world, pose, other):
     picture = render(world, CAMERA, pose, samples=1, threads=1)

@@ -82,7 +82,7 @@ def test_every_scene_is_the_same(name):
 poses = st.builds(Pose.of, turn, point)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(worlds, poses, poses, st.sampled_from([1, 2, 3]), st.sampled_from([CAMERA, LENS, FISH_EYE]))
 def test_any_world_is_the_same(world, pose, other, samples, camera):
     reel = reel_of(camera, samples)

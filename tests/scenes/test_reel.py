@@ -98,7 +98,7 @@ changes = st.lists(
 )
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(worlds, st.builds(Pose.of, turn, point), changes)
 def test_whatever_changes_the_picture_is_the_same(world, pose, happenings):
     snapshots, poses = [world], [pose]

@@ -76,7 +76,7 @@ def test_splines_have_no_kink_in_speed_or_acceleration() -> None:
     assert np.abs(after - before).max() > 1  # (the measure tells a kink)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.lists(st.lists(st.floats(-180, 180), min_size=3, max_size=3), min_size=2, max_size=6),
     st.floats(-5, 20),

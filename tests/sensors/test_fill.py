@@ -46,7 +46,7 @@ def grids(events_us: np.ndarray, rng: np.random.Generator) -> list:
 
 
 @sensors
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(seed=st.integers(0, 2**32), threads=st.sampled_from([1, 2]), skip=st.booleans())
 def test_straight_into_grids_is_through_events(spec: DvsSpec, seed: int, threads: int, skip: bool) -> None:
     light, t_ns = light_of(seed)

@@ -17,7 +17,7 @@ from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.tags import BT709_WEIGHTS
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.sources import footage, open_source
-from vid2ev.sources.framing import crop_box, of_shape
+from vid2ev.sources.framing import Box, crop_box, of_shape, parse_size
 from vid2ev.sources.with_depth import WithDepth, parse_depth
 
 
@@ -174,7 +174,7 @@ def test_what_cannot_be_is_refused_before_anything_is_done(encode, options, said
 
 
 @given(st.fractions(Fraction(1, 100), 100, max_denominator=1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_times_are_divided_exactly(slowdown: Fraction) -> None:
     clip = "synthetic:sine,size=1x1,fps=240,duration_s=0.2"
     whole, slowed = open_source(clip), open_source(clip, slowdown=slowdown)
@@ -265,7 +265,7 @@ sides = st.integers(1, 40)
 
 
 @given(sides, sides, sides, sides, st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_light_is_made_or_lost(width: int, height: int, new_width: int, new_height: int, seed: int) -> None:
     """Flat stays flat, nothing goes beyond the darkest and brightest pixel, and a mean of means is the mean."""
     picture = np.random.default_rng(seed).exponential(1, (height, width)).astype(np.float32)
@@ -403,3 +403,13 @@ def test_parts_of_real_clips(shared_videos: Path, name: str) -> None:
     since = whole[38].t_ns + 1
     part = list(open_source(shared_videos / name, size="40", start=Fraction(since, 10**9), stop=2.2).frames())
     same(part, whole[39:])
+
+
+def test_the_largest_part_of_a_shape_is_in_the_middle_along_both_sides() -> None:
+    box = Box(*map(Fraction, (3, 5, 100, 100)))
+    assert of_shape(box, (2, 1)) == Box(*map(Fraction, (3, 30, 100, 50)))
+    assert of_shape(box, (1, 2)) == Box(*map(Fraction, (28, 5, 50, 100)))
+
+
+def test_a_height_that_is_not_said_is_the_nearest() -> None:
+    assert parse_size("346", (1920, 1080)) == (346, 195, False)  # 194.6

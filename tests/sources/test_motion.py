@@ -44,7 +44,7 @@ def centroid(light: np.ndarray) -> tuple[float, float]:
 
 
 @given(st.integers(1, 60), st.floats(-20, 60), st.floats(0.05, 6), st.integers(1, 40))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_weights_are_those_of_the_cubic_b_spline(length: int, begin: float, step: float, outputs: int) -> None:
     first, count, weights = spline_taps(length, begin, step, outputs)
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)

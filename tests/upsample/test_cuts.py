@@ -126,3 +126,16 @@ def test_a_restart_lets_event_frames_go_on() -> None:
     times = Events.concatenate(sent).t
     assert np.all(np.diff(times) >= 0) and set(times % 20_000) == {0}
     assert {0, 60_000} <= set(times)
+
+
+def test_a_picture_of_which_a_fifth_becomes_another_is_no_cut() -> None:
+    noise = [np.random.default_rng(k).uniform(0, 1, (120, 160)).astype(np.float32) for k in (0, 1)]
+    wall, other = (np.clip((cv2.GaussianBlur(each, (9, 9), 2) - 0.5) * 6 + 0.5, 0.02, 1) for each in noise)
+
+    def begins_shot(columns: int) -> bool:
+        after, detector = wall.copy(), CutDetector(0.15)
+        after[:, :columns] = other[:, :columns]
+        detector.begins_shot(Frame(wall, 0), Frame(wall.copy(), 1))
+        return detector.begins_shot(Frame(wall, 1), Frame(after, 2))
+
+    assert begins_shot(160) and not begins_shot(32)

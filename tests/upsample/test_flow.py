@@ -101,7 +101,7 @@ def test_the_ends_are_approached_evenly() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(24, 50), st.integers(24, 50))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_where_nothing_moves_nothing_changes(seed: int, height: int, width: int) -> None:
     light = np.random.default_rng(seed).uniform(0, 4, (height, width)).astype(F)
     for made in between(light, light.copy(), 3):
@@ -110,7 +110,7 @@ def test_where_nothing_moves_nothing_changes(seed: int, height: int, width: int)
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_no_light_is_invented(seed: int) -> None:
     """Every frame in between stays within the range of its two frames: no ringing, nothing negative."""
     rng = np.random.default_rng(seed)
@@ -212,7 +212,7 @@ def carried(
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1), st.sampled_from([0.0, 0.3, 1.0]))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_moving_ramp_is_exact_at_any_fraction_of_a_pixel(
     across: float, down: float, time: float, weight: float
 ) -> None:
@@ -245,7 +245,7 @@ def test_wild_motion_stays_inside() -> None:
 
 
 @given(st.floats(-2.5, 2.5), st.floats(-2.5, 2.5), st.floats(0.05, 0.95))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_even_motion_is_thrown_to_even_motion(across: float, down: float, time: float) -> None:
     flow = np.empty((12, 14, 2), F)
     flow[..., 0], flow[..., 1] = across, down
@@ -320,7 +320,7 @@ def test_outside_the_part_that_moves_light_is_as_if_the_motion_of_all_were_throw
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(12, 90), st.integers(12, 90))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_no_flow_convinces_outside_the_part_that_changes(seed: int, height: int, width: int) -> None:
     rng = np.random.default_rng(seed)
     start, end = rng.integers(0, 256, (2, height, width), np.uint8)
@@ -336,7 +336,7 @@ def test_no_flow_convinces_outside_the_part_that_changes(seed: int, height: int,
 
 
 @given(st.integers(1, 2000), st.integers(1, 2000), st.integers(0, 1999), st.integers(0, 1999))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_part_that_changes_is_matched_from_as_far_as_the_whole(rows: int, columns: int, y: int, x: int) -> None:
     """DIS halves pictures while the longer side has some four patches, and the shorter has one."""
 

@@ -72,7 +72,7 @@ def test_real_clips(clip):
         assert error.max() < MOST * one.max() and error.mean() < MEAN and (error == 0).mean() > 0.9
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     width=st.integers(1, 60), height=st.integers(1, 60), steps=st.integers(2, 6), seed=st.integers(0, 2**32 - 1),
     bad=st.booleans(), colour=st.booleans(), alike=st.booleans(),

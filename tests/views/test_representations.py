@@ -115,7 +115,7 @@ def test_frames_do_not_depend_on_how_events_come() -> None:
 # --------------------------------------------------------------------------------------------------------- voxel grids
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     gaps=st.lists(st.integers(0, 30), max_size=60), bins=st.integers(1, 9), start=st.integers(-5, 2**45),
     edges=st.tuples(st.integers(0, 40), st.integers(0, 40)),

@@ -42,7 +42,7 @@ def cut(slicing: Slicing, recording: Recording) -> list[tuple[int, int, Events]]
     return slices
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(gaps=gaps, start=st.integers(-50, 2**45), early=st.integers(0, 9), late=st.integers(0, 300), slicing=slicings,
        block=st.integers(1, 90), frames=st.lists(st.integers(-100, 5000), max_size=9))  # fmt: skip
 def test_every_event_is_in_one_slice_and_slices_have_no_gaps(
@@ -70,7 +70,7 @@ def test_every_event_is_in_one_slice_and_slices_have_no_gaps(
     assert [(a, b, part.t.tolist()) for a, b, part in slices] == [(a, b, part.t.tolist()) for a, b, part in same]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(gaps=gaps, us=st.fractions(1, 300, max_denominator=9))
 def test_durations_have_the_edges_they_should(gaps: list[int], us: Fraction) -> None:
     t = np.cumsum(gaps, dtype=np.int64)
@@ -132,7 +132,7 @@ def test_source_needs_frames() -> None:
         list(Source().pieces(recording_of(events_at([1]))))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(gaps=gaps, most=st.integers(1, 30), late=st.integers(0, 9))
 def test_counts_are_exact(gaps: list[int], most: int, late: int) -> None:
     t = np.cumsum(gaps, dtype=np.int64)
@@ -144,7 +144,7 @@ def test_counts_are_exact(gaps: list[int], most: int, late: int) -> None:
     assert rest == 0 or slices[-1][1] == stop
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(n=st.integers(0, 300), most=st.integers(1, 9), side=st.integers(1, 25), seed=st.integers(0, 99))
 def test_areas_are_full_when_a_plain_count_says_so(n: int, most: int, side: int, seed: int) -> None:
     events = events_at(np.arange(n), seed=seed)
