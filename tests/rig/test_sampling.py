@@ -99,3 +99,18 @@ def test_light_behind_a_cut_two_pixels_away_changes_nothing() -> None:
     cuts = surface.near_cut, surface.inverse[1:-1, 1:-1], surface.steep
     found = sampled(Spline(light, Bands(1)), x, y, Bands(1), *cuts)
     np.testing.assert_allclose(found[5, 14, 0], 0.2 + 0.01 * 14.3, atol=2e-3)  # (the cut is between 15 and 16)
+
+
+def test_pixels_of_a_slanted_surface_count_beside_a_cut_as_far_as_they_are_of_it() -> None:
+    source = Intrinsics(size=(32, 12), focal_px=(30.0, 30.0), centre_px=(15.5, 5.5))
+    columns = np.arange(32, dtype=np.float32)
+    steep = surface_of(np.ones((12, 32), np.float32), corners_of(source), source).steep
+    slanted = (1 - 0.7 * steep) ** columns  # (a step is no cut, and two together are more than one may be)
+    inverse = np.tile(np.where(columns < 16, slanted, 1e-3 * slanted), (12, 1)).astype(np.float32)
+    light = np.tile(0.2 + 0.1 * columns + np.where(columns < 16, 0, 5), (12, 1)).astype(np.float32)
+    surface = surface_of(inverse, corners_of(source), source)
+    x, y = np.full((1, 1), 14.75, np.float32), np.full((1, 1), 5, np.float32)
+    cuts = surface.near_cut, surface.inverse[1:-1, 1:-1], surface.steep
+    first, second = -0.5 * 0.75 * 0.25**2, 1 - 2.5 * 0.75**2 + 1.5 * 0.75**3  # (Keys: of pixels 13 and 14; own is 15)
+    expected = light[5, 15] - 0.2 * first - 0.1 * second
+    assert sampled(Spline(light, Bands(1)), x, y, Bands(1), *cuts)[0, 0, 0] == pytest.approx(expected, abs=1e-5)
