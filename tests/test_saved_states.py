@@ -11,14 +11,14 @@ import pytest
 
 from interp.evaluate import kept as kept_module
 from interp.evaluate.kept import Kept
-from interp.train import run_folder
 from interp.train.run_folder import RunFolder
 from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.outputs import Outputs
 from vid2ev.recording.destination import partial_of
-from vid2ev.recording.disk import lock, put_in_place
+from vid2ev.recording.disk import put_in_place
+from vid2ev.recording.held import Held
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 
@@ -228,14 +228,15 @@ def test_what_another_has_begun_until_the_folder_is_free_is_respected(
     with Kept(tmp_path / "more", {"a": 1}, {"linear": 1}, resume=False):
         pass
 
-    def waited_for(folder: Path) -> int:
-        for path, job in theirs.items():
-            if path.parent == folder:
-                path.write_text(json.dumps(job))
-        return lock(folder)
+    take = Held.take
 
-    for module in (run_folder, kept_module):
-        monkeypatch.setattr(module, "lock", waited_for)
+    def waited_for(held: Held) -> None:
+        take(held)
+        for path, job in theirs.items():
+            if path.parent == held.folder:
+                path.write_text(json.dumps(job))
+
+    monkeypatch.setattr(Held, "take", waited_for)
     with pytest.raises(UsageError, match="holds a run; --resume"):
         RunFolder(tmp_path / "run", {"a": 1}, resume=False)
     with pytest.raises(UsageError, match="holds an evaluation; --resume"):

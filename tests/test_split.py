@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,7 +22,7 @@ from vid2ev.commands import main
 from vid2ev.conversion import Paused
 from vid2ev.formats import read_events
 from vid2ev.parts import Replayed
-from vid2ev.recording.disk import lock, unlock
+from vid2ev.recording.held import Held
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.split import convert_split
 from vid2ev.stream.events import Events
@@ -38,14 +38,6 @@ def here(tasks: Sequence[Task]) -> None:
     """All tasks in this process, the last first."""
     for task in reversed(tasks):
         task.call(lambda _: None)
-
-
-@contextmanager
-def lock_held(folder: Path) -> Iterator[None]:
-    """A folder that somebody else writes."""
-    handle = lock(folder)
-    yield
-    unlock(folder, handle)
 
 
 @pytest.fixture(scope="module")
@@ -217,7 +209,7 @@ def test_starting_again_removes_the_parts_that_were_begun(clip: str, tmp_path: P
         assert not any(part.exists() for part in begun)
         here(tasks)
 
-    with lock_held(begun[1]), pytest.raises(UsageError, match="another vid2ev is writing"):  # (by a worker left over)
+    with Held(begun[1]), pytest.raises(UsageError, match="another vid2ev is writing"):  # (by a worker left over)
         convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
     convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
     assert {path.name for path in tmp_path.iterdir()} == {"made"}

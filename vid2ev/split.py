@@ -14,12 +14,11 @@ once, but for parts begun with a warm-up.
 
 from __future__ import annotations
 
-import os
 import re
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,8 +30,9 @@ from vid2ev.kernels.layout import BLOCK
 from vid2ev.outputs import Outputs
 from vid2ev.parts import Made, reading
 from vid2ev.recipe import Recipe
-from vid2ev.recording.disk import lock, undisturbed, unlock, writing
+from vid2ev.recording.disk import writing
 from vid2ev.recording.folder import begun_job, check_free
+from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
@@ -89,7 +89,7 @@ def check_parts_free(directory: Path, overwrite: bool = False, resume: bool = Fa
     if beside.exists() and not beside.is_dir():
         raise UsageError(f"{beside} is needed to work in, and is a file; choose another folder with -o")
     for path in sorted(beside.iterdir()) if beside.is_dir() else ():
-        if not ((path.is_dir() and PART.fullmatch(path.name)) or path.name == "lock"):
+        if not ((path.is_dir() and PART.fullmatch(path.name)) or path.name == LOCK):
             raise UsageError(
                 f"{beside} is needed to work in, and holds {path.name}, which is no part; choose another folder with -o"
             )
@@ -102,13 +102,13 @@ def _held(directory: Path) -> Iterator[Path]:
     """The folder for the parts of a recording, which no other process touches meanwhile; where nothing was begun in it
     that could be taken up, it is gone in the end."""
     beside = parts_of(directory)
-    with writing(directory), undisturbed():
-        beside.mkdir(parents=True, exist_ok=True)
-        handle = lock(beside)
+    held = Held(beside)
     try:
+        with writing(directory):
+            held.take()
         yield beside
     finally:
-        unlock(beside, handle)
+        held.close()
         with suppress(OSError):
             beside.rmdir()
 
@@ -121,9 +121,7 @@ def _begun(beside: Path) -> list[Path]:
 def _remove_parts(beside: Path) -> None:
     """Remove parts, and nothing else.  Raises UsageError for one that a worker left over is still making."""
     for part in _begun(beside):
-        with writing(part), ExitStack() as holding:
-            if part.suffix == ".partial":
-                holding.callback(os.close, lock(part))
+        with writing(part), Held(part) if part.suffix == ".partial" else nullcontext():
             shutil.rmtree(part, ignore_errors=True)
 
 

@@ -10,7 +10,6 @@ DIR/                 NAME/ ..., dataset.json, README.md (the data card)
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import as_completed
@@ -30,7 +29,8 @@ from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.conversion import telling
 from vid2ev.errors import DiskError
-from vid2ev.recording.disk import lock, sync, undisturbed, whole_file, writing
+from vid2ev.recording.disk import sync, whole_file, writing
+from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import difference, read_manifest, versions
 
 FACTS = "dataset.json"
@@ -72,19 +72,11 @@ def write_dataset(
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
     scenes, unusable = scenes_of(spec)
-    handle: int | None = None
-    with writing(directory):
-        try:
-            with undisturbed():
-                made_in.mkdir(parents=True, exist_ok=True)
-                handle = lock(made_in)
-            _begin(made_in / "job.json", job, directory)
-            made = sorted(_all(scenes, made_in, spec, workers, share, report))
-            facts = _facts(job, spec, made, unusable)
-            _publish(made_in, directory, facts)
-        finally:
-            if handle is not None:
-                os.close(handle)
+    with writing(directory), Held(made_in):
+        _begin(made_in / "job.json", job, directory)
+        made = sorted(_all(scenes, made_in, spec, workers, share, report))
+        facts = _facts(job, spec, made, unusable)
+        _publish(made_in, directory, facts)
     return facts
 
 
@@ -195,7 +187,7 @@ def _publish(made_in: Path, directory: Path, facts: dict[str, Any]) -> None:
         with whole_file(made_in / name) as file:
             file.write(f"{text.rstrip()}\n".encode())
     (made_in / "job.json").unlink(missing_ok=True)
-    (made_in / "lock").unlink(missing_ok=True)
+    (made_in / LOCK).unlink(missing_ok=True)
     made_in.rename(directory)
     sync(directory.absolute().parent)
 

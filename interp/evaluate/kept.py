@@ -17,14 +17,14 @@ import os
 import reprlib
 import shutil
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from interp.evaluate.row import Row
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, undisturbed, unlock, whole_file, writing
+from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import as_stated, difference
 from vid2ev.untrusted import json_of, read_text
 
@@ -101,11 +101,10 @@ class Kept(KeptRows):
         super().__init__(folder)
         wanted = json.loads(json.dumps({**job, "methods": methods}))
         _known_methods(folder, wanted, resume)  # (before anything is written where something else is)
-        self._begins, self._makes_folder = False, not folder.exists()
+        self._begins = False
         with writing(folder):
-            with undisturbed():
-                folder.mkdir(parents=True, exist_ok=True)
-                self._handle = lock(folder)
+            self._held = Held(folder)
+            self._held.take()
             try:
                 known = _known_methods(folder, wanted, resume)  # (another may have begun there until now)
                 self._begins = not (folder / JOB).exists()
@@ -126,12 +125,9 @@ class Kept(KeptRows):
         for each in self.folder.iterdir() if nothing else ():
             if each.is_dir():
                 shutil.rmtree(each, ignore_errors=True)
-            elif each.name != "lock":
+            elif each.name != LOCK:
                 each.unlink(missing_ok=True)
-        unlock(self.folder, self._handle)
-        if nothing and self._makes_folder:
-            with suppress(OSError):  # (somebody else has begun there meanwhile)
-                self.folder.rmdir()
+        self._held.close()
 
 
 def _known_methods(folder: Path, wanted: Mapping[str, Any], resume: bool) -> dict[str, Any]:
@@ -139,7 +135,7 @@ def _known_methods(folder: Path, wanted: Mapping[str, Any], resume: bool) -> dic
     with something else than is wanted."""
     if not (folder / JOB).exists():
         # (what is left of an evaluation that was killed before it had begun is no reason not to begin)
-        if folder.exists() and {each.name for each in folder.iterdir()} - {"lock", f"{JOB}.new"}:
+        if folder.exists() and {each.name for each in folder.iterdir()} - {LOCK, f"{JOB}.new"}:
             raise UsageError(f"{folder} holds something else; choose another folder with -o")
         return {}
     if not resume:

@@ -16,7 +16,6 @@ a method has to remember of the stretches before is kept beside (`keep`).
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -34,8 +33,9 @@ from interp.interpolate.pieces import Pieces
 from vid2ev.errors import DataError, Vid2evError
 from vid2ev.pictures.film import film_size, join_films, remarks_on_size
 from vid2ev.recording.destination import partial_of
-from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
+from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
 from vid2ev.recording.exposures import read_codes, write_codes
+from vid2ev.recording.held import LOCK, Held, undisturbed
 from vid2ev.recording.manifest import difference, is_of_job, read_manifest, write_manifest
 from vid2ev.sources.images import FRAMES
 from vid2ev.untrusted import first_line, read_arrays
@@ -77,15 +77,14 @@ class Shelf:
         self._write, self._frames, self._whole = write, self.partial / "frames", self.partial / "whole"
         self._journal = self.partial / "done.jsonl"
         self._pieces = Pieces(self.partial / "pieces", rate, self.job["transfer"])
-        self._lock: int | None = None
+        self._held = Held(self.partial)
         self._begun = False
 
     def __enter__(self) -> Self:
         check_free(self.output, self.kind, self.overwrite, self.resume)
         try:
             with self.writing(), undisturbed():
-                self.partial.mkdir(parents=True, exist_ok=True)
-                self._lock = lock(self.partial)
+                self._held.take()
                 self._begin()
                 self._begun = True
         except BaseException as error:
@@ -96,11 +95,11 @@ class Shelf:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._lock is None:
+        if not self._held:
             return
         if not self._goes_on or isinstance(error, TooFine):
             shutil.rmtree(self.partial, ignore_errors=True)
-        os.close(self._lock)
+        self._held.close()
 
     @property
     def _goes_on(self) -> bool:
@@ -208,7 +207,7 @@ class Shelf:
             self.finished = read_manifest(made)
             return
         for path in self.partial.iterdir():
-            if path.name != "lock":
+            if path.name != LOCK:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         self._frames.mkdir()
         self._pieces.folder.mkdir()

@@ -30,7 +30,8 @@ from typing import Any
 
 from interp.pretrained import OF_RUN
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.disk import lock, undisturbed, unlock, whole_file, writing
+from vid2ev.recording.disk import whole_file, writing
+from vid2ev.recording.held import Held
 from vid2ev.recording.manifest import as_stated, difference, machine, versions
 from vid2ev.untrusted import json_of, read_text
 
@@ -58,16 +59,14 @@ class RunFolder:
         starts: Mapping[str, Path] = MappingProxyType({}),
     ):
         self.path, self.first = path, first
-        self._lock: int | None = None
+        self._held = Held(path)
         job = json.loads(json.dumps(job))
         if not first:  # (the process that leads has looked, and holds the folder)
             return
         self._check(job, resume)  # (before anything is written where something else is)
         try:
             with writing(path, "make room or access there, or choose another folder with -o"):
-                with undisturbed():
-                    path.mkdir(parents=True, exist_ok=True)
-                    self._lock = lock(path)
+                self._held.take()
                 self._check(job, resume)  # (another may have begun there until now)
                 self._begin(job, resume, starts)
         except BaseException:
@@ -103,9 +102,7 @@ class RunFolder:
 
     def close(self) -> None:
         """Let others at it."""
-        if self.first and self._lock is not None:
-            unlock(self.path, self._lock)
-            self._lock = None
+        self._held.close()
 
     @property
     def checkpoint(self) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -25,8 +24,8 @@ from interp.data.settings import ClipSettings
 from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
-from vid2ev.recording.disk import lock
 from vid2ev.recording.exposures import write_codes
+from vid2ev.recording.held import Held
 
 pytestmark = pytest.mark.long
 
@@ -261,8 +260,9 @@ def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, m
             write_dataset(tmp_path / "set", DatasetSpec(**QUICK))
     finally:
         signal.signal(signal.SIGINT, before)
-    assert not (tmp_path / "set.partial" / "job.json").exists()
-    os.close(lock(tmp_path / "set.partial"))
+    assert not list(tmp_path.iterdir())
+    with Held(tmp_path / "set.partial"):
+        pass
 
 
 def test_what_is_there_is_left_alone(made: Path) -> None:

@@ -12,8 +12,9 @@ import pytest
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.columns import EventColumns, column_files
 from vid2ev.recording.destination import partial_of
-from vid2ev.recording.disk import lock, unlock, whole
+from vid2ev.recording.disk import whole
 from vid2ev.recording.folder import Folder, begun_job, check_free
+from vid2ev.recording.held import Held
 from vid2ev.recording.manifest import write_manifest
 from vid2ev.stream.events import Events
 
@@ -198,21 +199,22 @@ def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
 
 def test_a_lock_that_was_removed_since_it_was_opened_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fcntl = pytest.importorskip("fcntl", reason="no file locks on this system")
-    flock, held, removed = fcntl.flock, [], tmp_path / "out" / "lock"
+    flock, third, removed = fcntl.flock, Held(tmp_path / "out"), tmp_path / "out" / "lock"
 
     def late(handle: int, flags: int) -> None:
         """As if another process had ended, and a third begun, between the opening of the lock and this."""
         monkeypatch.setattr(fcntl, "flock", flock)
         removed.unlink()
-        held.append(lock(tmp_path / "out"))
+        third.take()
         flock(handle, flags)
 
     (tmp_path / "out").mkdir()
     monkeypatch.setattr(fcntl, "flock", late)
-    with pytest.raises(UsageError, match="another vid2ev"):
-        lock(tmp_path / "out")
-    os.close(held[0])
-    os.close(lock(tmp_path / "out"))
+    with pytest.raises(UsageError, match="another vid2ev"), Held(tmp_path / "out"):
+        pass
+    third.close()
+    with Held(tmp_path / "out"):
+        pass
 
 
 def test_who_is_asked_to_end_while_it_begins_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,16 +236,27 @@ def test_who_is_asked_to_end_while_it_begins_leaves_nothing(tmp_path: Path, monk
 
 
 def test_of_a_lock_nothing_is_left_and_that_of_others_stays(tmp_path: Path) -> None:
-    unlock(tmp_path, lock(tmp_path))
+    with Held(tmp_path):
+        pass
     assert not list(tmp_path.iterdir())
     pytest.importorskip("fcntl", reason="no file locks on this system")
-    handle = lock(tmp_path)
-    (tmp_path / "lock").unlink()
-    other = lock(tmp_path)
-    unlock(tmp_path, handle)
-    with pytest.raises(UsageError, match="another vid2ev"):
-        lock(tmp_path)
-    unlock(tmp_path, other)
+    with Held(tmp_path) as held:
+        (tmp_path / "lock").unlink()
+        with Held(tmp_path):
+            held.close()
+            with pytest.raises(UsageError, match="another vid2ev"), Held(tmp_path):
+                pass
+
+
+def test_a_folder_that_was_made_to_be_held_is_gone_if_nothing_came_into_it(tmp_path: Path) -> None:
+    with Held(tmp_path / "a" / "mine"):
+        pass
+    assert [path.name for path in tmp_path.rglob("*")] == ["a"]
+    with Held(tmp_path / "a"):  # (which was there)
+        pass
+    with Held(tmp_path / "b"):
+        (tmp_path / "b" / "file").touch()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["a", "b", "file"]
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:

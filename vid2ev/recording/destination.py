@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.held import LOCK
 from vid2ev.untrusted import possible
 
 
@@ -36,6 +37,6 @@ def begun_at(path: Path) -> set[str]:
     """The names of what is there of something that was begun.  Raises UsageError where others have that folder."""
     partial = partial_of(path)
     begun = {each.name for each in partial.iterdir()} if partial.is_dir() else set()
-    if begun and not begun & {"job.json", "lock"}:
+    if begun and not begun & {"job.json", LOCK}:
         raise UsageError(f"{partial} is needed to work in, and holds other files; choose another folder with -o")
     return begun

@@ -1,13 +1,11 @@
-"""Files and folders that survive: written as a whole, brought to the disk, held by one process."""
+"""Files and folders that survive: written as a whole, brought to the disk."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import shutil
-import signal
 import sys
-import threading
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,65 +16,7 @@ from typing import IO
 import numpy as np
 
 from vid2ev.errors import DataError, DiskError, UsageError
-
-try:
-    import fcntl
-except ImportError:  # not on Windows
-    fcntl = None  # type: ignore[assignment]
-
-
-ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-
-
-def lock(folder: Path) -> int:
-    """Lock a folder until the handle returned is closed or the process ends; raises UsageError if another holds it."""
-    handle = os.open(folder / "lock", os.O_CREAT | os.O_RDWR)
-    if fcntl is None:
-        return handle
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        raise UsageError(f"another vid2ev is writing {folder}; wait for it, or choose another folder with -o") from None
-    if _is_at(handle, folder / "lock"):
-        return handle
-    os.close(handle)  # (who held it has removed it since it was opened, and others may hold a new one)
-    folder.mkdir(parents=True, exist_ok=True)
-    return lock(folder)
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Signals that ask the program to end wait until this is done: who clears up knows what was taken within."""
-    if threading.current_thread() is not threading.main_thread():  # (others hear none)
-        yield
-        return
-    before, asked = {number: signal.getsignal(number) for number in ENDING}, list[int]()
-    try:
-        for number, handler in before.items():
-            if callable(handler):
-                signal.signal(number, lambda number, _: asked.append(number))
-        yield
-    finally:
-        for number, handler in before.items():
-            if callable(handler):
-                signal.signal(number, handler)
-    for number in asked[:1]:
-        signal.raise_signal(number)
-
-
-def unlock(folder: Path, handle: int) -> None:
-    """Let others at a folder that was locked, with nothing left of the lock."""
-    if _is_at(handle, folder / "lock"):
-        _remove(folder / "lock")  # (while it is held: who has opened it meanwhile sees that it is gone)
-    os.close(handle)
-
-
-def _is_at(handle: int, path: Path) -> bool:
-    """Whether the file of a handle is still there by its name."""
-    with suppress(FileNotFoundError):
-        return os.path.samestat(os.fstat(handle), os.stat(path))
-    return False
+from vid2ev.recording.held import Held
 
 
 @contextmanager
@@ -108,11 +48,9 @@ def whole(path: Path) -> Iterator[Path]:
     """
     aside = path.with_name(f"{path.name}.new")
     made, replaced = aside / path.name, aside / "replaced"
-    handle = None
+    held = Held(aside)
     try:
-        with undisturbed():
-            aside.mkdir(parents=True, exist_ok=True)
-            handle = lock(aside)
+        held.take()
         _remove(made)
         yield made
         for file in [*made.rglob("*"), made]:
@@ -120,10 +58,10 @@ def whole(path: Path) -> Iterator[Path]:
         put_in_place(made, path, replaced)
         sync(path.absolute().parent)
     finally:
-        if handle is not None:
-            for rest in (made, replaced, aside / "lock"):
-                _remove(rest)
-            os.close(handle)
+        if held:
+            _remove(made)
+            _remove(replaced)
+            held.close()
         with suppress(OSError):
             aside.rmdir()
 

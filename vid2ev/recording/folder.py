@@ -31,7 +31,8 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats.eager import EagerFile
 from vid2ev.recording.destination import begun_at, check_folder, partial_of
-from vid2ev.recording.disk import lock, put_in_place, sync, undisturbed, whole_file, writing
+from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
+from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import is_of_job, read_manifest
 from vid2ev.untrusted import read_arrays
 
@@ -71,15 +72,13 @@ class Folder:
         self._growing = tuple(growing)
         self.finished: dict[str, Any] | None = None  # the manifest, if `resume` finds the recording made
         self._files: dict[str, io.BufferedRandom] = {}
-        self._lock: int | None = None
+        self._held = Held(self.partial)
 
     def __enter__(self) -> Self:
         check_free(self.directory, self.overwrite, self.resume)
         try:
             with self.writing():
-                with undisturbed():
-                    self.partial.mkdir(parents=True, exist_ok=True)
-                    self._lock = lock(self.partial)
+                self._held.take()
                 self._begin()
         except BaseException as error:
             self.__exit__(type(error), error, error.__traceback__)
@@ -92,12 +91,12 @@ class Folder:
         for file in self._files.values():
             with suppress(OSError):
                 file.close()
-        if self._lock is not None:
+        if self._held:
             if self.finished or not self.resumable:
                 with suppress(OSError):
                     self._clear()
                 shutil.rmtree(self.partial, ignore_errors=True)
-            os.close(self._lock)
+            self._held.close()
 
     @property
     def resumable(self) -> bool:
@@ -222,7 +221,7 @@ class Folder:
         """Remove all but the lock: first what could be gone on from, last what says whose folder it is."""
         (self.partial / "checkpoint.npz").unlink(missing_ok=True)
         for path in sorted(self.partial.iterdir(), key=lambda path: path.name == "job.json"):
-            if path.name != "lock":
+            if path.name != LOCK:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
