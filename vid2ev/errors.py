@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
 
 class Vid2evError(Exception):
@@ -38,6 +40,21 @@ class DataError(Vid2evError, OSError):
 
 class DiskError(DataError):
     """A disk that does not take what is to be written: nobody's file is at fault, and all work ends there."""
+
+
+@contextmanager
+def read_as(
+    path: Path, kind: str, stumbles: tuple[type[Exception], ...] = (OSError, ValueError, MemoryError)
+) -> Iterator[None]:
+    """What a reader of files of this kind stumbles over within becomes one sentence, a DataError."""
+    try:
+        yield
+    except Vid2evError:
+        raise
+    except stumbles as error:
+        raise DataError(
+            f"{path} cannot be read as {kind}: it is cut short or damaged; make it again or get another copy"
+        ) from error
 
 
 def _quoted(message: str) -> str:

@@ -28,7 +28,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, read_as
 from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
 from vid2ev.stream.events import Events
 
@@ -130,15 +130,8 @@ class Aedat3Events:
     @contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
         """The file, open; every way in which it is not one becomes a DataError."""
-        try:
-            with open(self.path, "rb") as file:
-                yield file
-        except DataError:
-            raise
-        except (OSError, ValueError, MemoryError) as error:
-            raise DataError(
-                f"{self.path} cannot be read as AEDAT 3.1: it is cut short or damaged; get another copy of it"
-            ) from error
+        with read_as(self.path, "AEDAT 3.1"), open(self.path, "rb") as file:
+            yield file
 
 
 def _header(file: BinaryIO) -> dict[str, str]:

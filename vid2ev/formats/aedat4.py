@@ -29,7 +29,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, read_as
 from vid2ev.formats.aedat4_writer import EVENT, MAGIC, PACKET, START, write_events
 from vid2ev.formats.event_file import BLOCK, PACKETS, Format, Picture, regrouped, within
 from vid2ev.formats.flatbuffers import Table
@@ -122,15 +122,8 @@ class Aedat4Events:
     @contextmanager
     def _opened(self) -> Iterator[BinaryIO]:
         """The file, open; every way in which it is not one becomes a DataError."""
-        try:
-            with open(self.path, "rb") as file:
-                yield file
-        except DataError:
-            raise
-        except (OSError, ValueError, MemoryError) as error:
-            raise DataError(
-                f"{self.path} cannot be read as AEDAT4: it is cut short or damaged; make it again or get another copy"
-            ) from error
+        with read_as(self.path, "AEDAT4"), open(self.path, "rb") as file:
+            yield file
 
 
 def _header(file: BinaryIO) -> tuple[str, int, list[_Stream]]:

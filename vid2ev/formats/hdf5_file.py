@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, read_as
 from vid2ev.formats.eager import EagerFile
 from vid2ev.untrusted import check_bytes
 
@@ -26,16 +26,10 @@ def opened(path: Path, check: Callable[[h5py.File, Path], None]) -> Iterator[h5p
     import h5py
     import hdf5plugin  # noqa: F401  (registers the filters)
 
-    try:
-        with h5py.File(path, "r") as file:
-            check(file, path)
-            yield file
-    except DataError:
-        raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        raise DataError(
-            f"{path} cannot be read as events: it is cut short or damaged; make it again or get another copy"
-        ) from error
+    stumbles = (OSError, RuntimeError, KeyError, ValueError, TypeError)
+    with read_as(path, "events", stumbles), h5py.File(path, "r") as file:
+        check(file, path)
+        yield file
 
 
 def holds_table(path: Path) -> bool:

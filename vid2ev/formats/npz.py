@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, read_as
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array
 from vid2ev.formats.sequential import Sequential, reading
@@ -102,15 +102,9 @@ class NpzEvents(Sequential):
     @contextmanager
     def _opened(self) -> Iterator[dict[str, Array]]:
         """The arrays of the file, open, by name; every way in which it is damaged becomes a DataError."""
-        try:
-            with ExitStack() as stack:
-                yield _arrays(stack, self.path)
-        except DataError:
-            raise
-        except Exception as error:  # (zipfile, zlib and numpy have a dozen of their own)
-            raise DataError(
-                f"{self.path} cannot be read as arrays of NumPy: it is cut short or damaged; get another copy"
-            ) from error
+        # zipfile, zlib and numpy have a dozen errors of their own
+        with read_as(self.path, "arrays of NumPy", (Exception,)), ExitStack() as stack:
+            yield _arrays(stack, self.path)
 
 
 def write_events(path: Path, recording: Recording) -> None:

@@ -18,14 +18,13 @@ Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-ca
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, UsageError, read_as
 from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.evt_state import Left, State
 from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
@@ -59,7 +58,7 @@ class RosEvents:
 
     def __init__(self, path: Path, open_bag: Callable[[Path], Bag]):
         self.path = path
-        with self._readable():
+        with read_as(self.path, "a bag"):
             self._bag = open_bag(path)
             self.warnings = self._bag.warnings
             events = [topic for topic in self._bag.topics if KINDS.get(topic.type) in ("array", "packet")]
@@ -86,7 +85,7 @@ class RosEvents:
 
     def frames(self) -> Iterator[Picture]:
         """The images of the topic next to that of the events."""
-        with self._readable():
+        with read_as(self.path, "a bag"):
             for _, content in self._bag.messages([self._images.name] if self._images else []):
                 yield image(content, self._bag.cdr)
 
@@ -113,7 +112,7 @@ class RosEvents:
             yield decode(content, self._bag.cdr)
 
     def _decoded(self) -> Iterator[Events]:
-        with self._readable():
+        with read_as(self.path, "a bag"):
             words = _Words(self.size or (1 << 11, 1 << 11))
             for message in self._messages():
                 if isinstance(message, EventArray):
@@ -122,18 +121,6 @@ class RosEvents:
                     yield words.events(message)
                 else:
                     yield _unpacked(message, self.path)
-
-    @contextmanager
-    def _readable(self) -> Iterator[None]:
-        """Every way in which the bag is not one becomes a DataError."""
-        try:
-            yield
-        except DataError:
-            raise
-        except (OSError, ValueError, MemoryError) as error:
-            raise DataError(
-                f"{self.path} cannot be read as a bag: it is cut short or damaged; make it again or get another copy"
-            ) from error
 
 
 def _nearest(images: list[Topic], events: Topic) -> Topic | None:
