@@ -35,6 +35,7 @@ from vid2ev.instants import Instant, events_of
 from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
 from vid2ev.sensors.compiled import flags_of
+from vid2ev.sensors.course import Course
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.presets import DVS, load
 from vid2ev.stream.events import Events
@@ -251,6 +252,15 @@ def test_a_preview_shows_the_events_that_the_sensor_sends(previewer: Previewer, 
     assert len(course_chart(answer.course)["series"]) == 7
     assert statistics_rows({"dvs": shown.statistics})[3] == ["events", f"{len(events):,}"]
     assert interval_chart({"dvs": shown.statistics})["series"][0]["name"] == "dvs"
+
+
+def test_the_levels_of_a_course_step_at_its_events() -> None:
+    t_ns, zero = np.array([0, 10**6, 2 * 10**6, 3 * 10**6]), np.zeros(4)
+    sent = Events(np.array([1200, 1700]), *np.zeros((2, 2), np.uint16), np.ones(2, np.uint8))
+    level_on = np.array([0.1, 0.1, 0.3, 0.3])
+    drawn = course_chart(Course(t_ns, zero, zero, zero, level_on, level_on - 0.2, sent))["series"]
+    (on,) = (series["data"] for series in drawn if series["name"] == "ON level")
+    assert on == [[0.0, 0.1], [1.0, 0.1], [1.7, 0.3], [2.0, 0.3], [3.0, 0.3]]
 
 
 def test_half_of_the_intervals_are_below_what_is_said_with_two_digits() -> None:

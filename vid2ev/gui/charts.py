@@ -25,8 +25,8 @@ def course_chart(course: Course | None) -> dict[str, Any]:
     step = line | below | {"step": "end", "lineStyle": {"width": 1, "type": "dashed"}}
     series = [
         line | {"name": "light", "data": _pairs(t_ms, course.light), "color": MUTED},
-        step | {"name": "ON level", "data": _pairs(t_ms, course.level_on), "color": ON},
-        step | {"name": "OFF level", "data": _pairs(t_ms, course.level_off), "color": OFF},
+        step | {"name": "ON level", "data": _stepped(course, course.level_on), "color": ON},
+        step | {"name": "OFF level", "data": _stepped(course, course.level_off), "color": OFF},
         line
         | below
         | {
@@ -67,6 +67,16 @@ def course_chart(course: Course | None) -> dict[str, Any]:
         "yAxis": [_axis("light", True, gridIndex=0, splitNumber=2), _axis("log light [nat]", True, gridIndex=1)],
         "series": series,
     }
+
+
+def _stepped(course: Course, level: np.ndarray) -> list[list[float]]:
+    """A level, which is known after each frame: what is another then is so from the last event before it."""
+    sent_ns = 1000 * course.events.t
+    frame = np.minimum(np.searchsorted(course.t_ns, sent_ns), len(course.t_ns) - 1)
+    last = np.flatnonzero(np.diff(frame, append=len(course.t_ns)))
+    t_ns = np.concatenate([course.t_ns, sent_ns[last]])
+    order = np.argsort(t_ns, kind="stable")
+    return _pairs(1e-6 * (t_ns[order] - course.t_ns[0]), np.concatenate([level, level[frame[last]]])[order])
 
 
 def cost_chart(found: dict[str, Any]) -> dict[str, Any]:
