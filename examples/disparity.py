@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS
 from vid2ev import open_source
-from vid2ev.conversion import convert
+from vid2ev.making.conversion import convert
 
 SCENE = """
 [scene]

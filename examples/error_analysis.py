@@ -25,7 +25,7 @@ from interp.evaluate.sets import footage_of
 from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS
 from vid2ev.compare.pictures import psnr, squared_error
-from vid2ev.conversion import convert
+from vid2ev.making.conversion import convert
 
 SIZE = "size=256x192"
 NEAR = f"scene:parallax,seed=2,{SIZE},camera.trajectory={{kind='shake',rms_mm=6,rms_deg=1.5,low_hz=1,high_hz=4,seed=1}}"

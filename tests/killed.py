@@ -30,4 +30,4 @@ def converted(
 ) -> subprocess.CompletedProcess[str]:
     """Convert with these options of `convert`, after the program `before`; prints how many reports there were."""
     arguments = [str(killed_at), str(clip), str(directory), json.dumps(options)]
-    return forks_of("import vid2ev.conversion").run(before + RUN, *arguments)
+    return forks_of("import vid2ev.making.conversion").run(before + RUN, *arguments)

@@ -113,7 +113,7 @@ def test_json_for_programs() -> None:
 
 
 def test_a_mistake_of_the_program_stops_one_video_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    from vid2ev import conversion
+    from vid2ev.making import conversion
 
     convert = conversion.convert
 

@@ -20,11 +20,13 @@ import pytest
 import torch
 from click.testing import CliRunner, Result
 
-from vid2ev import UsageError, conversion, instants
+from vid2ev import UsageError
 from vid2ev.commands import main
 from vid2ev.commands.summary import of_the_clip, result_facts
-from vid2ev.instants import Instant
+from vid2ev.making import conversion
 from vid2ev.recording.manifest import difference
+from vid2ev.seen import instants
+from vid2ev.seen.instants import Instant
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 LONG = "a" * 300
@@ -360,7 +362,7 @@ def test_an_interrupted_conversion_says_how_to_go_on(monkeypatch: pytest.MonkeyP
 
 
 def test_mistakes_of_the_program_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vid2ev.recipe.open_source", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("vid2ev.seen.recipe.open_source", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         vid2ev("convert", CLIP)
 
@@ -381,7 +383,7 @@ def no_room_on_a_gpu() -> None:
     (no_room, "the memory"), (no_room_for_a_tensor, "the memory"), (no_room_on_a_gpu, "the GPU's memory"),
 ])  # fmt: skip
 def test_a_full_memory_is_one_sentence(monkeypatch: pytest.MonkeyPatch, fills: Callable[[], None], said: str) -> None:
-    monkeypatch.setattr("vid2ev.recipe.open_source", lambda *_, **__: fills())
+    monkeypatch.setattr("vid2ev.seen.recipe.open_source", lambda *_, **__: fills())
     result = vid2ev("convert", CLIP)
     assert result.exit_code == 1 and result.stderr.startswith(f"error: {said} is full; take smaller")
     assert result.stderr.count("\n") == 1

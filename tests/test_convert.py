@@ -14,9 +14,10 @@ import hdf5plugin  # noqa: F401  (registers the filters)
 import numpy as np
 import pytest
 
-from vid2ev import DataError, Events, UsageError, convert, events_of, instants, load_sensor, open_source, read_events
-from vid2ev.conversion import Paused
-from vid2ev.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
+from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, open_source, read_events
+from vid2ev.making.conversion import Paused
+from vid2ev.seen import instants
+from vid2ev.seen.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
 from vid2ev.stream.ahead import ahead
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.3"

@@ -14,14 +14,14 @@ from click.testing import CliRunner
 
 from vid2ev import DataError, Events, UsageError, convert, read_events
 from vid2ev.commands import main
-from vid2ev.conversion import Paused
-from vid2ev.recipe import Recipe
+from vid2ev.making.conversion import Paused
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.pose import IDENTITY
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.source import SceneSource
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sources import open_source
 from vid2ev.sources.synthetic import MovingEdge
 

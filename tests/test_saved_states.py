@@ -15,12 +15,12 @@ from interp.train.run_folder import RunFolder
 from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
-from vid2ev.outputs import Outputs
 from vid2ev.recording.destination import partial_of
 from vid2ev.recording.disk import put_in_place
 from vid2ev.recording.held import Held
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks.outputs import Outputs
 
 CLIP = "synthetic:moving-edge,size=16x12,fps=100,duration_s=0.08"
 OPTIONS = {"overrides": ["frame_rate_hz=900", "delay_us=3000"], "threads": 1, "piece": 3 << 18}

@@ -19,14 +19,14 @@ from click.testing import CliRunner
 from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster.task import Task
 from vid2ev.commands import main
-from vid2ev.conversion import Paused
 from vid2ev.formats import read_events
-from vid2ev.parts import Replayed
+from vid2ev.making.conversion import Paused
+from vid2ev.making.split import convert_split
 from vid2ev.recording.held import Held
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.split import convert_split
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks.parts import Replayed
 
 pytestmark = pytest.mark.long
 

@@ -10,12 +10,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vid2ev.conversion import convert as convert
     from vid2ev.errors import DataError as DataError
     from vid2ev.errors import UsageError as UsageError
     from vid2ev.errors import Vid2evError as Vid2evError
     from vid2ev.formats import read_events as read_events
-    from vid2ev.instants import events_of as events_of
+    from vid2ev.making.conversion import convert as convert
+    from vid2ev.seen.instants import events_of as events_of
     from vid2ev.sensors.batch import DvsBatch as DvsBatch
     from vid2ev.sensors.batch_on_card import DvsBatchOnCard as DvsBatchOnCard
     from vid2ev.sensors.card_grids import NetCountsOnCard as NetCountsOnCard
@@ -58,8 +58,8 @@ _HOME = {
     "VoxelsOnCard": "vid2ev.sensors.card_grids",
     "Windows": "vid2ev.views.grid",
     "cis_names": "vid2ev.sensors.presets",
-    "convert": "vid2ev.conversion",
-    "events_of": "vid2ev.instants",
+    "convert": "vid2ev.making.conversion",
+    "events_of": "vid2ev.seen.instants",
     "load_cis": "vid2ev.sensors.presets",
     "load_sensor": "vid2ev.sensors.presets",
     "memory_of": "vid2ev.sensors.devices",

@@ -27,8 +27,8 @@ from vid2ev.cluster.processes import processes
 from vid2ev.cluster.task import Task, Tell
 from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
-from vid2ev.conversion import telling
 from vid2ev.errors import DiskError
+from vid2ev.making.conversion import telling
 from vid2ev.recording.disk import sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import difference, read_manifest, versions

@@ -15,9 +15,9 @@ from interp.data.chance import chance
 from interp.data.sensor_ranges import SENSORS
 from interp.own_codes import codes_of, curve_of
 from vid2ev import Dvs, DvsSpec, Events, load_sensor, open_source
-from vid2ev.instants import Instant, instants
-from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sources import is_scene
 from vid2ev.sources.source import Source
 from vid2ev.toml_text import toml_value

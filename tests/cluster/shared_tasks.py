@@ -11,7 +11,7 @@ from typing import Any
 
 from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster.task import GoOn, Tell
-from vid2ev.conversion import Paused
+from vid2ev.making.conversion import Paused
 
 
 def tried(name: str) -> int:

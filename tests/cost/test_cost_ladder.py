@@ -14,7 +14,7 @@ from vid2ev.commands.convert import convert
 from vid2ev.cost.ladder import Given, Ladder, ladder_of
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError
-from vid2ev.recipe import Recipe
+from vid2ev.seen.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.1"
 

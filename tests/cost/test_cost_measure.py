@@ -22,7 +22,7 @@ from vid2ev.cost.rung import Rung
 from vid2ev.cost.stretch import stretch_of
 from vid2ev.cost.table import cells, recommendation, table
 from vid2ev.errors import UsageError
-from vid2ev.recipe import Recipe
+from vid2ev.seen.recipe import Recipe
 from vid2ev.stream import Events
 
 SIMPLE: dict[str, Any] = {"sensor": "ideal", "fps": 50, "threads": 1, "repeats": 1}

@@ -31,9 +31,9 @@ from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
 from vid2ev.gui.worker import Refused, Worker, _serve
-from vid2ev.instants import Instant, events_of
-from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import default_rig
+from vid2ev.seen.instants import Instant, events_of
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.compiled import flags_of
 from vid2ev.sensors.course import Course
 from vid2ev.sensors.dvs import Dvs

@@ -27,10 +27,10 @@ from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_pl
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.why import why_not
-from vid2ev.outputs import Outputs
-from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import read_scene, scene_names
+from vid2ev.seen.recipe import Recipe
+from vid2ev.tracks.outputs import Outputs
 
 SMALL = "scene:spinning-shapes,size=32x24,duration_s=0.02"
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from vid2ev.bounds.scene import Omission
 from vid2ev.compare.by_pixel import by_pixel
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
-from vid2ev.instants import instants
 from vid2ev.plan.plan import EFFECTS
-from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import Camera, Rig
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Events, Frame

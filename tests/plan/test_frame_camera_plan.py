@@ -15,11 +15,11 @@ import pytest
 
 from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
 from vid2ev.errors import UsageError
-from vid2ev.instants import instants
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of
 from vid2ev.plan.plan import KNOWN, names_of
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import EFFECTS, CisSpec
 from vid2ev.sensors.presets import cis_names, load_cis

@@ -12,8 +12,8 @@ from vid2ev import convert
 from vid2ev.commands.plan import plan
 from vid2ev.errors import UsageError
 from vid2ev.plan.recordings import planned, plans_of
-from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.seen.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.2"
 

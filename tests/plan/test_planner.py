@@ -16,11 +16,11 @@ import pytest
 from against.clips import clean
 
 from vid2ev import convert, read_events
-from vid2ev.instants import instants
 from vid2ev.plan import planner as planning
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import plans_of
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sources.arrays import ArrayStack
 from vid2ev.stream import Events
 
@@ -158,7 +158,7 @@ def test_the_time_it_took_is_that_of_all_plans(
     """By a clock that goes on a second whenever it is asked."""
     held(SOME)
     clock = itertools.count()
-    monkeypatch.setattr("vid2ev.conversion.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    monkeypatch.setattr("vid2ev.making.conversion.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
     manifest = made(clip, tmp_path / "auto", tolerance=0.01)
     assert gone(manifest) == [] and manifest["run"]["seconds"] > 100 + 10
 

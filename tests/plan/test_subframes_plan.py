@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from vid2ev import convert
-from vid2ev.instants import Instant, instants
 from vid2ev.plan.recordings import plans_of
 from vid2ev.plan.subframes import Subframes
-from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.stream import Frame
 from vid2ev.upsample.flow import FlowUpsampling
 from vid2ev.upsample.motion import FEWEST

@@ -13,11 +13,11 @@ from click.testing import CliRunner
 from vid2ev.commands.plan import plan as plan_command
 from vid2ev.plan.recordings import plans_of
 from vid2ev.plan.views import DepthRange, homography_error_px
-from vid2ev.recipe import Recipe
 from vid2ev.rig.homography import places_on_plane
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.views import Views
+from vid2ev.seen.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=48x32,duration_s=0.05"
 SOURCE = Intrinsics.of_field((96, 72), 60.0)

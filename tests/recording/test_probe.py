@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from vid2ev import Dvs, Events, UsageError, convert, load_sensor, read_events
-from vid2ev.outputs import Outputs
 from vid2ev.recording.probe import HEADER, Probe, merged, read_probe, stepped
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks.outputs import Outputs
 
 F = np.float32
 CLIP = "synthetic:moving-edge,size=48x32,fps=200,duration_s=0.3"

@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_any_world import TEXTURES, point, surfaces, things, turn, worlds
 
-from vid2ev.instants import instants
-from vid2ev.recipe import Recipe
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.reel import Reel
@@ -19,6 +17,8 @@ from vid2ev.scenes.render import render
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.snapshot import Lamp, Shape, Snapshot, Surface, Thing
 from vid2ev.scenes.world import World
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.upsample.stillness import still_strips
 
 CAMERA = Intrinsics.of_field((150, 70), 80)

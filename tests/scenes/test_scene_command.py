@@ -18,13 +18,13 @@ from scipy.spatial.transform import Rotation
 from vid2ev.commands import Commands
 from vid2ev.commands.convert import convert
 from vid2ev.commands.scene import scene
-from vid2ev.recipe import Recipe
 from vid2ev.recording.flow_files import read_flow
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.scenes import folder as folder_module
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.world import World
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sources import open_source
 
 QUICK = ["--size", "48x36", "--duration", "0.05", "--fps", "100", "--no-preview"]

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from vid2ev.commands import main
-from vid2ev.instants import events_of
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import events_of
+from vid2ev.seen.recipe import Recipe
 
 CLIP = "synthetic:moving-edge,size=40x30,duration_s=0.2,fps=100"
 

@@ -12,8 +12,8 @@ import pytest
 from skimage import data
 
 from vid2ev import Dvs, convert, load_sensor, open_source, read_events
-from vid2ev.instants import Instant, instants
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import cuts

@@ -22,7 +22,7 @@ Convert = Callable[[str, Path], dict[str, Any]]
 
 def directories(videos: Iterable[str], within: Path) -> dict[str, Path]:
     """A folder for the recording of each video; of videos with one name, the second gets a number."""
-    from vid2ev.conversion import default_directory
+    from vid2ev.making.conversion import default_directory
 
     named: dict[str, Path] = {}
     taken: set[str] = set()

@@ -180,12 +180,12 @@ def convert(
 
     Of several videos, one that fails does not stop the others; with --resume, those that are done are left as they are.
     """
-    from vid2ev import conversion
     from vid2ev.commands import batch
     from vid2ev.commands.converting import check_shared, chosen_for, convert_on_worker, convert_one
     from vid2ev.commands.progress import given
     from vid2ev.commands.splitting import split_among, split_of
     from vid2ev.commands.worker_options import workers_of
+    from vid2ev.making import conversion
     from vid2ev.sources.many import sources_in
 
     quiet |= as_json

@@ -19,10 +19,10 @@ def convert_one(
     video: str, directory: Path, dry_run: bool, verbose: bool, quiet: bool, options: dict[str, Any]
 ) -> dict[str, Any]:
     """Convert a video; returns the manifest, of a dry run what it would begin with."""
-    from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.commands.dry_run import planned
     from vid2ev.commands.progress import bar, given, heard, kept
+    from vid2ev.making import conversion
     from vid2ev.terminal import lines
 
     budget, limits = options["budget"], None
@@ -62,8 +62,8 @@ def convert_on_worker(
 ) -> dict[str, Any] | GoOn:
     """Convert a video, as a task, or go on for so long and then leave it to another; returns the manifest.  `named`:
     the options of the command line."""
-    from vid2ev import conversion
     from vid2ev.cluster.task import GoOn
+    from vid2ev.making import conversion
 
     chosen, until_s = chosen_for(video, directory, True, dict(options), named), time.monotonic() + link_s
     chosen |= {"report": conversion.telling(tell), "pause": lambda: time.monotonic() > until_s}
@@ -89,9 +89,9 @@ def _within(
     `named` on the command line stay as they are."""
     from vid2ev.commands.progress import pass_bar
     from vid2ev.cost.choice import chosen, taken_up
-    from vid2ev.outputs import Outputs
+    from vid2ev.making.split import begun_part
     from vid2ev.recording.folder import begun_job, check_free
-    from vid2ev.split import begun_part
+    from vid2ev.tracks.outputs import Outputs
 
     check_free(directory, options["overwrite"], options["resume"])
     job = begun_job(directory) or begun_part(directory) if options["resume"] else {}

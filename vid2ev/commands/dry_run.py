@@ -13,15 +13,15 @@ def planned(
     video: str, directory: Path, options: dict[str, Any], budget: Budget | None = None
 ) -> tuple[dict[str, Any], str]:
     """The recipe for programs, and lines for people; raises what the conversion would raise before its first frame."""
-    from vid2ev import conversion
     from vid2ev.commands import summary
     from vid2ev.cores import usable_cores
-    from vid2ev.outputs import Outputs
+    from vid2ev.making import conversion
     from vid2ev.plan.recordings import check_effects
-    from vid2ev.recipe import Recipe
     from vid2ev.recording.folder import check_free
+    from vid2ev.seen.recipe import Recipe
     from vid2ev.sensors.devices import device_for
     from vid2ev.terminal import lines
+    from vid2ev.tracks.outputs import Outputs
 
     device = options.pop("device")
     threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")

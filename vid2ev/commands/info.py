@@ -50,7 +50,7 @@ def info(file: str, as_json: bool, **options: Any) -> None:
     elif is_list(path):
         raise UsageError(f"{path} is a text, which vid2ev convert takes for a list of videos; give one of them")
     else:
-        from vid2ev.recipe import holds_adc_codes
+        from vid2ev.seen.recipe import holds_adc_codes
 
         source = _opened(path, file, options)
         found = {"path": file} | source.describe() | {"duration_expected_s": source.duration_expected_s}

@@ -39,7 +39,7 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
     """
     from vid2ev.cores import usable_cores
     from vid2ev.plan.recordings import described, plans_of
-    from vid2ev.recipe import Recipe
+    from vid2ev.seen.recipe import Recipe
 
     plans = plans_of(Recipe.of(source, **options), effects, tolerance, usable_cores())
     if as_json:

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from vid2ev.conversion import Progress
     from vid2ev.cost.turns import Report
     from vid2ev.formats.event_file import Recording
-    from vid2ev.recipe import Recipe
+    from vid2ev.making.conversion import Progress
+    from vid2ev.seen.recipe import Recipe
 
 EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {elapsed} gone, {remaining} left"
 PASSES = "{percentage:3.0f}% {bar} pass {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"

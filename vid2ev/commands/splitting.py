@@ -50,7 +50,7 @@ def split_among(
     """Convert a video in parts; returns the manifest."""
     from vid2ev.commands.live import shared_out
     from vid2ev.commands.progress import bar, heard
-    from vid2ev.split import convert_split
+    from vid2ev.making.split import convert_split
     from vid2ev.terminal import counting
 
     def share_out(tasks: Sequence[Task]) -> None:

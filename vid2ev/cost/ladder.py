@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from vid2ev.cost.rung import Rung
-from vid2ev.instants import instants
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.cis_spec import NOISELESS, CisSpec
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample import METHODS

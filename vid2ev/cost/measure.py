@@ -24,8 +24,8 @@ from vid2ev.cost.stretch import FRAMES, Stretch, beginning_of, stretch_of
 from vid2ev.cost.turns import Report, Turns
 from vid2ev.errors import UsageError, Vid2evError
 from vid2ev.plan.plan import TOLERANCE
-from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import machine
+from vid2ev.seen.recipe import Recipe
 
 REPEATS = 3
 

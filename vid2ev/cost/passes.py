@@ -17,12 +17,12 @@ import numpy as np
 from vid2ev.compare.by_pixel import ByPixel, by_pixel
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError
-from vid2ev.instants import Instant, instants
 from vid2ev.light.eight_bits import srgb_codes
-from vid2ev.mounts import Mount
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import planned
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events

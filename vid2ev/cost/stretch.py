@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import islice
 from typing import Any
 
-from vid2ev.recipe import Recipe
+from vid2ev.seen.recipe import Recipe
 
 LONGEST_S, FRAMES = 2.0, 30  # of a clip of 640x480 pixels; less of larger ones, in proportion
 FEWEST, VGA = 8, 640 * 480

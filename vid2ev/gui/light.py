@@ -24,15 +24,15 @@ from vid2ev.gui.run_in import RUN_IN_S, PartRecipe, since_cut
 from vid2ev.gui.scene_light import Film, finer_than, grid_hz, ticks_of
 from vid2ev.gui.scene_part import ScenePart, scene_part
 from vid2ev.gui.setup import Setup
-from vid2ev.instants import Instant, instants
-from vid2ev.mounts import Loaded, Mount, mounts_of
-from vid2ev.recipe import Recipe
 from vid2ev.rig.camera import ResolvedRig, Rig
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.world import World
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.mounts import Loaded, Mount, mounts_of
+from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import taken_by
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.limits import check_seed
-from vid2ev.sight import taken_by
 from vid2ev.sources import OPTIONS, open_source
 from vid2ev.sources.framing import Framed, framing_of
 from vid2ev.sources.source import Source

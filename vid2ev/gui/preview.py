@@ -20,9 +20,9 @@ from vid2ev.gui.setup import Setup
 from vid2ev.gui.stand_in import Kernels
 from vid2ev.kernels.layout import Flags
 from vid2ev.light.eight_bits import srgb_codes
-from vid2ev.mounts import Mount
 from vid2ev.plan.plan import TOLERANCE, Plan
 from vid2ev.plan.recordings import Look
+from vid2ev.seen.mounts import Mount
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.course import Course, course_of
 from vid2ev.sensors.spec import DvsSpec

@@ -9,7 +9,6 @@ from typing import Any
 
 from nicegui import ui
 
-from vid2ev.conversion import default_directory
 from vid2ev.errors import Vid2evError
 from vid2ev.gui.command import RIG, SCENE, command_of, sensor_text, write_scene
 from vid2ev.gui.jobs import Done, Job, Progress
@@ -18,6 +17,7 @@ from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.gui.tasks import converted
 from vid2ev.gui.theme import say
+from vid2ev.making.conversion import default_directory
 from vid2ev.rig.rig_file import rig_text, write_text
 
 

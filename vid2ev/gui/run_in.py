@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from vid2ev.instants import Instant
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import Instant
+from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval, Upsampler

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.instants import Instant
-from vid2ev.mounts import Mount
 from vid2ev.rig.camera import ResolvedRig
 from vid2ev.scenes.instants import rate_hz
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.world import World
-from vid2ev.sight import arriving
+from vid2ev.seen.instants import Instant
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.sight import arriving
 from vid2ev.stream.frames import LUMINANCE, Frame
 
 MOST = 48  # pictures of a part

@@ -15,11 +15,11 @@ from pydantic import ValidationError
 
 from vid2ev.errors import UsageError
 from vid2ev.gui import files
-from vid2ev.recipe import refuse_recordings
 from vid2ev.rig.camera import Camera, Rig, Source, default_rig
 from vid2ev.rig.rig_file import made, read_rig
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.source import Request, parse_request, rig_of_scene
+from vid2ev.seen.recipe import refuse_recordings
 from vid2ev.sensors.presets import CIS, DVS, Kind, SensorFile
 from vid2ev.sources import CAMERA_PREFIX, SCENE_PREFIX, STANDARD_INPUT, check_there, is_scene
 from vid2ev.toml_text import toml_value

@@ -16,9 +16,9 @@ EVERY_S = 0.1  # a report, at most
 
 def converted(tell: Tell, setup: Setup, directory: str, overwrite: bool = False) -> dict[str, Any]:
     """The manifest of the recording of a setup; cancelled work leaves what it would leave on the command line."""
-    from vid2ev.conversion import convert
-    from vid2ev.recipe import Recipe
-    from vid2ev.recorder import Progress
+    from vid2ev.making.conversion import convert
+    from vid2ev.seen.recipe import Recipe
+    from vid2ev.tracks.recorder import Progress
 
     told_s = 0.0
 
@@ -39,10 +39,10 @@ def planned(tell: Tell, setup: Setup) -> dict[str, Any]:
     from contextlib import closing
 
     from vid2ev.cores import usable_cores
-    from vid2ev.instants import instants
     from vid2ev.plan.plan import TOLERANCE
     from vid2ev.plan.recordings import Look
-    from vid2ev.recipe import Recipe
+    from vid2ev.seen.instants import instants
+    from vid2ev.seen.recipe import Recipe
 
     tell(0, None, "opening the source")
     with tempfile.TemporaryDirectory() as folder:

@@ -39,10 +39,10 @@ from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import replace
 
-from vid2ev.instants import Instant, instants
 from vid2ev.plan.plan import Plan, check_tolerance
 from vid2ev.plan.recordings import PASSES, Look, left_of, plans_unseen
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.devices import CPU, Device
 
 HELD = 1 << 26  # bytes of light, at least an instant

@@ -7,15 +7,15 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from vid2ev.instants import Instant, instants
-from vid2ev.mounts import Mount
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.frame_camera import frame_plan_of, frame_plan_unseen
 from vid2ev.plan.measure import Measure
 from vid2ev.plan.plan import TOLERANCE, Plan, check_tolerance, names_of, plan_of, plan_unseen
 from vid2ev.plan.subframes import Subframes
 from vid2ev.plan.views import DepthRange, view_row
-from vid2ev.recipe import Recipe
+from vid2ev.seen.instants import Instant, instants
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sources import Source
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.bounds.scene import Omission
-from vid2ev.instants import Instant
 from vid2ev.plan.plan import Row
+from vid2ev.seen.instants import Instant
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample.subframes import KAPPA_PER_PX
 

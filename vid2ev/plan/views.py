@@ -20,14 +20,14 @@ import math
 import numpy as np
 
 from vid2ev.bounds.scene import Kind, Omission
-from vid2ev.mounts import Mount
 from vid2ev.plan.plan import Row
-from vid2ev.recipe import Recipe
 from vid2ev.rig.homography import places_on_plane
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.views import NEAREST_M, is_same
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
 
 HOMOGRAPHY_NS, DEPTH_NS = 12.0, 60.0  # per pixel of the view, luminance, of one thread; 15 while depth stays
 

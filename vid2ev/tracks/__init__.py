@@ -1,4 +1,4 @@
-"""What grows while a recording is made, camera by camera: a sensor, and the files of what it sends.
+"""What grows while a recording is made: of each camera a sensor, and the files of what it sends; of all a recorder.
 
 A new kind of camera is a class that satisfies `Track`, in a module of its own, and a line in `recorder._track`.
 """

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vid2ev.outputs import Outputs
 from vid2ev.pictures.film import remarks_on_size
 from vid2ev.recording.exposures import KINDS, ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks.outputs import Outputs
 
 
 class CisTrack:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.formats.event_file import BLOCK, Picture, Recording
-from vid2ev.outputs import Outputs
 from vid2ev.physics.fixed_rate import latest_us
 from vid2ev.pictures.film import remarks_on_size
 from vid2ev.recording.columns import EventColumns, column_files
@@ -21,6 +20,7 @@ from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks.outputs import Outputs
 from vid2ev.views.on_disk import KINDS
 
 FRAME_US, PROBE = "frame_us", "probe.csv"  # files that grow beside the events

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vid2ev.mounts import Mount
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.pose_text import HEADER, pose_lines
 from vid2ev.recording.truth_files import write_depth, write_flow, write_mask, write_pixel_map
 from vid2ev.rig.lens_file import write_lens
-from vid2ev.truth import Truth
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.truth import Truth
 
 TIMES, POSES = "truth_times", "truth_poses"  # files that grow
 

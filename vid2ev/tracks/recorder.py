@@ -12,22 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.instants import Instant, pictures
-from vid2ev.mounts import Mount
-from vid2ev.outputs import Outputs
-from vid2ev.parts import Made
-from vid2ev.recipe import Recipe
 from vid2ev.recording.folder import Folder
 from vid2ev.recording.preview import rate_for
 from vid2ev.rig.rig_file import is_file, rig_text, write_text
+from vid2ev.seen.instants import Instant, pictures
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import sees_nothing
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.sensors.tiles import WHOLE, Part
-from vid2ev.sight import sees_nothing
 from vid2ev.sources.framing import framing_of
 from vid2ev.tracks import Track
 from vid2ev.tracks.cis import CisTrack
 from vid2ev.tracks.dvs import DvsTrack, dvs_files
+from vid2ev.tracks.outputs import Outputs
+from vid2ev.tracks.parts import Made
 from vid2ev.tracks.truth import TruthTrack, truth_files
 from vid2ev.untrusted import json_of
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import read_events
-from vid2ev.mounts import Mount
 from vid2ev.physics.fixed_rate import EventFrames
-from vid2ev.recipe import Recipe
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.recording.probe import merged, one_after_the_other
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events

@@ -20,7 +20,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from vid2ev.errors import UsageError
-from vid2ev.recipe import Recipe
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample.cuts import CutDetector
 

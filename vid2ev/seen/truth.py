@@ -20,13 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.mounts import Mount
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.truth import depth_of_plane, depth_seen, pixel_map
 from vid2ev.rig.views import is_same
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.world import World
+from vid2ev.seen.mounts import Mount
 from vid2ev.stream.frames import Frame
 
 EARLY = 0.05  # of a period

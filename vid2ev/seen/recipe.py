@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from vid2ev.errors import UsageError, check_names
 from vid2ev.formats import recognise
-from vid2ev.mounts import Mount, Sensors, mounts_of
 from vid2ev.physics.bayer import check_pattern
 from vid2ev.recording import exposures
 from vid2ev.recording.manifest import identity, versions
@@ -21,15 +20,16 @@ from vid2ev.rig.camera import ResolvedRig, Rig, default_rig
 from vid2ev.rig.depth import plane_of
 from vid2ev.rig.intrinsics import Framing
 from vid2ev.rig.rig_file import read_rig
+from vid2ev.seen.mounts import Mount, Sensors, mounts_of
+from vid2ev.seen.sight import Sight, are_free, lens_of, scene_of, staged, taken_by
+from vid2ev.seen.truth import Wanted
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, are_free, lens_of, scene_of, staged, taken_by
 from vid2ev.sources import OPTIONS, SCENE_PREFIX, Source, is_scene, open_source
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.upload import Upload
-from vid2ev.truth import Wanted
 from vid2ev.upsample import Upsampler, make_upsampler
 
 THRESHOLD = 0.15  # nat, where there are frame cameras only

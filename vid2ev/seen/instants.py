@@ -16,19 +16,19 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.formats.event_file import Picture
 from vid2ev.light.eight_bits import srgb_codes
-from vid2ev.mounts import Mount
-from vid2ev.recipe import Recipe
 from vid2ev.rig.depth import between
+from vid2ev.seen.mounts import Mount
+from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import Sight, Stage, arriving, instants_of, scene_behind
+from vid2ev.seen.truth import Truth, Wanted, with_next
 from vid2ev.sensors.clock import LONGEST_INTERVAL_NS
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.sight import Sight, Stage, arriving, instants_of, scene_behind
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.stream.upload import Upload, as_array, downloaded
-from vid2ev.truth import Truth, Wanted, with_next
 from vid2ev.upsample import Interval
 from vid2ev.upsample.cuts import CutDetector
 from vid2ev.upsample.linear import LinearUpsampling

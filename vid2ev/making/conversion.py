@@ -16,21 +16,21 @@ from typing import Any
 from vid2ev.cluster.task import share_of
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError, check_names
-from vid2ev.instants import instants
-from vid2ev.outputs import Outputs
-from vid2ev.parts import Made
 from vid2ev.plan.plan import TOLERANCE
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import described, planned
-from vid2ev.recipe import Recipe, plain
-from vid2ev.recorder import Progress, Recorder, growing, progress_of
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
+from vid2ev.seen.instants import instants
+from vid2ev.seen.recipe import Recipe, plain
+from vid2ev.seen.sight import scene_of
 from vid2ev.sensors.devices import device_for
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
-from vid2ev.sight import scene_of
 from vid2ev.sources import begins_s, short_name
+from vid2ev.tracks.outputs import Outputs
+from vid2ev.tracks.parts import Made
+from vid2ev.tracks.recorder import Progress, Recorder, growing, progress_of
 
 PIECE = 1 << 32  # pixel-steps between two checkpoints: seconds of work, whatever the size of the frames
 STEP = 1 << 18  # what a step counts for at least, as a small frame takes its time too

@@ -24,19 +24,19 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.cluster.task import Task, Tell
-from vid2ev.conversion import Report, check_outputs, convert, telling
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import BLOCK
-from vid2ev.outputs import Outputs
-from vid2ev.parts import Made, reading
-from vid2ev.recipe import Recipe
+from vid2ev.making.conversion import Report, check_outputs, convert, telling
+from vid2ev.making.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
 from vid2ev.recording.disk import writing
 from vid2ev.recording.folder import begun_job, check_free
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Part
-from vid2ev.stretches import Look, Stretch, at_cuts, warm_up_us, with_warm_up
+from vid2ev.tracks.outputs import Outputs
+from vid2ev.tracks.parts import Made, reading
 
 PART = re.compile(r"\d+-of-\d+(\.partial)?")  # the folder of a part
 

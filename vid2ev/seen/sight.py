@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.mounts import Mount
 from vid2ev.physics.bayer import mosaic
 from vid2ev.rig.camera import Source as Taker
 from vid2ev.rig.homography import places_on_plane
@@ -19,6 +18,7 @@ from vid2ev.rig.views import View, Views, is_same
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.render import Picture
 from vid2ev.scenes.source import SceneSource
+from vid2ev.seen.mounts import Mount
 from vid2ev.sources import Source
 from vid2ev.sources.cut import Cut, Slowed
 from vid2ev.sources.edit import Edit

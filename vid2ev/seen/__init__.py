@@ -1,0 +1,1 @@
+"""What decides a recording, and what its cameras see of the source, instant by instant."""
