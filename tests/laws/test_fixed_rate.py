@@ -1,12 +1,16 @@
-"""Fixed-rate mode: event frames at round(1e6 k / rate) us, at most one event per pixel and event frame."""
+"""Fixed-rate mode: event frames at 1e6 k / rate us, rounded, at most one event per pixel and event frame."""
 
 from __future__ import annotations
+
+import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from against.clips import clean, feed, noisy, play, start
 
 from vid2ev.physics.fixed_rate import EventFrames, FixedRate
+from vid2ev.physics.shutter import opening_ns
 from vid2ev.sensors.dvs import DvsSpec
 from vid2ev.stream import Events
 
@@ -21,8 +25,12 @@ def clip() -> tuple[np.ndarray, np.ndarray]:
 
 
 def frame_times(rate_hz: float, until_us: int) -> np.ndarray:
-    k = np.arange(int(until_us * rate_hz * 1e-6) + 3)
-    return START_NS // 1000 + np.rint(1e6 * k / rate_hz).astype(np.int64)
+    return START_NS // 1000 + np.array([exact_us(k, rate_hz) for k in range(int(until_us * rate_hz * 1e-6) + 3)])
+
+
+def exact_us(k: int, rate_hz: float) -> int:
+    """The microsecond nearest to tick k of the rate as it is written, the later of two that are equally near."""
+    return math.floor(k * 10**6 / Fraction(repr(float(rate_hz))) + Fraction(1, 2))
 
 
 roundings = pytest.mark.parametrize("rounding", ["nearest", "causal"])
@@ -76,6 +84,36 @@ def test_each_microsecond_has_its_event_frame(rate_hz, rounding):
     before = np.maximum(after - 1, 0)
     nearest = np.where(t_us - grid[before] <= grid[after] - t_us, before, after)
     assert np.array_equal(frames.frame_of(t_us), nearest if rounding == "nearest" else after)
+
+
+# (those of many digits do not fit into products of int64)
+@pytest.mark.parametrize("rate_hz", [29.97, 0.007, 999_999.9, 24 / 1.001, 30 / 1.001, 1e-9, 1e5 / 3])
+@roundings
+def test_event_frames_are_on_an_exact_clock_however_late(rate_hz, rounding):
+    frames = EventFrames(FixedRate(frame_rate_hz=rate_hz, rounding=rounding), 1, 1)
+    frames.origin_us = 0
+    most = int(min(3e9, 2e6 * rate_hz * 1e6))
+    k = np.unique(np.random.default_rng(1).integers(0, max(most, 2), 200))
+    at_us = np.array([exact_us(each, rate_hz) for each in k.tolist()])
+    assert np.array_equal(frames.instant_us(k), at_us)
+    assert np.array_equal(frames.frame_of(at_us), k)
+    later = np.where(rounding == "causal", k + 1, k)
+    assert rate_hz > 3e5 or np.array_equal(frames.frame_of(at_us + 1), later)
+
+
+@pytest.mark.parametrize("rate_hz", [400_000.0, 29.97, 6e5, 24 / 1.001])
+def test_event_frames_and_exposures_go_by_one_clock(rate_hz):
+    frames = EventFrames(FixedRate(frame_rate_hz=rate_hz), 1, 1)
+    frames.origin_us = 0
+    k = np.append(np.arange(200), 10**9 + np.arange(3000))
+    apart_ns = np.array([opening_ns(each, rate_hz) for each in k.tolist()]) - 1000 * frames.instant_us(k)
+    assert np.abs(apart_ns).max() <= 500
+
+
+def test_halves_go_upwards():
+    frames = EventFrames(FixedRate(frame_rate_hz=400_000), 1, 1)
+    frames.origin_us = 0
+    assert frames.instant_us(np.arange(5)).tolist() == [0, 3, 5, 8, 10]
 
 
 @roundings

@@ -1,6 +1,6 @@
 """Fixed-rate mode: events are read out in event frames, at most one per pixel and frame.
 
-    frame k is at round(1e6 k / frame_rate_hz) us after the first light frame
+    frame k is at 1e6 k / frame_rate_hz us after the first light frame, rounded to the microsecond, halves upwards
     nearest   an event goes to the event frame nearest to its time, the earlier of two that are equally near
     causal    to the next one, as a scanner that reads what has happened
 
@@ -23,6 +23,7 @@ from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.physics.omission import omitted
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import clock, entry, events_of
+from vid2ev.stream.ticks import Ticks
 
 SLOWEST_HZ = 1e-9  # of event frames: 32 years from one to the next
 KINDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8, "label": np.uint8}  # of events held back
@@ -47,6 +48,7 @@ class EventFrames:
 
     def __init__(self, spec: FixedRate, width: int, height: int, labels: bool = False):
         self.spec, self.width, self.height, self.labels = spec, width, height, labels
+        self._ticks = Ticks.of(spec.frame_rate_hz, 10**6)
         self.origin_us: int | None = None
         self.last = np.full(width * height, -1, np.int64)
         self.held = Events.empty(labels)
@@ -54,17 +56,16 @@ class EventFrames:
     def instant_us(self, k: np.ndarray) -> np.ndarray:
         """Times [us] of event frames k."""
         assert self.origin_us is not None
-        return self.origin_us + np.rint(np.asarray(k, np.float64) * (1e6 / self.spec.frame_rate_hz)).astype(np.int64)
+        return self.origin_us + self._ticks.all_at(k)
 
     def frame_of(self, t_us: np.ndarray) -> np.ndarray:
         """The event frame that an event of time t goes to."""
         assert self.origin_us is not None
-        k = np.floor((t_us - self.origin_us) * (self.spec.frame_rate_hz * 1e-6)).astype(np.int64) - 1
-        # Frames are at rounded microseconds: walk up to the right one instead of trusting the division.
-        for _ in range(3):
-            here, after = self.instant_us(k), self.instant_us(k + 1)
-            ahead = t_us > here if self.spec.rounding == "causal" else t_us - here > after - t_us
-            k = k + ahead
+        since_us = t_us - self.origin_us
+        k = self._ticks.first_from(since_us)
+        if self.spec.rounding == "nearest":
+            before_us, after_us = self._ticks.all_at(k - 1), self._ticks.all_at(k)
+            k = k - (since_us - before_us <= after_us - since_us)
         return np.maximum(k, 0)
 
     def push(self, events: Events, until_us: int) -> Events:

@@ -32,7 +32,6 @@ Chen, "Analysis and compensation of rolling shutter effect", IEEE Trans. Image P
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -41,6 +40,7 @@ from pydantic import BaseModel, Field
 from vid2ev.bounds.exposed import Exposed, LevelChange, level_change
 from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
+from vid2ev.stream.ticks import Ticks
 
 
 class Shutter(BaseModel, frozen=True, extra="forbid"):
@@ -54,8 +54,7 @@ class Shutter(BaseModel, frozen=True, extra="forbid"):
 
 def opening_ns(k: int, frame_rate_hz: float) -> int:
     """When exposure k opens [ns after the first]; the rate as it is written in decimals, halves upwards."""
-    period = 10**9 / Fraction(str(frame_rate_hz))
-    return (2 * k * period.numerator + period.denominator) // (2 * period.denominator)
+    return Ticks.of(frame_rate_hz, 10**9).at(k)
 
 
 def interval_weights(
