@@ -55,7 +55,7 @@ def sensors_of(spec: dict[str, Any]) -> str:
 
 
 def _keys(facts: dict[str, Any]) -> str:
-    """How many frames scenes have of their frame camera; parts of films have as many as there is room for."""
+    """How many frames scenes have of their frame camera; fewer where frames of a film are missing."""
     least, most = (extreme(scene["key_frames"] for scene in facts["of_scenes"].values()) for extreme in (min, max))
     return f"{least} to {most}" if least < most else str(least)
 

@@ -151,7 +151,9 @@ def _rig(spec: DatasetSpec, number: int) -> tuple[Rig, float]:
     draw, ranges = chance(spec.seed, "rig", number), spec.sensors
     truth_fps = spec.multiple * spec.cis_fps
     halves = 2 if spec.preset == "paper" else int(draw.integers(2))  # steps of the truth in half an exposure
-    cis = ranges.cis(draw, 1_000_000, 2e6 * halves / truth_fps).model_copy(update={"frame_rate_hz": spec.cis_fps})
+    clock = {"frame_rate_hz": spec.cis_fps, "burst": spec.frames}
+    cis = ranges.cis(draw, 1_000_000, 2e6 * halves / truth_fps).model_copy(update=clock)
+    truth = cis.sampling(truth_fps, spec.frames * spec.multiple)  # (not on to where the next exposure would be)
     distance_mm, angle = uniform(draw, (0.0, spec.baseline_mm)), draw.uniform(0, 2 * math.pi)
     place = (distance_mm * math.cos(angle), distance_mm * math.sin(angle), 0.0)
     cameras = (
@@ -159,7 +161,7 @@ def _rig(spec: DatasetSpec, number: int) -> tuple[Rig, float]:
             name="dvs", kind="dvs", translation_mm=place, sensor="paper", set=_changes(ranges.dvs(draw), load_sensor)
         ),
         Camera(name="cis", kind="cis", sensor="paper", set=_changes(cis, load_cis)),
-        Camera(name="instants", kind="cis", sensor="paper", set=_changes(cis.sampling(truth_fps), load_cis)),
+        Camera(name="instants", kind="cis", sensor="paper", set=_changes(truth, load_cis)),
     )
     return Rig(cameras=cameras), 2 * halves / truth_fps
 

@@ -121,6 +121,18 @@ def test_films_are_cut_into_scenes_of_the_right_speed(film: Path, tmp_path: Path
     assert "They are real films." in card and "| Sensors | drawn anew for every video |" in card
 
 
+@pytest.mark.parametrize("layout", ["own", "hsergb"])
+def test_parts_of_a_film_have_as_many_frames_as_are_asked_for(film: Path, tmp_path: Path, layout: str) -> None:
+    """Whose frames are as far apart as the camera's: some parts have light for one more."""
+    facts = write_dataset(tmp_path / "set", DatasetSpec(videos=(str(film),), frames=3, layout=layout))
+    assert facts["scenes"] > 3
+    assert {scene["key_frames"] for scene in facts["of_scenes"].values()} == {3}
+    if layout == "own":
+        sequence = open_sequence(next((tmp_path / "set").glob("film-*")))
+        last = sequence.key_frames[-1]  # type: ignore[attr-defined]
+        assert len(sequence.times_us) <= last + 8
+
+
 def test_a_film_whose_clock_does_not_begin_at_0_is_cut_from_its_beginning(film: Path, tmp_path: Path) -> None:
     late = tmp_path / "film.npz"
     frames = np.load(film)["frames"]

@@ -206,6 +206,22 @@ def test_exposures_that_the_light_does_not_last_for_are_counted():
     assert cis.flush() == []
 
 
+def test_a_burst_ends_after_as_many_exposures_wherever_it_is_interrupted():
+    frames, spec = clip(), EVERYTHING.model_copy(update={"burst": 5})
+    whole = list(Cis(EVERYTHING, SIZE).run(frames))
+    assert len(whole) > 8
+    for at in (1, 12, 40):
+        cis, made = Cis(spec, SIZE), list[Exposure]()
+        for frame in frames[:at]:
+            made += cis.see(frame)
+        rest = Cis(spec, SIZE)
+        rest.restore(cis.state())
+        made += rest.run(frames[at:])
+        assert same(made, whole[:5]) and rest.counts == {"frames": 5, "unfinished": 0, "not_finite": 0}
+    with pytest.raises(UsageError, match=r"state of a frame camera at .* before exposure 6"):
+        rest.restore(rest.state() | {"clock": rest.state()["clock"] + np.array([0, 0, 1])})
+
+
 def test_rows_that_sampled_are_an_exposure_begun():
     """A rolling shutter of instants: at the only frame the first row has sampled, and the others never will."""
     light = np.full((*SIZE[::-1], 3), 0.5, np.float32)

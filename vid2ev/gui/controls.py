@@ -116,7 +116,8 @@ def reach(control: Control, seen: Iterable[Any]) -> tuple[float, float, float] |
     if control.kind not in ("number", "whole") or control.optional:
         return None
     known = [abs(float(value)) for value in seen if isinstance(value, int | float) and not isinstance(value, bool)]
-    high = _round(SPAN * (max(known, default=0.0) or USUAL.get(control.unit, 0.1)))
+    usual = USUAL.get(control.unit, 10.0 if control.kind == "whole" else 0.1)
+    high = _round(SPAN * (max(known, default=0.0) or usual))
     high = high if control.high is None else min(high, control.high)
     step = _round(high / STEPS)
     step = max(step, 1.0) if control.kind == "whole" else step

@@ -50,6 +50,7 @@ class Shutter(BaseModel, frozen=True, extra="forbid"):
     exposure_us: float = Field(5000.0, ge=0, le=1e8, description="how long each row is open; 0: an instant [us]")
     blur: bool = Field(True, description="true: the mean of the light while a row is open; false: that in the middle")
     line_us: float = Field(0.0, ge=0, le=1e6, description="how much later each row opens than the one above it [us]")
+    burst: int = Field(0, ge=0, le=10**9, description="exposures in all; 0: as many as the light lasts for")
 
 
 def opening_ns(k: int, frame_rate_hz: float) -> int:

@@ -21,6 +21,7 @@ from vid2ev.stream.saved import check_mark, clock, entry, mark_of
 __all__ = ["Cis", "CisSpec"]
 
 OPEN_BYTES = 1 << 32  # of the sums of all exposures that are open at a time
+NEVER_NS = 1 << 63  # later than any frame
 
 
 @dataclass(slots=True)
@@ -45,7 +46,8 @@ class Cis:
 
     The frames of light are its samples in time; between them it is a straight line, and the exposures are its exact
     integral, whatever the rates.  The first exposure opens with the first frame of light, the k-th k / frame_rate_hz
-    later.  Exposures depend on the earlier frames only through the state, which `state` gives and `restore` takes.
+    later, up to the last of a `burst`.  Exposures depend on the earlier frames only through the state, which `state`
+    gives and `restore` takes.
     """
 
     def __init__(
@@ -144,7 +146,7 @@ class Cis:
         totals = entry(state, "totals", np.float64, (len(begun), *shape)) if len(begun) else begun
         pending = entry(state, "pending", np.float64, (len(begun), shape[0])) if len(begun) else begun
         counts, (t_ns, first_ns, following) = clock(state, "counts", 3), clock(state, "clock", 3)
-        open_ns = [first_ns + opening_ns(k, self.spec.frame_rate_hz) for k in (following - 1, following)]
+        open_ns = [first_ns + self._opening_ns(k) for k in (following - 1, following)]
         if following < 1 or not open_ns[0] <= t_ns < open_ns[1]:
             raise UsageError(f"state of a frame camera at {t_ns} ns before exposure {following} since {first_ns} ns")
         self._t_ns, self._first_ns, self._next = t_ns, first_ns, following
@@ -184,10 +186,14 @@ class Cis:
         self._t_ns, self._open = t_ns, []
         for each in begun:
             yield from self._expose(each, since_ns, cut)
-        while (start_ns := self._first_ns + opening_ns(self._next, self.spec.frame_rate_hz)) <= t_ns:
+        while (start_ns := self._first_ns + self._opening_ns(self._next)) <= t_ns:
             self._next += 1
             yield from self._expose(self._opened(self._next - 1, start_ns), since_ns, cut)
         self._rows.pass_on()
+
+    def _opening_ns(self, k: int) -> int:
+        """When exposure k opens [ns after the first]; those after the burst never do."""
+        return NEVER_NS if 0 < self.spec.burst <= k else opening_ns(k, self.spec.frame_rate_hz)
 
     def _expose(self, each: Open, since_ns: int, cut: bool) -> Iterator[Exposure]:
         """Give an exposure the light from `since_ns` until now; it comes out if its last row closes."""

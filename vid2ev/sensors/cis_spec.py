@@ -50,9 +50,10 @@ class CisSpec(  # the order of the bases, last to first, is the order of the fie
         """The same camera without noise and fixed pattern."""
         return self.model_copy(update=NOISELESS)
 
-    def sampling(self, frame_rate_hz: float) -> CisSpec:
+    def sampling(self, frame_rate_hz: float, burst: int = 0) -> CisSpec:
         """The same camera without noise, all rows of which see an instant, at a rate: what a network is to rebuild."""
-        return CisSpec(**(self.model_dump() | NOISELESS | INSTANT | {"frame_rate_hz": frame_rate_hz}))
+        clock = {"frame_rate_hz": frame_rate_hz, "burst": burst}
+        return CisSpec(**(self.model_dump() | NOISELESS | INSTANT | clock))
 
     @property
     def curve(self) -> str:
