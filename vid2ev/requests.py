@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.toml_text import parsed_toml
+
+NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+
+
+def number_of(text: str) -> float:
+    """The number that a text is as people write them: 20, .5 or 1e-3.  NaN, which is within no limits, of any other
+    text: also of those that Python takes, such as 1_0, inf, or one with blanks around it; and of what is too large."""
+    number = float(text) if NUMBER.fullmatch(text) else math.nan
+    return number if math.isfinite(number) else math.nan
 
 
 def names_in(texts: str | Sequence[str]) -> tuple[str, ...]:
@@ -16,7 +27,7 @@ def names_in(texts: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def setting(text: str, example: str) -> tuple[str, Any]:
-    """Key and value of a text key=value: a TOML value, else a number as Python reads it (`.2`), else the text itself.
+    """Key and value of a text key=value: a TOML value, else a number (`.2` is none in TOML), else the text itself.
 
     Raises UsageError, with the example, for a text that is none.
     """
@@ -33,7 +44,5 @@ def _value(text: str) -> Any:
         parsed = {}
     if list(parsed) == ["value"]:
         return parsed["value"]
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    number = number_of(text)
+    return text if math.isnan(number) else number

@@ -11,16 +11,14 @@ import click
 
 from vid2ev.commands import INTERRUPTED, tidy
 from vid2ev.errors import DataError, UsageError
+from vid2ev.requests import number_of
 
 
 def contrast_of(text: str | None) -> tuple[float, float] | None:
     """Nats of an OFF and an ON event as people write them.  Raises UsageError."""
     if text is None:
         return None
-    try:
-        values = [float(word) for word in text.split(",")]
-    except ValueError:
-        values = []
+    values = [number_of(word.strip()) for word in text.split(",")]
     if len(values) not in (1, 2) or not all(0 < value < 10 for value in values):
         raise UsageError(f"--contrast {text}: expected nats, such as 0.2, or of OFF and ON events, such as 0.2,0.25")
     return values[0], values[-1]

@@ -170,7 +170,10 @@ def parse_number(text: Number, option: str) -> Fraction:
 
 
 def _is_short(said: str) -> bool:
-    """Whether a number has few digits, also as a fraction: 1e1000000000 has as many.  Raises ValueError for none."""
+    """Whether a number has few digits, also as a fraction: 1e1000000000 has as many.  Raises ValueError for none, which
+    1_0 is to people."""
+    if "_" in said:
+        raise ValueError(said)
     return len(said) <= LONGEST and abs(int(said.lower().partition("e")[2] or 0)) <= FARTHEST
 
 

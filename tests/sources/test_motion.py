@@ -270,7 +270,7 @@ def test_a_small_photograph_enlarged_is_remarked_on(tmp_path: Path) -> None:
     ("spin", "expected pan, saccade, zoom or a file"),
     ("pan:sped=3", "parameter 'sped' is not one of duration_s, scale, speed, angle"),
     ("pan:speed=fast", "speed='fast', expected a number"),
-    ("pan:speed=nan", "motion pan: duration_s=1, scale=0, speed=nan, angle=0; expected finite numbers"),
+    ("pan:speed=nan", "speed='nan', expected a number"),
     ("pan:duration_s=0", "a duration_s above 0"),
     ("zoom:factor=0", "factor 0.0"),
     ("pan:speed=1e10,duration_s=1e-9", "too much for any rate of frames"),

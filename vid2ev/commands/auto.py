@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import click
@@ -19,10 +20,9 @@ class Auto(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
         if value == self.word or isinstance(value, int):
             return value
-        try:
-            number = int(value)
-        except ValueError:
+        if not re.fullmatch(r"-?[0-9]{1,18}", value):
             self.fail(f"'{value}' is neither '{self.word}' nor a whole number", param, ctx)
+        number = int(value)
         if number < self.least:
             self.fail(f"{number} is less than {self.least}", param, ctx)
         return number

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vid2ev.errors import UsageError
+from vid2ev.requests import number_of
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
@@ -67,10 +68,7 @@ def split_among(
 
 
 def _minutes(said: str, text: str) -> float:
-    try:
-        minutes = float(said)
-    except ValueError:
-        minutes = 0.0
+    minutes = number_of(said)
     if not 0 < minutes < 1e6:
         raise UsageError(f"--split {text}: expected how many minutes a worker goes on for, such as chain:10")
     return minutes

@@ -21,6 +21,7 @@ from typing import TypeVar
 from vid2ev.cost.errors import Errors
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError, nearest
+from vid2ev.requests import number_of
 
 DEFAULT, DEFAULT_OF_FRAMES = "vR=0.05", "lsb=1"
 AS_FAST = 1.05
@@ -140,10 +141,7 @@ def _error(row: Row) -> float:
 
 
 def _number(part: str, text: str) -> float:
-    try:
-        limit = float(text)
-    except ValueError:
-        limit = math.nan
+    limit = number_of(text)
     if not 0 <= limit < math.inf:
         raise UsageError(
             f"budget '{part}': expected a number of at least 0, such as vR=0.05, us=50 or time=10x, with commas between"

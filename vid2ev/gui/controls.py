@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from vid2ev.requests import setting
+from vid2ev.requests import number_of, setting
 from vid2ev.toml_text import parsed_toml, toml_value
 
 SUFFIXES = {
@@ -192,16 +192,8 @@ def _is_bare(value: Any) -> bool:
     try:
         parsed_toml(f"value = {value}")
     except ValueError:
-        return not _is_number(value)
+        return math.isnan(number_of(value))
     return False
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _round(number: float) -> float:

@@ -29,7 +29,6 @@ value 1; SMPTE 240M and ST 428, the same table, values 7 and 17; ranges, Rec. IT
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +36,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.light import hdr
 from vid2ev.light.hdr import Curve
+from vid2ev.requests import number_of
 
 KNOWN = "srgb, bt709, linear, pq, hlg, smpte240m, st428, log100, log316 or gamma:G (such as gamma:2.2)"
 STEEPEST_GAMMA = 10.0
@@ -84,10 +84,7 @@ def code_table(transfer: str, bits: int, full_range: bool = True) -> np.ndarray:
 
 
 def _gamma(name: str) -> float:
-    try:
-        gamma = float(name.removeprefix("gamma:"))
-    except ValueError:
-        gamma = math.nan
+    gamma = number_of(name.removeprefix("gamma:"))
     if not 1 / STEEPEST_GAMMA <= gamma <= STEEPEST_GAMMA:
         raise UsageError(f"transfer '{name}': expected a number from 0.1 to 10 after 'gamma:', such as gamma:2.2")
     return gamma

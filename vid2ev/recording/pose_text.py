@@ -19,6 +19,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.decimals import decimal
 from vid2ev.recording.disk import whole_file
+from vid2ev.requests import number_of
 from vid2ev.untrusted import read_lines
 
 HEADER = "# timestamp tx ty tz qx qy qz qw\n"
@@ -77,10 +78,7 @@ def _nanoseconds(path: Path, number: int, row: list[str]) -> int:
 
 
 def _numbers(path: Path, number: int, row: list[str]) -> list[float]:
-    try:
-        values = [float(word) for word in row[1:]]
-    except ValueError:
-        values = []
+    values = [number_of(word) for word in row[1:]]
     fits = len(row) == COLUMNS and len(values) == COLUMNS - 1 and bool(np.isfinite(values).all())
     if not fits or abs(math.hypot(*values[3:]) - 1) > NEARLY_ONE:
         raise DataError(f"{path}: line {number} is no pose; expected t x y z and a unit quaternion qx qy qz qw")

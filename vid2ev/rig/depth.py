@@ -28,6 +28,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.requests import number_of
 from vid2ev.rig.intrinsics import Intrinsics
 
 Kind = Literal["depth", "disparity", "inverse"]
@@ -151,10 +152,7 @@ def between(before_m: np.ndarray, after_m: np.ndarray, share: float | np.ndarray
 
 
 def _distance_m(text: str) -> float:
-    try:
-        distance_m = float(text)
-    except ValueError:
-        distance_m = math.nan
+    distance_m = math.inf if text == "inf" else number_of(text)
     if not distance_m > 0:
         raise UsageError(f"depth 'plane:{text}'; expected a distance in metres, such as plane:2.5 or plane:inf")
     return distance_m

@@ -30,6 +30,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.requests import number_of
 
 SAMPLES = 4001
 
@@ -180,10 +181,9 @@ def parse_motion(text: str) -> Motion:
         key, _, value = setting.partition("=")
         if key not in known:
             raise UsageError(f"motion {name}: parameter '{key}' is not one of {', '.join(known)}")
-        try:
-            values[key] = float(value)
-        except ValueError as error:
-            raise UsageError(f"motion {name}: {key}='{value}', expected a number") from error
+        values[key] = number_of(value)
+        if math.isnan(values[key]):
+            raise UsageError(f"motion {name}: {key}='{value}', expected a number")
     return replace(MOTIONS[name](), **values)
 
 
@@ -209,7 +209,7 @@ def _rows(path: Path) -> list[list[float]]:
     rows = []
     for number, words in enumerate(lines, 1):
         try:
-            row = {"angle": 0.0, "zoom": 1.0} | dict(zip(names, map(float, words), strict=True))
+            row = {"angle": 0.0, "zoom": 1.0} | dict(zip(names, map(number_of, words), strict=True))
         except ValueError as error:
             raise DataError(f"{path}: row {number} is {','.join(words)[:80]}; expected {len(names)} numbers") from error
         if not all(map(math.isfinite, row.values())) or not 0.01 <= row["zoom"] <= 100:

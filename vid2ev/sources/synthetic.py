@@ -7,6 +7,7 @@ clip is a class with its formula in `light`, and a place in `SYNTHETIC`.
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
@@ -17,6 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.requests import number_of
 from vid2ev.sources.times import parse_fps, round_ns
 from vid2ev.stream.frames import Frame
 
@@ -197,14 +199,13 @@ def parse_synthetic(text: str) -> SyntheticClip:
         key, _, value = setting.partition("=")
         if key not in known:
             raise UsageError(f"synthetic:{name}: parameter '{key}' is not one of {', '.join(known)}")
-        try:
-            values[key] = _size(value) if key == "size" else float(value)
-        except ValueError as error:
+        values[key] = _size(value) if key == "size" else number_of(value)
+        if values[key] is None or values[key] != values[key]:
             expected = "WIDTHxHEIGHT, such as 320x240" if key == "size" else "a number"
-            raise UsageError(f"synthetic:{name}: {key}='{value}', expected {expected}") from error
+            raise UsageError(f"synthetic:{name}: {key}='{value}', expected {expected}")
     return replace(clip, **values)
 
 
-def _size(text: str) -> tuple[int, int]:
-    width, _, height = text.partition("x")
-    return int(width), int(height)
+def _size(text: str) -> tuple[int, int] | None:
+    found = re.fullmatch(r"(-?[0-9]{1,9})x(-?[0-9]{1,9})", text)
+    return (int(found[1]), int(found[2])) if found else None

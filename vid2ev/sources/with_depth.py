@@ -7,6 +7,7 @@ On the command line depth is named in one text, with what its numbers mean after
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,6 +16,7 @@ from typing import Any
 
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import identity
+from vid2ev.requests import number_of
 from vid2ev.rig.depth import KINDS, Depth, open_depth
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.sources.edit import Edit
@@ -65,18 +67,11 @@ def parse_depth(text: str, lens: Intrinsics) -> Depth:
         name, key, value = found[1], found[2], found[3]
         if key == "kind" and value in KINDS:
             settings[key] = value
-        elif key in NUMBERS and _number(value) is not None:
-            settings[key] = _number(value)
+        elif key in NUMBERS and not math.isnan(number := number_of(value)):
+            settings[key] = number
         else:
             keys = ("kind", *NUMBERS)
             wanted = f"one of {', '.join(KINDS)}" if key == "kind" else "a number"
             why = f"expected {wanted}" if key in keys else f"unknown{nearest(key, keys)}; expected {', '.join(keys)}"
             raise UsageError(f"depth '{text}': {key}={value}: {why}")
     return open_depth(name, lens, **settings)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

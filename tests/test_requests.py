@@ -1,0 +1,64 @@
+"""What people write as numbers, wherever they write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+
+from interp.commands.making import contrast_of
+from vid2ev import UsageError
+from vid2ev.commands.auto import Auto
+from vid2ev.commands.finite import Finite
+from vid2ev.cost.front import Budget
+from vid2ev.light.transfer import parse_transfer
+from vid2ev.requests import number_of, setting
+from vid2ev.rig.depth import plane_of
+from vid2ev.sources.motion import parse_motion
+from vid2ev.sources.synthetic import parse_synthetic
+
+NONE = ["", "1_0", "nan", "inf", "-inf", "infinity", " 1", "1 ", "1e", "0x10", "1,0", "٣", "1e999", "1.2.3", "."]
+
+
+@pytest.mark.parametrize("text", NONE)
+def test_what_people_do_not_write_is_no_number(text: str) -> None:
+    assert math.isnan(number_of(text))
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "+2.50", ".5", "5.", "1e-3", "12E+2", "0007", "3.141592653589793"])
+def test_what_people_write_is_the_number_that_it_says(text: str) -> None:
+    assert number_of(text) == float(text)
+
+
+ASKED: dict[str, Callable[[str], object]] = {
+    "budget": lambda text: Budget.parse(f"vR={text}"),
+    "gamma": lambda text: parse_transfer(f"gamma:{text}"),
+    "plane": lambda text: plane_of(f"plane:{text}"),
+    "motion": lambda text: parse_motion(f"pan:speed={text}"),
+    "synthetic": lambda text: parse_synthetic(f"sine,frequency_hz={text}"),
+    "size": lambda text: parse_synthetic(f"sine,size={text}x{text}"),
+    "contrast": contrast_of,
+    "option": lambda text: Finite(0).convert(text, None, None),
+    "whole": lambda text: Auto("auto", 1, "N").convert(text, None, None),
+}
+
+
+@pytest.mark.parametrize("text", ["1_0", "nan"])
+@pytest.mark.parametrize("where", ASKED)
+def test_no_number_of_python_goes_for_one(where: str, text: str) -> None:
+    with pytest.raises((UsageError, click.BadParameter), match=text):
+        ASKED[where](text)
+
+
+def test_a_row_of_a_path_has_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("0,0,0\n1_0,5,0\n")
+    with pytest.raises(Exception, match="row 2 is 1_0,5,0; expected finite numbers"):
+        parse_motion(str(path))
+
+
+def test_settings_are_toml_or_numbers_or_texts() -> None:
+    assert setting("a=.5", "a=1")[1] == 0.5 and setting("a=1_0.", "a=1")[1] == "1_0."
