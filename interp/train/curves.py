@@ -73,6 +73,12 @@ class Curves(Logger):
         self._columns[name] = columns
 
 
+def check_curves(folder: Path) -> None:
+    """Raise DataError where those of a run cannot be gone on with: at once, not when its clips are made again."""
+    for name in FILES.values():
+        read_curve(folder / name)
+
+
 def read_curve(path: Path) -> list[dict[str, str]]:
     """The rows of a curve that are whole; none if there is no file.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from interp.train import told
 from interp.train.checkpoints import read_checkpoint
+from interp.train.curves import check_curves
 from interp.train.fit import Fit, Outcome, Stop
 from interp.train.job import NOTHING, Job
 from interp.train.machines import Machines
@@ -60,6 +61,7 @@ def run(
                 return told.outcome_of(done)
         if resume:
             begin(learner, folder.starts(job.starts))
+            check_curves(folder.path)
         step = read_checkpoint(folder.checkpoint)["global_step"] if folder.checkpoint.exists() else 0
         spare = machines.spare(job.recipe.threads) if workers is None else workers
         with ExitStack() as fed:

@@ -6,7 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from interp.train import runs
 from interp.train.curves import Curves, read_curve
+from interp.train.job import Job
+from interp.train.machines import Machines
+from interp.train.run_folder import RunFolder
 from vid2ev.errors import DataError
 
 
@@ -84,3 +88,15 @@ def test_validation_that_is_measured_again_has_one_row(tmp_path: Path) -> None:
         curves.log_metrics({"train/loss": 1.0}, 7)
     assert [(row["step"], row["psnr"]) for row in read_curve(tmp_path / "validation.csv")] == [("7", "21")]
     assert len(read_curve(tmp_path / "training.csv")) == 2
+
+
+@pytest.mark.parametrize("name", ["training.csv", "validation.csv"])
+def test_a_damaged_curve_is_found_before_clips_are_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    job = Job.of("rrin", "tiny", settings=["batch=2"])
+    RunFolder(tmp_path / "run", job.kept(), resume=False).close()
+    (tmp_path / "run" / name).write_text("step,loss\none,0.5\n")
+    monkeypatch.setattr(runs, "feed_of", lambda *_: pytest.fail("clips are made"))
+    with pytest.raises(DataError, match=f"{name} cannot be read as a curve"):
+        runs.run(job, tmp_path / "run", resume=True, machines=Machines(1, accelerator="cpu"))
