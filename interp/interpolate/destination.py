@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.recording.destination import begun_at, check_destination, check_folder
+from vid2ev.recording.destination import begun_at, check_destination, check_folder, partial_of
 from vid2ev.recording.manifest import read_manifest
 from vid2ev.sources.images import FRAMES
 
@@ -32,6 +32,11 @@ def kind_of(output: Path | None, asked: str | None) -> Kind:
 def manifest_of(output: Path, kind: str) -> Path:
     """Where the manifest of an output is."""
     return output.with_suffix(".json") if kind == "mp4" else output / FRAMES
+
+
+def places_of(output: Path, kind: str) -> tuple[Path, ...]:
+    """All that is written for an output, while it is made and in the end."""
+    return output, partial_of(output), manifest_of(output, kind)
 
 
 def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -59,11 +59,11 @@ class FramesBesideEvents(OfSource):
                 f" {begin_s:g} to {begin_s + lasts_s:g} s; give both by one clock"
             )
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """What source and event file are."""
         about = {"path": str(self._events_path), "size": list(self.event_size), "contrast": self.contrast}
-        known = {"dead_time": stated(self.dead_time), "identity": identity(self._events_path)}
-        return super().describe() | {"events": about | known}
+        known = {"dead_time": stated(self.dead_time), "identity": identity(self._events_path, besides=besides)}
+        return super().describe(besides) | {"events": about | known}
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
@@ -114,14 +114,14 @@ class OfEventFile:
         """Nobody says so."""
         return ()
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """Path and sizes."""
         about = {"kind": "events with frames", "path": str(self._path), "size": list(self.size)}
         return about | {
             "event_size": list(self.event_size),
             "contrast": self.contrast,
             "dead_time": stated(self.dead_time),
-            "identity": identity(self._path),
+            "identity": identity(self._path, besides=besides),
         }
 
     def keys(self, start: int = 0) -> Iterator[Key]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,11 +56,12 @@ class OfSequence:
         """See `Take`."""
         return self._sequence.looks(t_us)
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """Folder and sizes."""
         about = {"kind": type(self._sequence).__name__.lower(), "path": str(self.folder), "size": list(self.size)}
         sent = {"event_size": list(self._sequence.event_size), "contrast": self.contrast}
-        return about | sent | {"dead_time": stated(self.dead_time), "identity": identity(self.folder, deep=True)}
+        known = {"dead_time": stated(self.dead_time), "identity": identity(self.folder, deep=True, besides=besides)}
+        return about | sent | known
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""

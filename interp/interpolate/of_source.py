@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -76,10 +76,10 @@ class OfSource:
         """Nobody says so."""
         return ()
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """What the source says."""
         path = Path(str(self._about.get("path", "")))
-        return self._about | ({"identity": identity(path)} if path.exists() else {})
+        return self._about | ({"identity": identity(path, besides=besides)} if path.exists() else {})
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""

@@ -10,7 +10,7 @@ one, and NAME.png lies beside it.  Source of such files: https://github.com/pz-e
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -83,11 +83,11 @@ class OfStill:
         """Nobody says so."""
         return ()
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """What both files are."""
         about = {"kind": "single frame", "path": str(self._picture), "size": list(self.size)}
         known = {"contrast": list(self.contrast), "dead_time": stated(self.dead_time)}
-        events = {"path": str(self._path), "identity": identity(self._path)} | known
+        events = {"path": str(self._path), "identity": identity(self._path, besides=besides)} | known
         return about | {"identity": identity(self._picture), "events": events}
 
     def keys(self, start: int = 0) -> Iterator[Key]:

@@ -5,7 +5,7 @@ A new kind is a class that satisfies `Take`, and a line in `open_take`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -85,8 +85,8 @@ class Take(Protocol):
     def looks(self, t_us: int) -> tuple[Look, ...]:
         """Where pixels of a key frame may look in the event camera, as far as is known.  Raises DataError."""
 
-    def describe(self) -> dict[str, Any]:
-        """What it is, for JSON."""
+    def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
+        """What it is, for JSON; `besides` are files and folders that are made of it."""
 
     def keys(self, start: int = 0) -> Iterator[Key]:
         """The key frames from index `start` on, their times strictly increasing.  Raises DataError."""

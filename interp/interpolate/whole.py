@@ -16,7 +16,7 @@ import torch
 from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
-from interp.interpolate.destination import kind_of, manifest_of
+from interp.interpolate.destination import kind_of, manifest_of, places_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
@@ -92,7 +92,7 @@ def interpolate(
     pictures = Pictures(kind, take.bits, take.curve if kind == "mp4" else take.coded)
     job = {
         "versions": versions(("torch",)),
-        "source": take.describe(),
+        "source": take.describe(places_of(output, kind)),
         "part": {"start_s": options.start_s, "stop_s": options.stop_s},
         "grid": grid.describe(),
         "interpolation": ready.about,

@@ -13,7 +13,7 @@ import torch
 
 from interp import pretrained
 from interp.interpolate.choice import device_of
-from interp.interpolate.destination import kind_of, manifest_of
+from interp.interpolate.destination import kind_of, manifest_of, places_of
 from interp.interpolate.instants import Number, parse_number
 from interp.interpolate.pictures import SLOWEST_HZ, Pictures, checked_play, of_film
 from interp.interpolate.shelf import Shelf
@@ -104,7 +104,7 @@ def reconstruct(
         "source": {
             "path": str(path),
             "size": list(size),
-            "identity": identity(path),
+            "identity": identity(path, besides=places_of(output, kind)),
             "contrast": list(sensor.contrast),
             "dead_time": stated(sensor.dead_time),
         },

@@ -257,3 +257,27 @@ def test_after_a_cut_nothing_is_remembered(tmp_path: Path) -> None:
     interpolate(images(tmp_path / "one", second), tmp_path / "rest", **given)
     alone = [(tmp_path / "rest" / f"{k:06d}.png").read_bytes() for k in range(7)]
     assert [(tmp_path / "all" / f"{k + 8:06d}.png").read_bytes() for k in range(7)] == alone
+
+
+@pytest.mark.parametrize("name", ["made", "made.mp4"])
+@pytest.mark.parametrize("kind", [recording, images])
+def test_what_is_made_within_its_own_source_is_no_part_of_it(tmp_path: Path, kind: Any, name: str) -> None:
+    source = kind(tmp_path / "source", moving(4))
+    output = source / name
+
+    def interrupt(done: int, _: int | None) -> None:
+        if done >= 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interpolate(source, output, multiple=3, report=interrupt)
+    assert output.with_name(f"{name}.partial").is_dir()
+    made = interpolate(source, output, multiple=3, resume=True)
+    assert made["frames"] == 10 and made["run"]["frames"] < 10
+    assert interpolate(source, output, multiple=3, resume=True) == made  # what is finished is left as it is
+    with pytest.raises(UsageError, match=r"was begun with grid.multiple = .3., not .2."):
+        interpolate(source, output, multiple=2, resume=True)
+    left = next(iter(sorted(source.rglob("*.png"))))
+    left.write_bytes(left.read_bytes() + b" ")
+    with pytest.raises(UsageError, match=r"was begun with source\.identity"):
+        interpolate(source, output, multiple=3, resume=True)

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -34,15 +34,19 @@ def machine() -> dict[str, Any]:
     return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}
 
 
-def identity(path: Path, *, copies: bool = False, deep: bool = False) -> dict[str, Any]:
+def identity(path: Path, *, copies: bool = False, deep: bool = False, besides: Collection[Path] = ()) -> dict[str, Any]:
     """What tells a file or a folder of files from another: bytes, time of change, and a digest of the names, the sizes,
     the beginnings and the ends of all of them.
 
     copies   a copy is the same: without the time of change
     deep     with the folders in a folder
+    besides  files and folders that are no part of it, wherever they are: what is made of it may be put there
     """
     within = path.rglob("*") if deep else path.iterdir() if path.is_dir() else ()
+    others = {other.resolve() for other in besides}
     files = sorted(child for child in within if child.is_file()) if path.is_dir() else [path]
+    if others:
+        files = [file for file in files if not others & {(whole := file.resolve()), *whole.parents}]
     stats = [file.stat() for file in files]
     sizes = [(file.relative_to(path).as_posix(), stat.st_size) for file, stat in zip(files, stats, strict=True)]
     digest, part = hashlib.sha256(repr(sizes).encode()), max(HEAD // max(len(files), 1), LEAST)
