@@ -187,10 +187,10 @@ def test_a_recording_without_events_is_dark() -> None:
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (700, 11), (1281, 721)])
 def test_any_view_of_any_size_fits(view: str, size: tuple[int, int]) -> None:
     corner = events_of([0, 10_000, 20_000], size[0] - 1, size[1] - 1, [1, 0, 1])
-    made = render(write(corner, size=size), "-o", "film.mp4", "--view", view, "--size", "300")
+    made = render(write(corner, size=size), "-o", "film.mp4", "--view", view, "--size", "301")
     shown = film("film.mp4")
     width, height = made["size"]
-    assert width <= 300 and height <= 300 + canvas.LINE
+    assert width <= 301 and height <= 301 + canvas.LINE
     assert shown[0].shape == (height, width, 3)
 
 

@@ -52,8 +52,8 @@ from vid2ev.commands.finite import SECONDS, Finite
     default=1280,
     show_default=True,
     metavar="PIXELS",
-    help="Longest side, the bar below not counted; small sensors are enlarged a whole number of times, large ones"
-    " reduced.",
+    help="Longest side at most, the line below (--stamp) not counted; small sensors are enlarged a whole number of"
+    " times, large ones reduced.",
 )
 @click.option(
     "--with-frames/--no-frames",

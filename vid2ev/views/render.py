@@ -60,7 +60,7 @@ def render(
     fps             pictures per second of the film
     speed           of the film against reality, 1 by default; cannot be had together with `by`
     start_s, stop_s the window, in seconds after the beginning (`window.beginning_us`); both ends are in
-    size            the longest side of a picture [pixels]
+    size            the longest side of a picture, at most [pixels]; the line that `stamp` writes below is not counted
     frames          whether to show the frames of the file, too; None: if it has any
     stamp           whether to write time and number of events below
     report          called after every slice with the recording and the number of events shown so far
@@ -69,7 +69,7 @@ def render(
     Raises UsageError for what cannot be meant, DataError for a file that cannot be read or a disk that cannot be
     written.
     """
-    output = Path(output)
+    output, made_as = Path(output), kind_of(Path(output))
     check_free(output, overwrite)
     _check_numbers(fps=fps, speed=speed, start=start_s, stop=stop_s, size=size)
     rate = Fraction(str(fps)).limit_denominator(10**6)  # films have no finer ones
@@ -79,15 +79,15 @@ def render(
     recording = _recording(file, zero_us, start_s, stop_s, frames)
     if isinstance(slicing, Source):
         recording = with_frame_times(recording)
-    if kind_of(output) == "png" and by is None and (start_s, stop_s) != (None, None):
+    if made_as == "png" and by is None and (start_s, stop_s) != (None, None):
         slicing = Duration(Fraction(max(1, recording.duration_us)))
     shown = recording.frames() if recording.frames else None
     fine = not isinstance(slicing, Source) and not (isinstance(slicing, Duration) and slicing.us >= 1000)
-    canvas = Canvas(kind, recording.size, size, shown, stamp=stamp, zero_us=zero_us, digits=6 if fine else 3)
+    limit = size - size % 2 if made_as == "mp4" else size  # (films have even sides)
+    canvas = Canvas(kind, recording.size, limit, shown, stamp=stamp, zero_us=zero_us, digits=6 if fine else 3)
     done = _Done(recording, report)
     arrays = represent(recording, slicing, canvas.view)
     made = _write(output, canvas, arrays, done, rate)
-    made_as = kind_of(output)
     asked = {"path": str(output), "kind": made_as, "view": view, "by": str(slicing), "fps": float(fps)}
     size_px = film_size(canvas.size) if made_as == "mp4" else canvas.size
     return asked | made | {"size": list(size_px), "warnings": list(file.warnings)}
