@@ -147,3 +147,28 @@ def test_a_broken_image_is_named(tmp_path: Path, content: bytes | None) -> None:
     (tmp_path / "1.png").write_bytes(whole[: len(whole) // 2] if content is None else content)
     with pytest.raises(DataError, match=r"1\.png"):
         list(open_source(tmp_path, fps=1).frames())
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["a_1.png", "a_2.png", "a_4.png"], "none between a_2.png and a_4.png; with --fps"),
+        (["a010.png", "a020.png", "a040.png", "a060.png", "a070.png"], "a040.png, nor in 1 other gap; with --fps"),
+        (["1.png", "2.png", "4.png", "6.png", "9.png"], "between 2.png and 4.png, nor in 2 other gaps;"),
+        (["a_1.png", "a_3.png"], ""),  # every second one
+        (["a_10.png", "a_20.png", "a_30.png"], ""),
+        (["a_1.png", "b_2.png", "b_4.png"], ""),  # names that tell more than a number
+        (["a_1.png", "a_01.png", "a_4.png"], ""),
+        (["one.png", "two.png"], ""),
+        (["7.png"], ""),
+    ],
+)
+def test_numbers_that_are_missing_are_remarked_on_where_no_times_are_given(
+    tmp_path: Path, names: list[str], said: str
+) -> None:
+    write(tmp_path, names)
+    source = open_source(tmp_path, fps=10)
+    assert [frame.t_ns for frame in source.frames()] == [k * 10**8 for k in range(len(names))]
+    assert len(source.warnings) == bool(said) and all(said in warning for warning in source.warnings)
+    (tmp_path / "timestamps.txt").write_text("".join(f"{k}.5\n" for k in range(len(names))))
+    assert open_source(tmp_path).warnings == []

@@ -2,16 +2,19 @@
 
 8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
-rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps.  Codes are sRGB,
-16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose folder it is, or
-the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs.  Floating point is
-linear light, 1.0 white as it stands.  Transparency is ignored.
+rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps: one after the other
+then, whatever their numbers, with a remark where numbers are missing.  Codes are sRGB, 16-bit ones too, unless a
+transfer is given, or `frames.json`, the manifest of the frame camera whose folder it is, or the first PNG says one;
+that manifest also says of how many bits codes are that do not fill theirs.  Floating point is linear light, 1.0 white
+as it stands.  Transparency is ignored.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +78,8 @@ class Images:
             self._stamps, self._unit = self._read_stamps()
             file = self.path / TIMESTAMPS if self.path.is_dir() else times_beside(self.path)
             self.warnings += remarks_on_unit(self._unit, file)
+        elif self.path.is_dir():
+            self.warnings += _remarks_on_gaps([file for file, _ in self._places])
         first, _, tagged = read_picture(*self._places[0])
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
@@ -175,6 +180,25 @@ def _of_camera(said: Any, folder: str) -> tuple[str, int | None]:
     gamma, bits = (said["sensor"]["parameters"][key] for key in ("gamma", "bits"))
     curve = gamma if gamma == "srgb" else f"gamma:{gamma}"
     return {KINDS["raw"]: ("linear", bits_of(bits)), KINDS["png"]: (curve, None)}[folder]
+
+
+def _remarks_on_gaps(files: Sequence[Path]) -> list[str]:
+    """That some of the numbers are missing in the names of images, where these differ in nothing else."""
+    found = [re.fullmatch(r"(.*?)([0-9]{1,18})([^0-9]*)", file.stem) for file in files]
+    numbers = [int(each[2]) for each in found if each]
+    if len(numbers) < len(files) or len({(each[1], each[3]) for each in found if each}) > 1:
+        return []
+    steps = [after - before for before, after in pairwise(numbers)]
+    usual = min(steps, default=0)
+    gaps = [k for k, step in enumerate(steps) if step != usual]
+    if usual < 1 or not gaps:
+        return []
+    first, more = gaps[0], len(gaps) - 1
+    return [
+        f"{files[0].parent}: none between {files[first].name} and {files[first + 1].name}"
+        + f", nor in {more} other gap{'s' * (more > 1)}" * (more > 0)
+        + f"; with --fps images are evenly apart, whatever their numbers; {TIMESTAMPS} says other times"
+    ]
 
 
 def _places(path: Path) -> list[tuple[Path, int]]:
