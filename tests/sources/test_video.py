@@ -388,6 +388,40 @@ def test_damage_that_a_decoder_notices_is_remarked_on(encode) -> None:
     assert remarked >= 1
 
 
+@pytest.mark.parametrize("options", [{"level": "3", "slices": "4"}, {"level": "3", "slicecrc": "1", "coder": "0"}])
+@pytest.mark.parametrize("name", ["a.mkv", "a.avi", "a.nut"])
+def test_each_bit_of_damage_in_ffv1_with_checksums_is_remarked_on(encode, name: str, options: dict[str, str]) -> None:
+    """By the checksums: the decoder puts the picture before in the place of what is damaged, and says nothing."""
+    path = encode(name, noisy(6), options=options)
+    assert not list_warnings(path)
+    whole = path.read_bytes()
+    with av.open(str(path)) as container:
+        packets = [bytes(packet) for packet in container.demux(video=0) if packet.size]
+    for number, share in ((0, 0.4), (3, 0.0), (3, 0.99), (5, 0.5)):
+        data, packet = bytearray(whole), packets[number]
+        data[whole.index(packet) + int(share * len(packet))] ^= 16
+        path.write_bytes(data)
+        said = [warning for warning in list_warnings(path) if "damaged" in warning]
+        assert said[0].endswith("guessed with those that build on them: 1") or "left out" in said[0]
+
+
+def test_ffv1_without_checksums_is_not_taken_for_damaged(encode) -> None:
+    for options in ({"level": "1"}, {"level": "3", "slicecrc": "0", "slices": "4"}):
+        assert not list_warnings(encode("a.mkv", noisy(6), options=options))
+
+
+@pytest.mark.parametrize("codec", ["ffv1", "libx264"])
+def test_a_matroska_file_that_lacks_its_last_bytes_says_so(encode, codec: str) -> None:
+    """However few: the last picture may be among them."""
+    path = encode("a.mkv", noisy(20), codec=codec)
+    whole = path.read_bytes()
+    for cut in (1, 300, len(whole) // 30):
+        path.write_bytes(whole[:-cut])
+        assert any("truncated" in warning for warning in list_warnings(path))
+    path.write_bytes(whole + bytes(100))
+    assert not list_warnings(path)
+
+
 def list_warnings(path: Path) -> list[str]:
     source = open_source(path)
     list(source.frames())

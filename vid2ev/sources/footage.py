@@ -18,7 +18,9 @@ import av
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.recognise import recognise
+from vid2ev.sources.ffv1 import is_sound
 from vid2ev.sources.kept import Kept, Reader
+from vid2ev.sources.matroska import missing_bytes
 from vid2ev.sources.transport_stream import TAIL, remarks_on_end
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
@@ -39,6 +41,7 @@ class Footage(Protocol):
     planned: int  # frames by the header, 0 if it does not say
     end_s: Fraction | None  # by the header, on the clock of the pictures
     first: Any  # the first picture
+    missing: int  # bytes of the file by its header, 0 if it does not say
 
     @property
     def kept(self) -> Kept | None:
@@ -58,6 +61,7 @@ class VideoFile:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self.name = str(path)
+        self.missing = missing_bytes(self.path) if self.path.is_file() else 0
         with self._opened() as (container, stream):
             self.rate, self.pixel_shape, self.codec = _said_of(stream)
             self.planned: int = stream.frames
@@ -113,7 +117,7 @@ class Piped:
 
     kind = "pipe"
     rewindable = False
-    planned = 0
+    planned = missing = 0
 
     def __init__(self, kept: Kept):
         self.name, self.kept = kept.name, kept
@@ -151,7 +155,7 @@ class LiveStream:
     kind = "camera"
     rewindable = False
     kept = None
-    planned = 0
+    planned = missing = 0
     end_s: Fraction | None = None
 
     def __init__(self, container: Any, name: str):
@@ -246,12 +250,16 @@ def _sought(
 
 def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> Iterator[Any]:
     """Decoded pictures in order of presentation; what could not be read is told in `remarks` at the end."""
-    whole = broken = guessed = 0
+    whole = broken = guessed = sound = unsound = 0
+    checked = stream.codec_context.name == "ffv1"
     for packet in _packets(container, stream, remarks):
         if packet.is_corrupt:  # (cut off in the middle; the decoder would invent the rest)
             broken += 1
             continue
         whole += packet.size > 0
+        if checked and packet.size:
+            right = is_sound(bytes(packet))
+            sound, unsound = sound + right, unsound + (not right)
         try:
             pictures = packet.decode()
         except av.FFmpegError:
@@ -259,6 +267,7 @@ def _decoded(container: Any, stream: Any, planned: int, remarks: list[str]) -> I
             continue
         guessed += sum(picture.is_corrupt for picture in pictures)
         yield from pictures
+    guessed += unsound if sound else 0  # (where none is right, there are no checksums)
     if guessed:
         remarks.append(f"damaged pictures, which the decoder has guessed with those that build on them: {guessed}")
     if broken:

@@ -113,13 +113,15 @@ class Video:
         self.warnings.extend(remark for remark in remarks if remark not in self.warnings)
 
     def _cut_short(self, last: Any) -> list[str]:
-        """A remark if a file that announces no number of frames ends well before the time it announces."""
+        """A remark if a file that announces no number of frames ends well before the time it announces, or lacks some
+        of its bytes."""
         footage, stamp = self._footage, None if last is None else stamp_of(last)
+        cut = [f"truncated: the last {footage.missing:,} bytes of the file are missing"] * (footage.missing > 0)
         if footage.planned or footage.end_s is None or stamp is None or not footage.rate:
-            return []
+            return cut
         seen_s = stamp + max(2 / footage.rate, (last.duration or 0) * Fraction(last.time_base))
         if seen_s >= footage.end_s:
-            return []
+            return cut
         return [f"truncated: the file ends at {float(stamp):.3f} s of the {float(footage.end_s):.3f} s it announces"]
 
     def _not_square(self) -> list[str]:
