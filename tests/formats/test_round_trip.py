@@ -142,6 +142,37 @@ def test_dat_does_not_go_on_in_a_file_of_another_recording(tmp_path: Path, forei
     assert [text.split(" are not there")[0] for text in file.warnings] == ["1 further files of the recording"]
 
 
+@pytest.mark.parametrize("differs", ["size", "start", "events", "length"])
+def test_dat_does_not_go_on_in_the_same_part_of_another_recording(tmp_path: Path, differs: str) -> None:
+    """Both have two parts, and the second of one is in the place of the other's."""
+    kind = format_named("dat")
+    for name, changed in (("one", ""), ("other", differs)):
+        t = np.array([0, 5, 7, (1 << 32) + 9 + (changed == "length")])[changed == "events" :]
+        start_us = 1000 * (changed == "start")
+        size = (100, 100 + (changed == "size"))
+        (tmp_path / name).mkdir()
+        written(kind, recording_of(events_of(t + start_us, size), size, start_us), tmp_path / name)
+    path = tmp_path / "one" / "events.dat"
+    assert len(Events.concatenate(open_events(path).events())) == 4
+    shutil.copy(tmp_path / "other" / "events_1.dat", path.with_name("events_1.dat"))
+    file = open_events(path)
+    assert Events.concatenate(file.events()).t.tolist() == [0, 5, 7]
+    assert [text.split(" are not there")[0] for text in file.warnings] == ["1 further files of the recording"]
+
+
+def test_dat_without_a_line_about_all_of_it_goes_on(tmp_path: Path) -> None:
+    """As earlier versions wrote it."""
+    path = written(
+        format_named("dat"), recording_of(events_of(np.array([0, 5, (1 << 32) + 9]), (100, 100)), (100, 100)), tmp_path
+    )
+    for part in sorted(tmp_path.iterdir()):
+        head, line, rest = part.read_bytes().partition(b"% recording 3 events in 4294967305 us\n")
+        assert line
+        part.write_bytes(head + rest)
+    file = open_events(path)
+    assert len(Events.concatenate(file.events())) == 3 and not file.warnings
+
+
 @pytest.mark.parametrize("after_us", [-1, 0, 1])
 @pytest.mark.parametrize("turns", [1, 2])
 def test_dat_ends_at_the_end_of_a_file_and_just_beyond(tmp_path: Path, turns: int, after_us: int) -> None:

@@ -5,10 +5,11 @@
     time       uint32, little-endian [us] since start_us
     address    uint32: column [13:0], row [27:14], polarity [28]
 
-32 bits of microseconds are 71.6 minutes.  What is longer goes on in more files, NAME_1.dat, NAME_2.dat, ..., each with
-its own start_us and a line that says which of how many it is; each can be read alone, and the first is read with those
-that follow.  Times that start anew within one file are followed, too.  Version 1, where the address is column [8:0],
-row [16:9], polarity [17], is read.  Source: https://docs.prophesee.ai/stable/data/file_formats/dat.html
+32 bits of microseconds are 71.6 minutes.  What is longer goes on in more files, NAME_1.dat, NAME_2.dat, ..., each
+with its own start_us, a line that says which of how many it is, and one with the number of events and the length of
+them all, by which parts of other recordings are known; each can be read alone, and the first is read with those that
+follow.  Times that start anew within one file are followed, too.  Version 1, where the address is column [8:0], row
+[16:9], polarity [17], is read.  Source: https://docs.prophesee.ai/stable/data/file_formats/dat.html
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ class DatEvents(Sequential):
         yield from self._alone()
         there = self.further()
         missing = len(self._further()) - len(there)
-        self._leave_out(missing, f"further files of the recording are not there ({self.path.stem}_*) and are")
+        what = f"further files of the recording are not there ({self.path.stem}_*), or of another one, and are"
+        self._leave_out(missing, what)
         for path in there:
             part = DatEvents(path)
             yield from part._alone()
@@ -65,7 +67,17 @@ class DatEvents(Sequential):
     def further(self) -> list[Path]:
         """Those files in which the recording goes on that are there, and say themselves that they are its parts."""
         files = self._further()
-        return [path for k, path in enumerate(files, 2) if _is_part(path, f"{k}/{len(files) + 1}")]
+        return [path for k, path in enumerate(files, 2) if self._goes_on(path, k, len(files) + 1)]
+
+    def _goes_on(self, path: Path, k: int, parts: int) -> bool:
+        """Whether a file is part k of this recording: it says so, and agrees with this one in all else."""
+        found = _read_header(path)
+        return found is not None and (
+            found.fields.get("part") == f"{k}/{parts}"
+            and found.size == self.size
+            and found.start_us == self.start_us + (k - 1) * PART_US
+            and found.fields.get("recording") == self._header.fields.get("recording")
+        )
 
     def _further(self) -> list[Path]:
         """The files in which the recording goes on."""
@@ -95,8 +107,9 @@ def write_events(path: Path, recording: Recording) -> None:
     width, height = recording.size
     fields = ["Data file containing CD events", "Version 2", f"Width {width}", f"Height {height}"]
     parts = recording.duration_us // PART_US + 1
+    whole = f"recording {recording.count} events in {recording.duration_us} us"
     for number in range(parts):
-        own = [f"start_us {recording.start_us + number * PART_US}", f"part {number + 1}/{parts}"]
+        own = [f"start_us {recording.start_us + number * PART_US}", f"part {number + 1}/{parts}", whole]
         _part(path, number).write_bytes("".join(f"% {line}\n" for line in fields + own).encode() + KINDS[0])
     for number, pieces_of_it in groupby(_parted(recording), itemgetter(0)):
         with open(_part(path, number), "ab") as file:
@@ -126,12 +139,11 @@ def _part(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}_{number}{path.suffix}") if number else path
 
 
-def _is_part(path: Path, which: str) -> bool:
+def _read_header(path: Path) -> Header | None:
     if not path.is_file():
-        return False
+        return None
     with reading(path) as file:
-        header = _header(file.read(HEAD))
-    return header is not None and header.fields.get("part") == which
+        return _header(file.read(HEAD))
 
 
 def _header(head: bytes) -> Header | None:
