@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import re
+from fractions import Fraction
 from typing import Any
 
+import av
+import av.filter
 import numpy as np
 
 from vid2ev.errors import DataError
@@ -44,17 +47,37 @@ def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
 
 
 def _display_matrix(picture: Any) -> tuple[float, float, float, float]:
-    """a, b, c, d.  Beside data of kinds that PyAV has no name for, such as EXIF, it gives the turn alone, no mirror."""
-    try:
-        beside = list(picture.side_data)
-    except ValueError:
-        turn = math.radians(picture.rotation)
-        return math.cos(turn), -math.sin(turn), math.sin(turn), math.cos(turn)
-    matrix = next((data for data in beside if data.type.name == "DISPLAYMATRIX"), None)
+    """a, b, c, d."""
+    matrix = next((data for data in _beside(picture) if data.type.name == "DISPLAYMATRIX"), None)
     if matrix is None:
         return 1, 0, 0, 1
     a, b, _, c, d = np.frombuffer(matrix, np.int32)[:5].tolist()
     return a, b, c, d
+
+
+def _beside(picture: Any) -> list[Any]:
+    """What FFmpeg says beside a picture, but for kinds that PyAV has no name for, such as EXIF: it gives nothing at all
+    beside these, so FFmpeg takes them away, one after the other."""
+    taken = set[str]()
+    while True:
+        try:
+            return list(picture.side_data)
+        except ValueError as error:
+            number = re.match(r"\d+", str(error))
+            if number is None or number[0] in taken:
+                raise
+            taken.add(number[0])
+            picture = _without(picture, number[0])
+
+
+def _without(picture: Any, kind: str) -> Any:
+    """The same picture without what is beside it of a kind."""
+    graph, (width, height) = av.filter.Graph(), (picture.width, picture.height)
+    into = graph.add_buffer(None, width, height, picture.format, None, picture.time_base or Fraction(1))
+    taken_away = graph.add("sidedata", f"mode=delete:type={kind}")
+    graph.link_nodes(into, taken_away, graph.add("buffersink")).configure()
+    graph.push(picture)
+    return graph.pull()
 
 
 def upright(light: np.ndarray, orientation: tuple[bool, bool, bool]) -> np.ndarray:
