@@ -61,6 +61,11 @@ def luminance(light: torch.Tensor) -> torch.Tensor:
     return (red + green).add_(blue)
 
 
+def grey(codes: torch.Tensor, transfer: Transfer = "srgb") -> torch.Tensor:
+    """Codes [..., 1, H, W] of the luminance of codes [..., 1 or 3, H, W]."""
+    return to_codes(luminance(to_light(codes, transfer)), transfer)
+
+
 def _srgb_light(codes: torch.Tensor) -> torch.Tensor:
     codes = codes.clamp(min=0)
     steep = ((codes.clamp(min=SRGB_KNEE) + SRGB_OFFSET) / (1 + SRGB_OFFSET)) ** SRGB_POWER

@@ -5,7 +5,8 @@ from the key frame before, with the events since.  So key frames do not depend o
 no sensor took: where a key frame is clipped, these are near the top of its range, and would be believed there.
 Weights for frames alone are told of the frame before processing.  All starts afresh after a cut.
 
-Large frames are gone through in parts, with all around them that the network sees.
+Large frames are gone through in parts, with all around them that the network sees.  Of a network of one colour each
+plane of frames in colours is a frame of its own, as each is clipped for itself.
 """
 
 from __future__ import annotations
@@ -35,18 +36,14 @@ class After:
     """Post-processing with the weights of a file.
 
     events     whether there are any
-    channels   of the frames, 1 or 3
     tile       the parts of large frames: see `interp.methods.tiling.parse_tiling`
-    Raises UsageError for weights of another network, such as need events without them, and those of grey frames for
-    frames that have colours.
+    Raises UsageError for weights of another network, and such as need events without them.
     """
 
-    def __init__(self, path: Path, events: bool, channels: int, device: torch.device | str, tile: str = "auto"):
+    def __init__(self, path: Path, events: bool, device: torch.device | str, tile: str = "auto"):
         network = load(path).to(device)
         if not isinstance(network, Hdr):
             raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
-        if network.spec.colours < channels:
-            raise UsageError(f"HDR with {path}, trained with grey frames, and these have colours; leave it out")
         self.network, self.device, self.tile = network, device, tile
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
@@ -92,13 +89,14 @@ class After:
     ) -> tuple[np.ndarray, HdrState]:
         """A frame [H, W, C], with the events since the one that a state is of, and the state after it."""
         planes = torch.from_numpy(np.ascontiguousarray(np.moveaxis(codes, -1, 0)))
-        light = to_light(planes, "srgb")[None].to(self.device)
-        window = light.new_zeros(1, self.network.spec.bins, *light.shape[2:]) if since is None else since
-        second = window if self.needs_events else light
-        of_colours = light.expand(-1, self.network.spec.colours, -1, -1)
-        made, after = self.network(of_colours, second, state, residue=self.residue)
-        found = to_codes(made.clamp(min=0), "srgb")[0]
-        found = found if len(found) == codes.shape[2] else found.mean(0, keepdim=True)
+        light = to_light(planes, "srgb").to(self.device)
+        colours = self.network.spec.colours
+        frames = light[:, None] if colours == 1 else light.expand(colours, -1, -1)[None]
+        window = light.new_zeros(1, self.network.spec.bins, *light.shape[1:]) if since is None else since
+        second = window.expand(len(frames), -1, -1, -1) if self.needs_events else frames
+        made, after = self.network(frames, second, state, residue=self.residue)
+        found = to_codes(made.clamp(min=0), "srgb").flatten(0, 1)
+        found = found if len(found) == len(light) else found.mean(0, keepdim=True)
         return found.movedim(0, -1).cpu().numpy(), after
 
     def residue(self, path_a: torch.Tensor, path_b: torch.Tensor, cell: State) -> tuple[torch.Tensor, State]:

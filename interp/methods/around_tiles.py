@@ -12,7 +12,6 @@ import torch
 
 from interp.candidates.bridge import highest_of
 from interp.candidates.guided import flows_to
-from interp.light import Transfer
 from interp.methods.gap import Gap
 from interp.methods.tiling import Tiling, part
 from interp.networks.around import Around
@@ -23,23 +22,21 @@ from interp.networks.guide import light_at
 def around_tiles(network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tiling) -> Around:
     """What tiles of a gap need for their images at times [N]."""
     whole = network.padded(gap.frame_0[None], gap.frame_1[None])
-    transfer: Transfer = getattr(network.spec, "transfer", "srgb")
-    around = Around(whole.frame_0, whole.frame_1, highest_of(whole.frame_0, whole.frame_1, transfer))
+    highest = highest_of(whole.frame_0, whole.frame_1, network.transfer)
+    around = Around(whole.frame_0, whole.frame_1, highest, coloured=whole.coloured)
     if network.spec.guided:
-        light = _light(network, gap, times, tiling, around, transfer)
-        around = replace(around, to_targets=flows_to(whole.frame_0, whole.frame_1, light, transfer))
+        light = _light(network, gap, times, tiling, around)
+        around = replace(around, to_targets=flows_to(whole.frame_0, whole.frame_1, light, network.transfer))
     return replace(around, between=sought(whole) if network.seeks_motion else None)
 
 
-def _light(
-    network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tiling, around: Around, transfer: Transfer
-) -> torch.Tensor:
+def _light(network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tiling, around: Around) -> torch.Tensor:
     """C [1, N, C, H, W] of the frames, continued."""
     light = around.frame_0.new_empty(1, len(times), *around.frame_0.shape[1:])
     for tile in tiling:
         seen = part(gap, tile)
         pair = replace(network.padded(seen.frame_0[None], seen.frame_1[None], seen.events), around=around)
         height, width = pair.frame_0.shape[-2:]
-        made = light_at(pair, times[None], transfer)
+        made = light_at(pair, times[None], network.transfer)
         light[..., tile.top : tile.top + height, tile.left : tile.left + width] = made
     return light

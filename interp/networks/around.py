@@ -21,6 +21,7 @@ class Around:
     between            [B, 4, H, W] px: motion from the first to the second (x, y) and back
     to_targets         [B, N, 4, H, W] px: from targets to the first, to the second
     corner             row and column where the part begins
+    coloured           both frames in their colours, as of `frame_fed.Pair`
     """
 
     frame_0: torch.Tensor
@@ -29,6 +30,7 @@ class Around:
     between: torch.Tensor | None = None
     to_targets: torch.Tensor | None = None
     corner: tuple[int, int] = (0, 0)
+    coloured: tuple[torch.Tensor, ...] = ()
 
     def of_part(self, size: torch.Size) -> Around:
         """With the motion of the part alone, of a size (height, width)."""

@@ -45,7 +45,11 @@ AROUND = 64  # px that a pixel of the residue sees around it: 59, on whole multi
 class HdrSpec(NetworkSpec):
     """Options of the HDR network; of size paper with frames in path B it has 2,979,555 parameters and 268 kMAC/px."""
 
-    colours: Literal[1, 3] = Field(default=3, description="channels of a frame; 1 saves 4 % of the cost")
+    colours: Literal[1, 3] = Field(
+        default=3,
+        description="channels of a frame; a network of 3 takes grey frames, too, and one of 1 the planes of coloured"
+        " ones as frames of their own. 1 saves 4 % of the cost for grey frames",
+    )
     second: Literal["events", "frames"] = Field(
         default="events",
         description="what path B sees: events (bins channels) or frames (twice as many channels as a frame)",

@@ -33,7 +33,8 @@ class FrameFedSpec(NetworkSpec):
 
     colours: Literal[1, 3] = Field(
         default=3,
-        description="channels of a frame; a network of 3 takes grey frames, too. 1 saves less than 2 % of the cost",
+        description="channels of a frame; a network of 3 takes grey frames, too, and one of 1, which learns from"
+        " luminance, gives coloured frames the colours of those that it carries. 1 saves less than 2 % of the cost",
     )
     flow_scale: float = Field(
         default=10.0, gt=0, description="pixels that 1 at the head of a flow network stands for; costs nothing"

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from interp.light import luminance, to_codes, to_light
+from interp.light import grey
 from interp.losses import objectives
 from interp.losses.perceptual import Perceptual
 from interp.networks.event_fed import EventFed
@@ -43,20 +43,20 @@ class EventFedLearner(Learner):
     def parts(self, batch: Batch) -> objectives.Terms:
         """Terms of the loss."""
         flows = batch["flows"][:, 1:] if self.over_time else None
-        return objectives.reconstruction(self.made(batch), grey(batch)[:, 1:], self.features, flows)
+        return objectives.reconstruction(self.made(batch), grey(batch["truth"])[:, 1:], self.features, flows)
 
     def predicted(self, clip: Batch) -> torch.Tensor:
         """Images [K, 1, H, W] of one sequence, brought to the truth's mean and contrast."""
-        return aligned(self.made(clip)[0], grey(clip)[0, 1:])
+        return aligned(self.made(clip)[0], grey(clip["truth"])[0, 1:])
 
     def scored(self, clip: Batch, images: torch.Tensor) -> list[Scores]:
         """One for each of the images but the first, which has seen too little."""
-        truth = grey(clip)[0]
+        truth = grey(clip["truth"])[0]
         return scores(images[1:], truth[2:], truth[0], truth[-1])
 
     def picture(self, clip: Batch, images: torch.Tensor) -> np.ndarray:
         """Events so far, image, truth, error; a row per instant."""
-        truth, events, count = grey(clip)[0, 1:], events_of(clip), len(images)
+        truth, events, count = grey(clip["truth"])[0, 1:], events_of(clip), len(images)
         return rows(
             [of_events(events, (n + 1) / count, truth[n]), images[n], truth[n],
              of_error(images[n], truth[n])]
@@ -69,11 +69,6 @@ def windows(batch: Batch, bins: int) -> torch.Tensor:
     count = batch["truth"].shape[1] - 1
     edges = torch.arange(count + 1, device=batch["truth"].device).expand(len(batch["truth"]), -1) / count
     return events_of(batch).voxels(edges[:, :-1], edges[:, 1:], bins)
-
-
-def grey(batch: Batch) -> torch.Tensor:
-    """Codes [B, K + 1, 1, H, W] of the luminance of true frames."""
-    return to_codes(luminance(to_light(batch["truth"], "srgb")), "srgb")
 
 
 def aligned(images: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:

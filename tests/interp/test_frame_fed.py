@@ -8,10 +8,12 @@ import torch
 from pairs import FRAME_FED, counts, frames
 
 from interp.candidates.ramps import ramps
+from interp.light import grey
 from interp.networks import make
 from interp.networks.event_input import first_last_and_target
 from interp.networks.frame_fed import FrameFed
 from interp.representation.event_counts import EventCounts
+from interp.warp import both_warped
 from vid2ev import Events, UsageError
 
 TIMES = [0.25, 0.5, 0.9]
@@ -122,6 +124,33 @@ def test_grey_frames_are_colours_that_are_alike(name: str) -> None:
         one = network(name, colours=1)(first, second, TIMES, some)
     torch.testing.assert_close(grey.images, colours.images.mean(2, keepdim=True))
     assert grey.images.shape == one.images.shape == (1, 3, 1, 20, 24)
+
+
+@pytest.mark.parametrize("name", FRAME_FED)
+def test_a_network_of_one_colour_makes_the_luminance_of_images_and_frames_their_colours(name: str) -> None:
+    made = network(name, colours=1)
+    first, second, some = *frames(2, (20, 24)), counts(2, (20, 24))
+    with torch.no_grad():
+        seen = made(grey(first), grey(second), TIMES, some)
+        images = made(first, second, TIMES, some)
+        alike = made(grey(first).expand(-1, 3, -1, -1), grey(second).expand(-1, 3, -1, -1), TIMES, some)
+    assert images.images.shape == images.blend.shape == (2, 3, 3, 20, 24)
+    torch.testing.assert_close(grey(images.images), seen.images.clamp(min=0), rtol=0, atol=1e-4)
+    torch.testing.assert_close(alike.images, seen.images.clamp(min=0).expand(-1, -1, 3, -1, -1), rtol=0, atol=1e-4)
+    torch.testing.assert_close(images.flows_at, seen.flows_at)
+    torch.testing.assert_close(images.warps, both_warped(first, second, seen.flows_at), rtol=0, atol=1e-5)
+    darkest, brightest = images.warps.amin(2), images.warps.amax(2)
+    assert bool(((images.blend > darkest - 1e-5) & (images.blend < brightest + 1e-5)).all())
+
+
+def test_colours_come_from_the_frame_that_is_believed() -> None:
+    """Halfway, of a frame that is red and one that is green, where the masks say that the second is not to be seen."""
+    made = make("superslomo", colours=1)
+    red, green = (torch.tensor(codes)[None, :, None, None].expand(1, 3, 16, 16) for codes in ((0.5, 0, 0), (0, 0.3, 0)))
+    with torch.no_grad():
+        made.get_submodule("refine.head").bias[4] = 20.0  # type: ignore[index, union-attr, operator]
+        image = made(red, green, [0.5]).images
+    torch.testing.assert_close(image[:, 0], red, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize("name", FRAME_FED)

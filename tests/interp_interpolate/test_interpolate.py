@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import torch
 from click.testing import CliRunner
 from small_takes import SIZE, STEP_US, images, moving, recording, texture, times_of
 
@@ -233,7 +234,6 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--network", "events.safetensors"], 2, "network 'events.safetensors' needs events"),
         (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
         (["b", "--hdr-network", "events.safetensors"], 2, "network hdr"),
-        (["b", "--hdr-network", "grey.safetensors"], 2, "these have colours"),
         (["b", "--start", "9"], 2, "expected a part of its"),
         (["b", "--start", "nan"], 2, "expected seconds"),
         (["b", "--stop", "inf"], 2, "expected seconds"),
@@ -251,7 +251,6 @@ def test_what_is_wrong_is_said_in_one_sentence(
     (tmp_path / "weights.safetensors").write_bytes(b"nothing")
     for name, network in (("hdr", "hdr"), ("events", "rrin_events_light")):
         save(tmp_path / f"{name}.safetensors", network, make(network))
-    save(tmp_path / "grey.safetensors", "hdr", make("hdr", colours=1))
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(command, arguments)
     assert isinstance(result.exception, (UsageError, DataError))
@@ -424,6 +423,56 @@ def test_grey_frames_move_as_those_of_one_colour_do(tmp_path: Path) -> None:
         one, other = (read_codes(tmp_path / f"out_{name}" / f"{k:06d}.png") for name in ("grey", "coloured"))
         assert one.ndim == 2
         np.testing.assert_allclose(one, other[..., 0], atol=1)
+
+
+@pytest.mark.parametrize("grey", [False, True])
+def test_a_network_of_one_colour_takes_frames_as_they_are(tmp_path: Path, grey: bool) -> None:
+    network = make("rrin", colours=1, zero_heads=False)
+    save(tmp_path / "one.safetensors", "rrin", network)
+    pictures = [frame[..., 1] if grey else frame for frame in moving(2)]
+    found = [*frames(images(tmp_path / "in", pictures), multiple=2, network=tmp_path / "one.safetensors")]
+    keys = [torch.from_numpy(each.codes).movedim(-1, 0)[None] for each in found]
+    with torch.inference_mode():
+        wanted = network.eval()(keys[0], keys[2], [0.5]).images[0, 0]
+    assert found[1].codes.shape == (SIZE[1], SIZE[0], 1 if grey else 3)
+    torch.testing.assert_close(keys[1][0], wanted, rtol=0, atol=1e-5)
+    interpolate(tmp_path / "in", tmp_path / "out", multiple=2, network=tmp_path / "one.safetensors")
+    assert made(tmp_path / "out")[1].ndim == (2 if grey else 3)
+
+
+@pytest.mark.parametrize("second", ["events", "frames"])
+def test_hdr_of_one_colour_processes_each_plane_as_a_grey_frame(tmp_path: Path, second: str) -> None:
+    network = make("hdr", colours=1, second=second)
+    torch.nn.init.normal_(network.out.weight, std=0.05)  # type: ignore[arg-type, union-attr]
+    save(tmp_path / "one.safetensors", "hdr", network)
+    pictures = [np.clip(1.4 * frame.astype(float), 0, 255).astype(np.uint8) for frame in moving(3)]
+    assert 0.1 < np.mean([frame == 255 for frame in pictures]) < 0.9
+    planes = [[np.repeat(frame[..., k : k + 1], 3, 2) for frame in pictures] for k in range(3)]
+    given: dict[str, Any] = {"multiple": 2, "method": "linear", "hdr": tmp_path / "one.safetensors"}
+    known = Options(contrast=(0.2, 0.2))
+    found, *of_planes = (
+        [*frames(recording(tmp_path / f"{k}", shown), options=known, **given)]
+        for k, shown in enumerate([pictures, *planes])
+    )
+    for number, frame in enumerate(found):
+        assert np.abs(frame.codes - pictures[number // 2] / 255).max() > 0.02
+        for k, of_plane in enumerate(of_planes):
+            np.testing.assert_allclose(frame.codes[..., k], of_plane[number].codes[..., 0], atol=1e-5)
+
+
+def test_hdr_that_sees_frames_takes_grey_ones_as_colours_that_are_alike(tmp_path: Path) -> None:
+    network = make("hdr", second="frames")
+    torch.nn.init.normal_(network.out.weight, std=0.05)  # type: ignore[arg-type, union-attr]
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    grey = [frame[..., 0] for frame in moving(2)]
+    alike = [np.repeat(frame[..., None], 3, 2) for frame in grey]
+    found, wanted = (
+        [*frames(images(tmp_path / name, shown), multiple=2, method="linear", hdr=tmp_path / "hdr.safetensors")]
+        for name, shown in (("grey", grey), ("alike", alike))
+    )
+    for one, other in zip(found, wanted, strict=True):
+        assert one.codes.shape[2] == 1
+        np.testing.assert_allclose(one.codes[..., 0], other.codes.mean(2), atol=1e-5)
 
 
 def test_images_without_times_are_told_the_option_that_gives_them(tmp_path: Path) -> None:

@@ -190,7 +190,7 @@ def test_hdr_in_tiles_is_that_of_the_whole_also_when_it_remembers(tmp_path: Path
     network = make("hdr")
     torch.nn.init.normal_(network.out.weight, std=0.05)
     save(tmp_path / "hdr.safetensors", "hdr", network)
-    tiled, whole = (After(tmp_path / "hdr.safetensors", True, 3, "cpu", tile) for tile in ("96x80", "none"))
+    tiled, whole = (After(tmp_path / "hdr.safetensors", True, "cpu", tile) for tile in ("96x80", "none"))
     tiled_state, state = None, None
     for _ in range(3):
         frame, events = 1.2 * torch.rand(1, 3, *size[::-1]), torch.randn(1, 5, *size[::-1])
@@ -203,10 +203,20 @@ def test_hdr_in_tiles_is_that_of_the_whole_also_when_it_remembers(tmp_path: Path
 
 
 @pytest.mark.parametrize("event_size", [SIZE, (136, 104)])
-@pytest.mark.parametrize("name", ["flow", "guided", "rrin_events_guided", "rrin_slomo_events", "rrin_events_light"])
-def test_motion_is_that_of_the_whole(name: str, event_size: tuple[int, int]) -> None:
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("flow", {}),
+        ("guided", {}),
+        ("rrin_events_guided", {}),
+        ("rrin_events_guided", {"colours": 1}),
+        ("rrin_slomo_events", {"flow": "guided"}),
+        ("rrin_events_light", {}),
+        ("rrin_events_light", {"colours": 1}),
+    ],
+)
+def test_motion_is_that_of_the_whole(name: str, options: dict[str, Any], event_size: tuple[int, int]) -> None:
     """Fresh networks are closed forms: what is left to differ is motion, colours, and how bright light may be."""
-    options = {"flow": "guided"} if name == "rrin_slomo_events" else {}
     network = None if name in METHODS else make(name, **options).eval()
     method = open_method(name) if network is None else OfFrames(name, network, needs_events=name != "rrin_events_light")
     whole = gap(event_size)

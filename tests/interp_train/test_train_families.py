@@ -10,8 +10,9 @@ import pytest
 import torch
 from small_run import SIDE, sample
 
+from interp.light import grey
 from interp.networks import make
-from interp.train.event_fed import EventFedLearner, aligned, grey, windows
+from interp.train.event_fed import EventFedLearner, aligned, windows
 from interp.train.flow import FlowLearner
 from interp.train.frame_fed import FrameFedLearner
 from interp.train.hdr import HdrLearner, seen
@@ -31,10 +32,14 @@ KINDS = {
 }
 
 
-def learner(name: str) -> Learner:
+GREY = [name for name in KINDS if KINDS[name] is not EventFedLearner]
+
+
+def learner(name: str, colours: int = 3) -> Learner:
     torch.manual_seed(0)
+    options = {"colours": colours} if name in GREY else {}
     rate = 5e-3 if KINDS[name] is EventFedLearner else 1e-4 if name == "hdr" else 1e-3
-    recipe, network = Recipe(steps=8, rate=rate), make(name)
+    recipe, network = Recipe(steps=8, rate=rate), make(name, **options)
     if name == "hdr":  # (which begins with frames that are right already, wherever they are not clipped)
         torch.nn.init.normal_(network.out.weight, std=0.05)  # type: ignore[arg-type, union-attr]
     made: Any = KINDS[name](name, network, recipe, Schedule(0, 1.0, 8))  # type: ignore[arg-type]
@@ -42,15 +47,16 @@ def learner(name: str) -> Learner:
     return made
 
 
-def batch(name: str, side: int = 2 * SIDE) -> dict[str, torch.Tensor]:
+def batch(name: str, side: int = 2 * SIDE, colours: int = 3) -> dict[str, torch.Tensor]:
     """Four frames one after the other, and what is between the first and the last."""
     found = sample(0)
     if issubclass(KINDS[name], FrameFedLearner):
+        found |= {key: grey(found[key]) for key in ("frames", "truth")} if colours == 1 else {}
         return {key: part[None] for key, part in with_flow_between(found).items()}
     light = (
         torch.rand(3, 8, 8, generator=torch.Generator().manual_seed(1)).repeat_interleave(5, 1).repeat_interleave(5, 2)
     )
-    truth = torch.stack([light[:, k : k + side, :side] for k in range(4)])
+    truth = torch.stack([light[:colours, k : k + side, :side] for k in range(4)])
     off_on = torch.poisson(torch.full((2, 9, side, side), 0.2), torch.Generator().manual_seed(2)).to(torch.uint8)
     codes = (truth - 0.2).clamp(0, 0.5) / 0.5
     sensor = {"clipped": codes, "range": torch.tensor([0.2, 0.7])}
@@ -58,9 +64,9 @@ def batch(name: str, side: int = 2 * SIDE) -> dict[str, torch.Tensor]:
     return {key: part[None] for key, part in with_flows(sequence).items()}
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_the_loss_falls(name: str) -> None:
-    learning, one = learner(name), batch(name)
+@pytest.mark.parametrize(("name", "colours"), [*((name, 3) for name in KINDS), *((name, 1) for name in GREY)])
+def test_the_loss_falls(name: str, colours: int) -> None:
+    learning, one = learner(name, colours), batch(name, colours=colours)
     optimizer = learning.configure_optimizers()["optimizer"]
     losses = []
     for _ in range(8):
@@ -93,7 +99,7 @@ def test_windows_of_a_sequence_hold_the_events_between_its_frames() -> None:
 
 
 def test_alignment_takes_brightness_and_contrast_away_and_nothing_else() -> None:
-    truth = grey(batch("e2vid"))[0]
+    truth = grey(batch("e2vid")["truth"])[0]
     torch.testing.assert_close(aligned(0.3 * truth - 0.2, truth), truth, atol=1e-5, rtol=0)
     flat = aligned(torch.full_like(truth, 0.4), truth)  # (nothing to scale)
     assert float((flat - truth.mean((1, 2, 3), keepdim=True)).abs().max()) < 1e-5
