@@ -54,11 +54,17 @@ def about(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def fill(network: nn.Module, path: Path) -> None:
-    """Give a network the weights of a file.  Raises UsageError where they are of another network, DataError where they
-    are not even of the one that the file names."""
-    name, _, tensors = _read(path)
+    """Give a network the weights of a file.  Raises UsageError where they are of another network, or of one for frames
+    of other colours, DataError where they are not even of the one that the file names."""
+    name, spec, tensors = _read(path)
     if misfit := _misfit(network, tensors):
         _of_network(path)
+        theirs, ours = spec.get("colours"), getattr(network.spec, "colours", None)
+        if theirs and ours and theirs != ours:
+            raise UsageError(
+                f"{path} holds the weights of a network with network.colours = {theirs}, and this one has {ours};"
+                f" choose network.colours = {theirs}, or give others"
+            )
         raise UsageError(f"{path} holds the weights of another network, {name} ({misfit}); give those of this one")
     network.load_state_dict(tensors)
 

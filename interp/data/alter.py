@@ -1,6 +1,6 @@
-"""Clips altered: parts, mirror images, time backwards, still parts, sensors that are known less well.
+"""Clips altered: parts, mirror images, time backwards, grey frames, still parts, sensors that are known less well.
 
-All but the last three are exact: the clip of the altered light is the altered clip.
+Parts, mirror images and time backwards are exact: the clip of the altered light is the altered clip.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import numpy as np
 
 from interp.data.chance import Range
 from interp.data.clip import Clip
+from interp.own_codes import codes_of, light_of
+from vid2ev.stream.frames import luminance_of
 
 
 def cropped(clip: Clip, left: int, top: int, size: tuple[int, int]) -> Clip:
@@ -49,6 +51,11 @@ def backwards(clip: Clip) -> Clip:
     )
 
 
+def grey(clip: Clip) -> Clip:
+    """With frames of one colour, as a grey camera would have taken them: of the luminance of their light."""
+    return replace(clip, truth=_grey(clip.truth), keys=_grey(clip.keys))
+
+
 def stilled(clip: Clip, still: np.ndarray, quality: int | None = None) -> Clip:
     """Nothing happens where `still` [H, W, bool]: what the first key instant shows stays, and there are no events.
 
@@ -82,6 +89,13 @@ def misjudged(clip: Clip, draw: np.random.Generator, error: Range) -> Clip:
     """With thresholds believed to be some factor of what they are, OFF and ON apart."""
     off, on = (value * float(draw.uniform(*error)) for value in clip.contrast)
     return replace(clip, contrast=(off, on))
+
+
+def _grey(frames: np.ndarray) -> np.ndarray:
+    """Frames [N, H, W, 3] as [N, H, W, 1], codes or light as they were."""
+    if frames.dtype == np.uint8:
+        return codes_of(luminance_of(light_of("srgb")[frames]), "srgb")[..., None]
+    return luminance_of(frames.astype(np.float32)).astype(frames.dtype)[..., None]
 
 
 BLURRED = 24  # codes: what key frames differ by from an instant is blur and no noise

@@ -28,7 +28,7 @@ class Clip:
     truth      what the frame camera would have seen at K + 1 instants, even in time, both ends included, without
                exposure and noise: sRGB codes uint8, or linear light float16, [K + 1, H, W, 3]
     keys       the two key frames as the frame camera gave them, sRGB codes uint8 [2, H, W, 3]; the instants of the ends
-               are the middles of their exposures
+               are the middles of their exposures.  One colour of both in place of three after `alter.grey`
     off_on     OFF and ON events in each of S equal sub-intervals, with what dead time hid, float16 [2, S, h, w]
     contrast   what an OFF and an ON event stand for, nominally [nat]
     gap_us     from key frame to key frame [us]

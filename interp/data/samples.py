@@ -52,15 +52,15 @@ class SampleSettings(BaseModel):
 
 
 class Drawn(Dataset[Sample]):
-    """Samples 0 ... length - 1 of a pool.
+    """Samples 0 ... length - 1 of a pool, with frames of C colours, 3 or 1: then as a grey camera takes them.
 
     Drawing one may make a clip that is due for later (`pool`).  Raises UsageError for samples that do not fit into
     clips.
     """
 
-    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int, colours: int = 3):
         check_fits(pool.settings, settings.size)
-        self.pool, self.settings, self._length = pool, settings, length
+        self.pool, self.settings, self._length, self.colours = pool, settings, length, colours
 
     def __len__(self) -> int:
         return self._length
@@ -70,6 +70,7 @@ class Drawn(Dataset[Sample]):
             raise IndexError(index)
         self.pool.step(index)
         clip, draw = drawn_clip(self.pool, self.settings, index)
+        clip = clip if self.colours == 3 else alter.grey(clip)
         sample = tensors(clip, self.pool.settings) | self.truth(clip, draw)
         # (networks add up in the order of memory, which that of processes is, too, and so does not depend on them)
         return {name: each.contiguous() for name, each in sample.items()}
@@ -82,16 +83,16 @@ class Drawn(Dataset[Sample]):
 class Samples(Drawn):
     """Samples for frame-fed networks.
 
-    frames     [2, 3, h, w] float32, the two key frames: sRGB codes, 0 ... 1
+    frames     [2, C, h, w] float32, the two key frames: sRGB codes, 0 ... 1
     off_on     [2, S, h, w] float16: OFF and ON events of S sub-intervals, with what dead time hid, in the geometry of
                the frames
     contrast   [2] float32, what an OFF and an ON event are believed to stand for [nat]
     times      [N] float32, instants from 0 to 1, both left out, in order
-    truth      [N, 3, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
+    truth      [N, C, h, w] float32: what was there: sRGB codes, or linear light, as the clips have it
     """
 
-    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
-        super().__init__(pool, settings, length)
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int, colours: int = 3):
+        super().__init__(pool, settings, length, colours)
         if settings.targets >= min(pool.settings.multiples):
             raise UsageError(
                 f"{settings.targets} targets of clips with {min(pool.settings.multiples) - 1} frames in between:"

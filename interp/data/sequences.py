@@ -26,15 +26,15 @@ NOISE_LSB: Range = (0.0, 5.2)
 class Sequences(Drawn):
     """All K + 1 frames of a clip; `frames`, `off_on` and `contrast` as of `Samples`, but
 
-    truth     [K + 1, 3, h, w] float32: sRGB codes, or linear light, as the clips have it
-    clipped   [K + 1, 3, h, w] float32, only of linear light: the codes of a frame sensor, 0 ... 1, of even slope
+    truth     [K + 1, C, h, w] float32: sRGB codes, or linear light, as the clips have it
+    clipped   [K + 1, C, h, w] float32, only of linear light: the codes of a frame sensor, 0 ... 1, of even slope
     range     [2] float32, beside these: the light of codes 0 and 1
 
     Raises UsageError for clips of several lengths, too.
     """
 
-    def __init__(self, pool: Pool, settings: SampleSettings, length: int):
-        super().__init__(pool, settings, length)
+    def __init__(self, pool: Pool, settings: SampleSettings, length: int, colours: int = 3):
+        super().__init__(pool, settings, length, colours)
         if len(set(pool.settings.multiples)) > 1:
             raise UsageError(f"sequences of clips with multiples {pool.settings.multiples}: expected one, such as 32")
 
@@ -45,10 +45,12 @@ class Sequences(Drawn):
 
 
 def clipped(light: np.ndarray, draw: np.random.Generator) -> Sample:
-    """`clipped` and `range` of a sequence: linear light [N, H, W, 3] as a sensor of the paper's ranges sees it."""
+    """`clipped` and `range` of a sequence: linear light [N, H, W, 3 or 1] as a sensor of the paper's ranges sees it."""
     spec = frame_sensor(1000, 0.0, uniform(draw, DARKEST), uniform(draw, SLOPE), uniform(draw, NOISE_LSB))
+    spec = spec.model_copy(update={"colour": light.shape[3] == 3})
     cis = Cis(spec, (light.shape[2], light.shape[1]), int(draw.integers(1 << 62)))
-    codes = [each.codes for k, frame in enumerate(light) for each in cis.step(frame.astype(np.float32), 1_000_000 * k)]
+    frames = light.astype(np.float32) if spec.colour else light[..., 0].astype(np.float32)
+    codes = [each.codes for k, frame in enumerate(frames) for each in cis.step(frame, 1_000_000 * k)]
     ends = np.array([spec.min_illuminance, spec.min_illuminance + spec.top * spec.slope]) / WHITE
-    seen = np.moveaxis(np.stack(codes), -1, 1).astype(np.float32) / spec.top
+    seen = np.moveaxis(np.reshape(codes, light.shape), -1, 1).astype(np.float32) / spec.top
     return {"clipped": torch.from_numpy(seen), "range": torch.from_numpy(ends.astype(np.float32))}

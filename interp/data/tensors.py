@@ -27,6 +27,6 @@ def tensors(clip: Clip, settings: ClipSettings) -> Sample:
 
 
 def as_tensor(frames: np.ndarray) -> torch.Tensor:
-    """Frames [N, H, W, 3] as [N, 3, H, W] float32: codes from 0 to 1, light as it is."""
+    """Frames [N, H, W, C] as [N, C, H, W] float32: codes from 0 to 1, light as it is."""
     values = torch.from_numpy(np.array(np.moveaxis(frames, -1, 1), order="C")).float()
     return values.div_(255) if frames.dtype == np.uint8 else values

@@ -74,6 +74,11 @@ class Job(BaseModel):
         """Whether the network learns from frames one after the other."""
         return self.network in SEQUENTIAL
 
+    @property
+    def colours(self) -> int:
+        """Of the frames that the network learns from; of those that take none, of what is made of clips."""
+        return getattr(spec_of(self.network, self.size, **self.options), "colours", 3)
+
     @classmethod
     def of(
         cls,
@@ -96,8 +101,7 @@ class Job(BaseModel):
         asked = _by_part(settings)
         network, size = network_and_size(network, size, starts)
         options = (network_of(starts[WHOLE])[2] if WHOLE in starts else {}) | asked["network"]
-        if getattr(spec_of(network, size, **options), "colours", 3) != 3:
-            raise UsageError("network.colours = 1: training has frames of three colours; leave it out")
+        spec_of(network, size, **options)  # (raises for what cannot be)
         check_frozen(network, size, options, starts)
         clips = _clip_defaults(network, videos, recordings) | asked["clips"]
         recipe = (RECURRENT if network in SEQUENTIAL else {}) | asked["recipe"]

@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset, default_collate
 
+from interp.data import alter
 from interp.data.ahead import Ahead
 from interp.data.chance import chance
 from interp.data.clip import Clip, remove_half_written, sound_clip, write_clip
@@ -80,9 +81,9 @@ def feed_of(
 
 def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
     if not job.sequences:
-        samples = Samples(pool, job.samples, WITHOUT_END)
+        samples = Samples(pool, job.samples, WITHOUT_END, job.colours)
         return WithFlowBetween(samples) if job.network == "flow" else samples
-    return WithFlows(Sequences(pool, job.samples, WITHOUT_END))
+    return WithFlows(Sequences(pool, job.samples, WITHOUT_END, job.colours))
 
 
 def validation_of(job: Job, cache: Path) -> list[tuple[str, Batch]]:
@@ -98,6 +99,7 @@ def validation_of(job: Job, cache: Path) -> list[tuple[str, Batch]]:
 
 def _whole(job: Job, clip: Clip, number: int) -> Batch:
     """A clip, as a sample of all its instants."""
+    clip = clip if job.colours == 3 else alter.grey(clip)
     sample = tensors(clip, job.clips)
     if job.sequences:
         light = clipped(clip.truth, chance(0, "validation", number)) if job.clips.light == "linear" else {}

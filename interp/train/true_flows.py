@@ -16,7 +16,7 @@ from vid2ev.stream.frames import LUMINANCE
 
 
 class WithFlows(Dataset[Batch]):
-    """Sequences with flows between their true frames [K + 1, 3, H, W].
+    """Sequences with flows between their true frames [K + 1, C, H, W].
 
     flows            [K, 2, H, W] px, from each frame but the first to the one before
     flows_to_first   [K, 2, H, W] px, from each to the first
@@ -55,8 +55,8 @@ def with_flows(sample: Batch) -> Batch:
 
 
 def _codes(frames: torch.Tensor) -> np.ndarray:
-    """Luma of frames [N, 3, H, W], uint8."""
-    grey = np.tensordot(LUMINANCE, frames.numpy(), (0, 1))
+    """Luma of frames [N, C, H, W], uint8."""
+    grey = np.tensordot(LUMINANCE, frames.expand(-1, 3, -1, -1).numpy(), (0, 1))
     return np.rint(255 * np.clip(grey, 0, 1)).astype(np.uint8)
 
 

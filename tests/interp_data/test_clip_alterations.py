@@ -64,6 +64,27 @@ def test_recordings_of_finer_and_coarser_events_make_one_batch() -> None:
     np.testing.assert_array_equal(batch[2, ..., 1::3, 1::3], clips[2].off_on)  # (at the middle of their pixels)
 
 
+def test_grey_frames_are_those_of_a_grey_camera() -> None:
+    """It sees luminance, a sum of light; its codes are nearest to that."""
+    clip, codes = clip_of(), np.arange(256) / 255
+    curve = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)  # IEC 61966-2-1
+    for ours, theirs in ((grey := alter.grey(clip)).truth, clip.truth), (grey.keys, clip.keys):
+        assert ours.dtype == np.uint8 and ours.shape == (*theirs.shape[:3], 1)
+        light = curve[theirs] @ [0.2126, 0.7152, 0.0722]
+        lower, own, upper = (
+            np.abs(curve[np.clip(ours[..., 0].astype(int) + step, 0, 255)] - light) for step in (-1, 0, 1)
+        )
+        assert (own <= np.minimum(lower, upper) + 1e-4).all()
+    assert as_bytes(grey)[2] == as_bytes(clip)[2] and grey.contrast == clip.contrast
+    alike = np.repeat(np.arange(256, dtype=np.uint8).reshape(1, 16, 16, 1), 3, 3)
+    same = alter.grey(Clip(alike, alike, clip.off_on, clip.contrast, 1, {}))
+    np.testing.assert_array_equal(same.truth[..., 0], alike[..., 0])
+    bright = clip_of(light="linear")
+    np.testing.assert_allclose(
+        alter.grey(bright).truth[..., 0], bright.truth.astype(float) @ [0.2126, 0.7152, 0.0722], rtol=1e-3
+    )
+
+
 def test_nothing_happens_in_still_parts() -> None:
     still = np.zeros((24, 24), bool)
     still[:, :10] = True

@@ -58,7 +58,6 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["batch=true"], r"setting batch=true is impossible: true and false are no numbers"),
         ("rrin", ["clips.motion=[[true, 1, 2]]"], r"true and false are no numbers"),
         ("rrin", ["clips.sensors={exposed=true}"], r"true and false are no numbers"),
-        ("flow", ["network.colours=1"], r"network.colours = 1: training has frames of three colours; leave it out"),
         ("rrin", ["network.bins=true"], r"bins = True is impossible"),
         ("rrin", ["clips.motion=[[nan, 1, 2]]"], r"nan is impossible: it must be a finite number"),
         ("rrin", ["clips.motion=[[2, 1, 2], [-1, 3, 4]]"], r"clips.motion.1.0 = -1 is impossible"),
