@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,21 @@ def test_splines_have_no_kink_in_speed_or_acceleration() -> None:
     assert np.abs(after - before).max() > 1  # (the measure tells a kink)
 
 
+@pytest.mark.parametrize("ends_s", [(-3.0, -1.0), (3.0, 5.0)])
+def test_beyond_its_ends_a_spline_goes_straight_on(ends_s: tuple[float, float]) -> None:
+    places = [pose_of(trajectory(KEYS), t_s).translation_m for t_s in np.linspace(*ends_s, 5)]
+    speeds = np.diff(places, axis=0)
+    assert np.linalg.norm(speeds[0]) > 0.1
+    np.testing.assert_allclose(speeds, np.tile(speeds[0], (4, 1)), atol=1e-12)
+
+
+def test_a_spline_turns_by_the_shorter_way() -> None:
+    """From 170 degrees to -170 it is 20 degrees, over the back."""
+    turns = [[0, 170, 0], [0, -170, 0]]
+    motion = trajectory({"kind": "keyframes", "times_s": [0, 1], "rotations_deg": turns})
+    assert np.allclose(pose_of(motion, 0.5).rotation, np.diag([-1, 1, -1]), atol=1e-12)
+
+
 @settings(max_examples=60)
 @given(
     st.lists(st.lists(st.floats(-180, 180), min_size=3, max_size=3), min_size=2, max_size=6),
@@ -103,6 +119,15 @@ def test_orbits_are_circles_without_a_turn() -> None:
     assert np.array_equal(pose_of(motion, 1.3).rotation, np.eye(3))
 
 
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+def test_the_phase_of_an_orbit_is_where_it_begins(axis: tuple[int, int, int]) -> None:
+    orbit = {"kind": "orbit", "axis": axis, "radius_m": 2, "period_s": 4}
+    ahead, behind = (pose_of(trajectory(orbit | {"phase_deg": deg}), 0.5).translation_m for deg in (90, 0))
+    np.testing.assert_allclose(ahead, pose_of(trajectory(orbit), 1.5).translation_m, atol=1e-12)
+    np.testing.assert_allclose(ahead, np.cross(axis, behind), atol=1e-12)
+    assert np.linalg.norm(ahead) == pytest.approx(2)
+
+
 def test_motions_follow_each_other_in_the_coordinates_of_those_before() -> None:
     flight = {
         "kind": "straight",
@@ -126,6 +151,13 @@ def test_look_at_points_z_to_the_target_and_leaves_the_place(place: list[float],
         assert abs(pose.rotation[1, 0]) < 1e-9 and pose.rotation[1, 1] >= 0  # (level, and upright: y is down)
 
 
+def test_only_the_direction_of_up_counts() -> None:
+    """In the picture it is where y, which goes down, comes from."""
+    for length in (1e-7, 1, 1e6):
+        pose = pose_of(trajectory({"kind": "look-at", "target_m": [0, 0, 1], "up": [0, length, 0]}), 0.0)
+        assert np.allclose(pose.rotation[:, 1], (0, -1, 0))
+
+
 def test_shake_has_its_root_mean_square_and_stays_in_its_band() -> None:
     motion = trajectory({"kind": "shake", "rms_mm": 5, "rms_deg": 0, "low_hz": 1, "high_hz": 10, "seed": 3})
     rate, seconds = 100, 200
@@ -134,8 +166,21 @@ def test_shake_has_its_root_mean_square_and_stays_in_its_band() -> None:
     power = np.abs(np.fft.rfft(places[:, 0])) ** 2
     frequency = np.fft.rfftfreq(rate * seconds, 1 / rate)
     assert power[(frequency < 0.9) | (frequency > 10.1)].sum() < 0.01 * power.sum()
+    windowed = np.abs(np.fft.rfft(places * np.hanning(len(places))[:, None], axis=0)) ** 2
+    for low, high in pairwise(10 ** (np.arange(17) / 16)):  # (each of its 16 sines has a band of its own)
+        band = windowed[(frequency >= low) & (frequency < high)].sum(axis=0) / windowed.sum(axis=0)
+        assert np.all((band > 0.5 / 16) & (band < 1.5 / 16))
     others = [pose_of(trajectory({"kind": "shake", "seed": seed}), 0.3).translation_m[0] for seed in range(5)]
     assert len(set(others)) == 5
+
+
+def test_a_shake_turns_by_its_root_mean_square_apart_from_where_it_goes() -> None:
+    motion = trajectory({"kind": "shake", "rms_mm": 5, "rms_deg": 0.3, "seed": 3})
+    poses = [pose_of(motion, k / 50) for k in range(2000)]
+    turns = np.array([Rotation.from_matrix(pose.rotation).as_rotvec(degrees=True) for pose in poses])
+    assert np.allclose(turns.std(axis=0), 0.3, rtol=0.1)
+    places = np.array([pose.translation_m for pose in poses])
+    assert np.abs(np.corrcoef(turns, places, rowvar=False)[:3, 3:]).max() < 0.3
 
 
 @pytest.mark.parametrize(
