@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.calibration import FORMATS, calibration_format, left_out, read_calibration, write_calibration
-from vid2ev.rig.camera import Camera, Rig, Source, Viewpoint
+from vid2ev.rig.camera import LATEST_US, Camera, Rig, Source, Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
 
 HELD = {  # coefficients of distortion that a format can hold
@@ -98,7 +98,18 @@ def test_poses_count_from_the_first_camera(tmp_path: Path, name: str) -> None:
     between = [one.cameras[0].pose.inverse() @ one.cameras[1].pose for one in (rig, found)]
     np.testing.assert_allclose(between[0].rotation, between[1].rotation, atol=1e-12)
     np.testing.assert_allclose(between[0].translation_m, between[1].translation_m, atol=1e-12)
-    assert "the camera of the video, from which poses counted" in left_out(rig, name)
+    for moved in ({}, {"rotation_deg": (0, 0, 0), "translation_mm": (0, 0, 1)}):
+        first = rig.cameras[0].model_copy(update=moved)
+        assert "the camera of the video, from which poses counted" in left_out(Rig(cameras=(first,)), name)
+    assert left_out(Rig(cameras=(Camera(name="a", kind="dvs"),)), name) == []
+
+
+def test_a_unit_may_be_given_where_it_is_the_files_own(tmp_path: Path) -> None:
+    (tmp_path / "camchain.yaml").write_text(KALIBR)
+    turned, moved_m = differences(*(read_calibration(tmp_path / "camchain.yaml", unit).rig for unit in ("m", None)))
+    assert turned == moved_m == 0
+    with pytest.raises(UsageError, match="counts in m; leave --unit mm out"):
+        read_calibration(tmp_path / "camchain.yaml", "mm")
 
 
 def test_kalibrs_documentation_is_read_as_it_means_it(tmp_path: Path) -> None:
@@ -160,6 +171,11 @@ def test_dsec_is_read_as_its_page_says(tmp_path: Path) -> None:
     assert [camera.kind for camera in cameras] == ["dvs", "cis", "cis", "dvs"]
     assert [camera.size for camera in cameras] == [(640, 480), (1440, 1080), (1440, 1080), (640, 480)]
     np.testing.assert_allclose([camera.translation_mm[0] for camera in cameras], [0, 40, 550, 600])
+    tree["intrinsics"]["cam0"]["camera_matrix"] = [[550.0, 0, 320.0], [0, 551.0, 240.0], [0, 0, 1]]
+    del tree["intrinsics"]["cam0"]["camera_location"]
+    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump(tree | {"intrinsics": {"cam0": tree["intrinsics"]["cam0"]}}))
+    (alone,) = read_calibration(tmp_path / "matrix.yaml").rig.cameras
+    assert (alone.name, alone.focal_px, alone.centre_px) == ("cam0", (550.0, 551.0), (320.0, 240.0))
     for index in range(4):  # (as files are that do not say it)
         del tree["intrinsics"][f"cam{index}"]["camera_type"]
     (tmp_path / "unsaid.yaml").write_text(yaml.safe_dump(tree))
@@ -189,6 +205,82 @@ def test_rows_of_a_rectified_pair_show_the_same(tmp_path: Path) -> None:
     )
     turned = points @ np.array(tree["extrinsics"]["R_rect0"]).T
     np.testing.assert_allclose(found[:, :3] / found[:, 3:], turned, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"size": (320, 240)},
+        {"translation_mm": (0, 0, 0)},
+        {"distortion_model": "equidistant", "distortion": (0.1, 0, 0, 0)},
+        {"kind": "cis"},
+    ],
+    ids=str,
+)
+def test_cameras_that_are_no_pair_are_not_turned(tmp_path: Path, changed: dict[str, object]) -> None:
+    left, _, right = pair().cameras
+    write_calibration(tmp_path / "pair.yaml", Rig(cameras=(left, right)), "dsec")
+    write_calibration(tmp_path / "none.yaml", Rig(cameras=(left, right.model_copy(update=changed))), "dsec")
+    one, other = (yaml.safe_load((tmp_path / name).read_text()) for name in ("pair.yaml", "none.yaml"))
+    assert [*one["disparity_to_depth"]] == ["cams_01"] and other["disparity_to_depth"] == {}
+    for index in range(2):
+        np.testing.assert_array_equal(other["extrinsics"][f"R_rect{index}"], np.eye(3))
+        lenses = [other["intrinsics"][f"cam{rect}{index}"]["camera_matrix"] for rect in ("", "Rect")]
+        assert lenses[0] == lenses[1]
+
+
+def test_rectified_pictures_are_full_of_light(tmp_path: Path) -> None:
+    write_calibration(tmp_path / "cam_to_cam.yaml", pair(), "dsec")
+    tree = yaml.safe_load((tmp_path / "cam_to_cam.yaml").read_text())
+    for index in (0, 2):
+        (fx, fy, cx, cy), lens = (
+            tree["intrinsics"][f"camRect{index}"]["camera_matrix"],
+            views_of(pair())[index].intrinsics,
+        )
+        across, down = cv2.initUndistortRectifyMap(
+            lens.matrix,
+            np.array(lens.distortion),
+            np.array(tree["extrinsics"][f"R_rect{index}"]),
+            np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
+            lens.size,
+            cv2.CV_32FC1,
+        )
+        for places, side in ((across, lens.size[0]), (down, lens.size[1])):
+            assert places.min() > -1 and places.max() < side
+
+
+@pytest.mark.parametrize("name", ["kalibr", "dsec", "dv"])
+def test_cameras_come_in_the_order_of_their_numbers(tmp_path: Path, name: str) -> None:
+    cameras = [
+        Camera(name=f"c{k}", kind="dvs", size=(64, 48), fov_deg=60.0, translation_mm=(k * k, 0, 0)) for k in range(12)
+    ]
+    path = tmp_path / "calibration"
+    write_calibration(path, Rig(cameras=tuple(cameras)), name)
+    tree = yaml.safe_load(path.read_text())
+    for key in ("intrinsics", "cameras"):
+        if key in tree:
+            tree[key] = dict(reversed(tree[key].items()))
+    path.write_text(json.dumps(dict(reversed(tree.items()))))
+    found = read_calibration(path).rig.cameras
+    assert [camera.name for camera in found] == [camera.name for camera in cameras]
+    np.testing.assert_allclose([camera.translation_mm[0] for camera in found], [k * k for k in range(12)], atol=1e-9)
+
+
+def test_a_set_of_dv_processing_may_begin_with_another_camera(tmp_path: Path) -> None:
+    path = tmp_path / "calibration.json"
+    write_calibration(path, pair(), "dv")
+    tree = json.loads(path.read_text())
+    del tree["cameras"]["C0"]
+    path.write_text(json.dumps(tree))
+    found = read_calibration(path).rig
+    between = [one.cameras[-2].pose.inverse() @ one.cameras[-1].pose for one in (pair(), found)]
+    assert np.array_equal(found.cameras[0].pose.rotation, np.eye(3)) and not found.cameras[0].pose.translation_m.any()
+    np.testing.assert_allclose(between[0].rotation, between[1].rotation, atol=1e-9)
+    np.testing.assert_allclose(between[0].translation_m, between[1].translation_m, atol=1e-9)
+    tree["cameras"]["C1"]["focalLength"][0] = True
+    path.write_text(json.dumps(tree))
+    with pytest.raises(DataError, match=r"cameras.C1.focalLength\[0\] is True, not a number"):
+        read_calibration(path)
 
 
 def test_opencv_reads_what_is_written(tmp_path: Path) -> None:
@@ -239,7 +331,9 @@ def test_files_of_opencvs_samples_are_read(tmp_path: Path) -> None:
     one = opencv_file(
         tmp_path / "camera.yml", image_width=640, image_height=480, camera_matrix=matrix, distortion_coefficients=radtan
     )
-    (camera,) = read_calibration(one).rig.cameras
+    found = read_calibration(one)
+    (camera,) = found.rig.cameras
+    assert not found.notes  # (one camera has no translation whose unit could matter)
     assert (camera.size, camera.focal_px, camera.centre_px) == ((640, 480), (501.5, 502.5), (320.25, 240.75))
     assert (camera.distortion_model, camera.distortion) == ("radtan", (0.1, -0.2, 0.001, 0.002, 0.05))
     long = np.pad(radtan, ((0, 0), (0, 9)))
@@ -256,6 +350,33 @@ def test_files_of_opencvs_samples_are_read(tmp_path: Path) -> None:
     tilted = opencv_file(tmp_path / "tilted.yml", image_width=640, image_height=480, **(both | {"D1": long + 1}))
     with pytest.raises(DataError, match="D1 has a thin prism or a tilt"):
         read_calibration(tilted)
+
+
+def test_what_opencvs_files_leave_open_is_told_by_their_numbers(tmp_path: Path) -> None:
+    matrix, four = np.array([[501.5, 0, 320.25], [0, 502.5, 240.75], [0, 0, 1]]), np.array([[0.1, -0.2, 0.001, 0.002]])
+
+    def read(**changed: object) -> Camera:
+        stated = {"size": np.array([640, 480]), "camera_matrix": matrix, "distortion_coefficients": four, **changed}
+        return read_calibration(opencv_file(tmp_path / "camera.yml", **stated)).rig.cameras[0]
+
+    assert read().size == (640, 480)
+    assert (
+        read(fisheye_model=0).distortion_model == "radtan" and read(fisheye_model=1).distortion_model == "equidistant"
+    )
+    assert read(distortion_coefficients=0 * four).distortion_model == "none"
+    with pytest.raises(DataError, match="not a camera matrix of fx, 0, cx"):
+        read(camera_matrix=matrix + [[0, 0.5, 0]] * 3)
+    for first in ("%YAML:1.0", "# YAML"):  # (lines are counted with the first one)
+        (tmp_path / "broken.yml").write_text(f"{first}\nsize: [\n  ]]\n")
+        with pytest.raises(DataError, match="line 3"):
+            read_calibration(tmp_path / "broken.yml")
+
+
+def test_distortions_have_the_names_that_ros_gives_them(tmp_path: Path) -> None:
+    for count, name in ((4, "plumb_bob"), (5, "plumb_bob"), (8, "rational_polynomial")):
+        lens = {"size": (64, 48), "fov_deg": 60.0, "distortion_model": "radtan", "distortion": (0.01,) * count}
+        write_calibration(tmp_path / "c.yml", Rig(cameras=(Camera(name="a", kind="dvs", **lens),)), "opencv", True)
+        assert f"distortion_model: {name}" in (tmp_path / "c.yml").read_text()
 
 
 def test_ros_camera_info_is_read(tmp_path: Path) -> None:
@@ -383,6 +504,11 @@ def test_a_key_that_is_missing_is_named(tmp_path: Path, name: str, key: str, sen
         ("461.629", "many", "cam0.intrinsics[0] is 'many', not a number"),
         ("461.629", ".nan", "cam0.intrinsics[0] is '.nan', not a number"),
         ("0.99998854", "0.5", "cam1.T_cn_cnm1 is"),
+        ("-0.11003785", "-1.1e6", "cameras stand more than 1000 km apart"),
+        ("[752, 480]", "[0, 480]", "cam0.resolution[0] is '0', not a whole number of pixels"),
+        ("87]\n  - [0.0, 0.0, 0.0, 1.0]", "87]\n  - [0.0, 0.0, 0.0, 2.0]", "last row of 0, 0, 0, 1"),
+        ("[-0.33518750, 0.13211436, 57e-5, 0.00057686]", str([0] * 1001), "not at most 1000 numbers"),
+        ("-8.121e-05", f"{1.1e-6 * LATEST_US}", "cam0.timeshift_cam_imu is '"),
         ("-8.121e-05", "1e12", "cam0.timeshift_cam_imu is '1e12', not a shift of a clock"),
     ],
 )
@@ -400,6 +526,12 @@ def test_a_lens_that_a_format_cannot_hold_is_refused(tmp_path: Path) -> None:
     for name in ("kalibr", "dv"):
         with pytest.raises(UsageError, match="camera a has 8; choose --as opencv"):
             write_calibration(tmp_path / "calibration", rig, name)
+        padded = Rig(cameras=(Camera(name="a", kind="dvs", **(lens | {"distortion": (0.1, 0, 0, 0, 0, 0, 0, 0)})),))
+        write_calibration(tmp_path / name, padded, name)
+        assert (
+            read_calibration(tmp_path / name).rig.cameras[0].distortion == (0.1, 0, 0, 0, 0)[: HELD[name]["radtan"][-1]]
+        )
+        (tmp_path / name).unlink()
     with pytest.raises(UsageError, match="camera dvs has no size"):
         write_calibration(tmp_path / "calibration", Rig(cameras=(Camera(name="dvs", kind="dvs"),)), "dsec")
     with pytest.raises(UsageError, match="expected rig or one of dsec, kalibr, dv, opencv"):
@@ -413,6 +545,10 @@ def test_a_field_that_is_the_videos_is_written(tmp_path: Path) -> None:
     write_calibration(tmp_path / "calibration", seen, "kalibr")
     found = read_calibration(tmp_path / "calibration").rig.cameras[0]
     assert found.focal_px == pytest.approx(seen.resolved((1280, 720)).viewpoints[0].intrinsics.focal_px)
+    seen = Rig(source=Source(focal_px=(300, 300), size=(640, 480)), cameras=seen.cameras)
+    write_calibration(tmp_path / "pixels", seen, "kalibr")
+    found = read_calibration(tmp_path / "pixels").rig.cameras[0]
+    assert found.focal_px == pytest.approx(views_of(seen)[0].intrinsics.focal_px)
     for source in (Source(), Source(focal_px=(100, 100)), Source(size=(640, 480))):
         with pytest.raises(UsageError, match="camera a has no size with fov_deg or focal_px"):
             write_calibration(tmp_path / "calibration", Rig(source=source, cameras=seen.cameras), "kalibr")
@@ -421,14 +557,12 @@ def test_a_field_that_is_the_videos_is_written(tmp_path: Path) -> None:
 def test_names_become_names_of_folders(tmp_path: Path) -> None:
     write_calibration(tmp_path / "calibration", pair(), "dv")
     tree = json.loads((tmp_path / "calibration").read_text())
-    for key, name in zip(tree["cameras"], ("a/b", "A_B", "con"), strict=True):
-        tree["cameras"][key]["name"] = name
-    (tmp_path / "calibration").write_text(json.dumps(tree))
-    assert [camera.name for camera in read_calibration(tmp_path / "calibration").rig.cameras] == [
-        "a_b",
-        "A_B_2",
-        "con_2",
-    ]
+    for called, expected in ((("a/b", "A_B", "con"), ["a_b", "A_B_2", "con_2"]), (("x" * 300,) * 3, None)):
+        for key, name in zip(tree["cameras"], called, strict=True):
+            tree["cameras"][key]["name"] = name
+        (tmp_path / "calibration").write_text(json.dumps(tree))
+        names = [camera.name for camera in read_calibration(tmp_path / "calibration").rig.cameras]
+        assert names == (expected or ["x" * 48, f"{'x' * 48}_2", f"{'x' * 48}_3"])
 
 
 def test_files_of_no_format_are_one_sentence(tmp_path: Path) -> None:

@@ -21,7 +21,9 @@ def test_poses_compose_and_invert(turn, way, other_turn, other_way, point):  # t
     np.testing.assert_allclose(a.inverse().apply(a.apply(np.array(point))), point, atol=1e-9)
 
 
-@pytest.mark.parametrize("angle", [0, 1e-200, 1e-12, 1e-9, 1e-7, 1e-5, 0.1, 1, 3, np.pi - 1e-9, np.pi - 1e-5, np.pi])
+@pytest.mark.parametrize(
+    "angle", [0, 1e-200, 1e-12, 1e-9, 1e-7, 1e-5, 0.1, 1, 3, np.pi - 1e-9, np.pi - 1e-7, np.pi - 1e-5, np.pi]
+)
 def test_turns_are_those_of_opencv(angle: float) -> None:
     for seed in range(20):
         axis = np.random.default_rng(seed).normal(size=3)

@@ -12,11 +12,13 @@ from test_any_world import TEXTURES, point, surfaces, things, turn, worlds
 
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
-from vid2ev.scenes.reel import Reel
-from vid2ev.scenes.render import render
+from vid2ev.scenes.moves import _shadow
+from vid2ev.scenes.reel import Reel, still_of
+from vid2ev.scenes.render import canvas_of, paint, render, tiles_of
 from vid2ev.scenes.scene import Scene
-from vid2ev.scenes.snapshot import Lamp, Shape, Snapshot, Surface, Thing
+from vid2ev.scenes.snapshot import Lamp, Mesh, Shape, Snapshot, Surface, Thing
 from vid2ev.scenes.world import World
+from vid2ev.scenes.world_numbers import numbers_of
 from vid2ev.seen.instants import instants
 from vid2ev.seen.recipe import Recipe
 from vid2ev.upsample.stillness import still_strips
@@ -159,6 +161,68 @@ def test_shadows_of_what_moves_fall_where_they_fell(lamps, seed):
     for k in range(4):
         snapshots.append(moved(snapshots[-1], 2 + (seed + k) % 7, rng.uniform(-0.2, 0.2, 3), rng.uniform(-20, 20, 3)))
     assert_same_as_alone(snapshots, [HOME] * 5)
+
+
+@pytest.mark.parametrize("near", [False, True])
+@pytest.mark.parametrize("seed", range(20))
+def test_all_that_a_ball_may_hide_from_a_lamp_is_in_the_balls_of_its_shadow(near, seed):
+    rng = np.random.default_rng(seed)
+    centre, radius, lamp = rng.normal(0, 1, 3), rng.uniform(0.05, 0.5), rng.normal(0, 1, 3)
+    lamp = centre + radius * rng.uniform(1.2, 9) * lamp / np.linalg.norm(lamp) if near else lamp / np.linalg.norm(lamp)
+    way = (centre - lamp) / np.linalg.norm(centre - lamp) if near else -lamp
+    things = np.column_stack([centre + rng.uniform(1, 5, (3, 1)) * way + rng.normal(0, 0.3, (3, 3)), [0.3, 1, 3]])
+    rims = rng.normal(0, 1, (4000, 3))
+    rims = centre + radius * rims / np.linalg.norm(rims, axis=1, keepdims=True)
+    behind = rims + rng.uniform(0, 8, (4000, 1)) * (rims - lamp if near else -lamp)
+    gaps = np.linalg.norm(behind[:, None] - things[:, :3], axis=2) - things[:, 3]
+    behind = behind[(gaps <= 0).any(axis=1)]
+    balls = _shadow(np.array([*centre, radius]), lamp, near, things)
+    assert len(behind) > 100
+    assert (np.linalg.norm(behind[:, None] - balls[:, :3], axis=2) <= balls[:, 3]).any(axis=1).all()
+
+
+def test_strips_of_a_tile_that_is_painted_are_not_said_to_be_still():
+    camera = Intrinsics.of_field((512, 40), 80)
+    numbers = numbers_of(still_life([], 0), HOME)
+    for row, column in np.ndindex(tiles_of(camera.size)):
+        wanted = np.zeros(tiles_of(camera.size), np.uint8)
+        wanted[row, column] = 1
+        canvas = canvas_of(camera.size)
+        for plane in canvas:
+            plane[...] = 99
+        paint(canvas, numbers, np.zeros_like(canvas.depth, np.uint8), camera, wanted, 1)
+        assert not (still_of(canvas.light, wanted) & ~still_strips(np.full_like(canvas.light, 99), canvas.light)).any()
+
+
+@pytest.mark.parametrize("light", [-0.1, 1e31])
+def test_light_that_sensors_mend_is_not_said_to_be_still(light):
+    world = Snapshot(still_life([], 0).things, [Lamp("ambient", (light,) * 3)])
+    assert assert_same_as_alone([world, world], [HOME] * 2) == [0.0]
+
+
+def test_what_nearly_hides_a_lamp_has_its_shadow_anywhere():
+    first = still_life([Lamp("point", position_m=(0, 0, 2), shadows=True)], 1)
+    leaf = Thing("leaf", Shape("sphere", (0.2,) * 3), Surface(), Pose.of((0, 0, 0), (0, 0, 2.105)))
+    first = replace(first, things=[*first.things, leaf])
+    assert_same_as_alone([first, moved(first, 9, (0.3, 0, 0), (0, 0, 0))], [HOME] * 2)
+
+
+def test_shadows_fall_on_meshes():
+    grid = np.stack(np.meshgrid(np.linspace(-4, 4, 9), np.linspace(-3, 3, 7), [0.0]), axis=-1).reshape(-1, 3)
+    corners = np.arange(54).reshape(6, 9)[:, :8].reshape(-1, 1)
+    wall = Mesh(grid, np.concatenate([corners + np.array(third) for third in ((0, 1, 10), (0, 10, 9))]))
+    things = [
+        Thing("wall", Shape("mesh", mesh=wall), Surface(), Pose.of((0, 0, 0), (0, 0, 5))),
+        Thing("ball", Shape("sphere", (0.4,) * 3), Surface(), Pose.of((0, 0, 0), (-1, -0.5, 3))),
+    ]
+    first = Snapshot(things, [Lamp("sun", direction=(0.9, 0.2, 1.0), shadows=True)])
+    assert_same_as_alone([first, moved(first, 1, (0.1, 0, 0), (0, 0, 0))], [HOME] * 2)
+
+
+def test_the_background_goes_along_with_a_camera_that_turns():
+    first = replace(still_life([], 1), things=[], environment=TEXTURES[2])
+    assert_same_as_alone([first, first], [HOME, Pose.of((0, 10, 0))])
+    assert_same_as_alone([first, replace(first, environment_pose=Pose.of((0, 10, 0)))], [HOME] * 2)
 
 
 def test_where_little_moves_most_is_kept():

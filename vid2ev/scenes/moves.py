@@ -46,13 +46,12 @@ def balls_between(before: World, after: World) -> np.ndarray | None:
     balls = np.concatenate([world.ball[moved] for world in (before, after)])
     shadows = [np.empty((0, 4))]
     if after.casts and len(balls):
-        far = np.concatenate([before.ball, after.ball])
         for lamp in np.flatnonzero(after.lamp_shadows):
             for ball in balls:
-                shadow = _shadow(ball, after.lamp_in_camera[lamp], after.lamp_kind[lamp] == POINT, far)
+                shadow = _shadow(ball, after.lamp_in_camera[lamp], after.lamp_kind[lamp] == POINT, after.ball)
                 if shadow is None:
                     return None
-                shadows.append(shadow[_touches(shadow, before) | _touches(shadow, after)])
+                shadows.append(shadow[_touches(shadow, after)])  # (what moved away has a ball of its own)
     return _as_seen(np.concatenate([balls, *shadows]))
 
 

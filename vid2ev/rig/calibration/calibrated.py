@@ -105,18 +105,15 @@ def from_first(views: Sequence[Viewpoint]) -> list[Pose]:
     return [_exact_if_same(views[0], view) for view in views]
 
 
-def radtan_of(view: Viewpoint, counts: Sequence[int], format_name: str) -> tuple[float, ...]:
-    """The coefficients of a camera's distortion, as many as a format can hold of them.  Raises UsageError."""
+def distortion_of(view: Viewpoint, most: int, format_name: str) -> tuple[float, ...]:
+    """The coefficients of a camera's distortion, of which a format can hold so many at most.  Raises UsageError."""
     held = view.intrinsics.distortion
-    for count in counts:
-        if len(held) <= count:
-            return (*held, *(0.0,) * (count - len(held)))
-    if any(held[counts[-1] :]):
+    if any(held[most:]):
         raise UsageError(
-            f"{format_name} holds {counts[-1]} coefficients of distortion, and camera {view.camera.name} has"
+            f"{format_name} holds {most} coefficients of distortion, and camera {view.camera.name} has"
             f" {len(held)}; choose --as opencv"
         )
-    return held[: counts[-1]]
+    return held[:most]
 
 
 def _exact_if_same(first: Viewpoint, view: Viewpoint) -> Pose:

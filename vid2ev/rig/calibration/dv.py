@@ -25,10 +25,10 @@ from typing import Any
 from vid2ev.rig.calibration.calibrated import (
     Calibrated,
     CalibrationFormat,
+    distortion_of,
     from_first,
     intrinsics_at,
     model_named,
-    radtan_of,
 )
 from vid2ev.rig.calibration.node import Node
 from vid2ev.rig.camera import Viewpoint
@@ -37,7 +37,6 @@ from vid2ev.rig.pose import Pose
 
 NAMES: dict[DistortionModel, str] = {"none": "none", "radtan": "radialTangential", "equidistant": "equidistant"}
 MODELS: dict[str, DistortionModel] = {name: model for model, name in NAMES.items()} | {"": "none"}
-COUNTS = {"none": [0], "radtan": [4, 5], "equidistant": [4]}
 
 
 def read(tree: Node) -> list[Calibrated]:
@@ -53,7 +52,7 @@ def write(views: Sequence[Viewpoint]) -> str:
     cameras: dict[str, Any] = {}
     for index, (view, pose) in enumerate(zip(views, from_first(views), strict=True)):
         lens = view.intrinsics
-        distortion = radtan_of(view, COUNTS[lens.model], "dv-processing")
+        distortion = distortion_of(view, 5, "dv-processing")
         cameras[f"C{index}"] = {
             "name": view.camera.name,
             "position": view.camera.name,

@@ -27,10 +27,10 @@ from vid2ev.rig.calibration.calibrated import (
     Calibrated,
     CalibrationFormat,
     Kind,
+    distortion_of,
     from_first,
     intrinsics_at,
     model_named,
-    radtan_of,
 )
 from vid2ev.rig.calibration.node import Node
 from vid2ev.rig.camera import LATEST_US, Viewpoint
@@ -67,12 +67,11 @@ def write(views: Sequence[Viewpoint]) -> str:
     timed = any(view.camera.clock_offset_us for view in views)
     for index, (view, pose) in enumerate(zip(views, poses, strict=True)):
         lens, camera = view.intrinsics, view.camera
-        counts = [0] if lens.model == "none" else [4]
         chain[f"cam{index}"] = {
             "camera_model": "pinhole",
             "intrinsics": [*lens.focal_px, *lens.centre_px],
             "distortion_model": lens.model,
-            "distortion_coeffs": list(radtan_of(view, counts, "Kalibr's camchain")),
+            "distortion_coeffs": list(distortion_of(view, 4, "Kalibr's camchain")),
             **({"T_cn_cnm1": four_by_four(pose @ poses[index - 1].inverse())} if index else {}),
             **({"timeshift_cam_imu": -camera.clock_offset_us / 1e6} if timed else {}),
             "rostopic": f"/{camera.name}/{'events' if camera.kind == 'dvs' else 'image_raw'}",
