@@ -7,6 +7,7 @@ import os
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,7 +23,9 @@ from vid2ev.commands import main
 from vid2ev.formats import read_events
 from vid2ev.making.conversion import Paused
 from vid2ev.making.split import convert_split
+from vid2ev.making.stretches import warm_up_us, with_warm_up
 from vid2ev.recording.held import Held
+from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
@@ -92,6 +95,22 @@ def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(tmp_path:
     second.restore(first.state())
     sent += [(events.t.tolist(), events.x.tolist()) for events in second.see_all(frames[2:])]
     assert sent == [([10], [0]), ([20, 20, 20], [3, 5, 3]), ([21], [0]), ([30], [5])]
+
+
+def test_who_goes_on_keeps_to_the_clock_of_the_readout(tmp_path: Path) -> None:
+    part = tmp_path / "0.csv"
+    part.write_text("t,x,y,p\n27,0,0,1\n47,3,0,1\n67,3,1,0\n87,0,0,1\n")
+    spec = DvsSpec(frame_rate_hz=50_000, rounding="causal")
+    mount: Any = SimpleNamespace(size=(8, 2), within="", sensor=SimpleNamespace(spec=spec))
+    frames = [Frame(np.empty((2, 8)), t_us * 1000) for t_us in (7, 30, 55, 90)]
+    whole, first, second = (Replayed(mount, [part], False) for _ in range(3))
+    for sensor in (whole, first):
+        sensor.see(frames[0])
+    sent = [events.t.tolist() for events in whole.see_all(frames[1:])]
+    begun = [events.t.tolist() for events in first.see_all(frames[1:2])]
+    second.restore(first.state())
+    assert begun + [events.t.tolist() for events in second.see_all(frames[2:])] == sent
+    assert all(sent[1:])
 
 
 @pytest.mark.parametrize("rounding", ["nearest", "causal"])
@@ -271,6 +290,43 @@ def test_parts_with_a_warm_up_differ_from_their_seam_to_the_next_cut_and_the_man
         parts = [each.select((each.t > 10**6 * first_s) & (each.t <= 10**6 * last_s)) for each in (one, other)]
         assert len(parts[0]) > 1000
         assert exact == all(np.array_equal(getattr(parts[0], name), getattr(parts[1], name)) for name in "txyp")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "beyond_us"),
+    [
+        ((), 0),
+        (("refractory_us=700", "delay_us=50"), 750),
+        (("photoreceptor_tau_us=300", "follower_tau_us=20"), 3200),
+        (("photoreceptor_tau_us=300", "follower_tau_us=20", "bandwidth=light", "bandwidth_dark=0.1"), 33_200),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("slowdown", [1.0, 2.5])
+def test_a_part_is_shown_what_is_before_it_for_its_warm_up_and_up_to_a_frame_more(
+    tmp_path: Path, overrides: tuple[str, ...], beyond_us: int, slowdown: float
+) -> None:
+    """1 s, 10 time constants of all poles in the dark, the refractory period and the delay."""
+    np.save(tmp_path / "clip.npy", np.ones((50, 4, 4), np.float32))
+    recipe = Recipe.of(tmp_path / "clip.npy", "ideal", overrides=overrides, fps=10.0, slowdown=slowdown)
+    frame_ns = round(10**8 / slowdown)
+    assert warm_up_us(recipe) == 10**6 + beyond_us
+    first, *later = with_warm_up(recipe, 4, {"slowdown": slowdown})
+    assert len(later) == 3 and (first.start, first.since_ns, later[-1].stop) == (None, None, None)
+    for before, stretch in pairwise([first, *later]):
+        shown = [k * frame_ns for k in range(50) if stretch.start is None or k > 10 * stretch.start]
+        assert 1000 * warm_up_us(recipe) <= stretch.since_ns - shown[0] <= 1000 * warm_up_us(recipe) + frame_ns or (
+            stretch.start is None
+        )
+        last = max(k for k in range(50) if k < 10 * before.stop)
+        assert stretch.since_ns == last * frame_ns  # (the last frame of one is the first of the next)
+    assert [round(stretch.since_ns / frame_ns) for stretch in later] == [12, 24, 36]
+
+
+def test_of_few_frames_there_are_few_parts(tmp_path: Path) -> None:
+    np.save(tmp_path / "clip.npy", np.ones((3, 4, 4), np.float32))
+    parts = with_warm_up(Recipe.of(tmp_path / "clip.npy", "ideal", fps=10.0), 5, {})
+    assert [part.since_ns for part in parts] == [None, 10**8]
 
 
 def test_a_chain_is_gone_on_with_from_every_checkpoint(clip: str, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pytest
 from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
 from vid2ev.errors import UsageError
 from vid2ev.plan.expose import Expose
+from vid2ev.plan.exposure_sums import OVERFULL, SUMS, add_change, add_light
 from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of
 from vid2ev.plan.plan import KNOWN, names_of
 from vid2ev.seen.instants import instants
@@ -239,3 +240,27 @@ def test_bounds_add_up(name: str) -> None:
     bounds = [FRAME_EFFECTS[effect].omission(seen, spec).levels for effect in gone]
     assert np.abs(change).max() <= sum(bound.most for bound in bounds) + 1
     assert np.sqrt(np.mean(change**2)) <= sum(bound.rms for bound in bounds) + 1
+
+
+def test_an_exposure_costs_as_many_frames_of_light_as_are_in_it_and_one_at_least() -> None:
+    """Of 1000 frames a second."""
+    light = [Frame(np.full((4, 4), 0.5, np.float32), k * 10**6) for k in range(101)]
+
+    def cost_ns(exposure_us: float) -> float:
+        spec = PLAIN.model_copy(update={"exposure_us": exposure_us})
+        rows = frame_plan_of(exposed(spec, (4, 4), light), spec).rows
+        return next(row.ns_per_pixel for row in rows if row.effect == "exposure")
+
+    assert cost_ns(9000) == pytest.approx(9 * cost_ns(1000), rel=0.05)
+    assert cost_ns(100) == FRAME_EFFECTS["exposure"].ns
+
+
+def test_light_is_measured_before_a_lens_and_behind_it_and_wells_by_the_most_sensitive_pixel() -> None:
+    one, other = np.array([[0.2, 0.9, 0.5]], np.float32), np.array([[0.6, 0.4, 0.5]], np.float32)
+    for gain in (0.5, 1.5):
+        sums = np.zeros((2, 3))
+        add_change(one, other, np.full((1, 3), gain, np.float32), 0.0, 10.0, sums)
+        np.testing.assert_allclose(sums[0], max(gain, 1) * np.abs(one - other)[0])
+    sums = np.zeros((SUMS, 3))
+    add_light(one, np.ones((1, 3), np.float32), 0.0, 10.0, 0.0, 10.0, 1.5, 0.6, 10.0, sums)
+    np.testing.assert_allclose(sums[OVERFULL], [0, 0.75, 0.15], rtol=1e-6, atol=1e-7)

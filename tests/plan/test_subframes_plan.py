@@ -64,8 +64,20 @@ def test_what_is_made_keeps_to_the_upsampler_s_tolerance() -> None:
         row = found.row()
         assert found.made == steps - 1 and row.fate == "kept" and row.omission.kind == "estimate"
         assert found.left_us <= 1e6 * TOLERANCE_S * (1 + 1e-9)
+        assert found.left_us == pytest.approx(found.worst_us / steps**2)
         assert found.speed_px_per_s == pytest.approx(shift_px / (end_ns * 1e-9))
         assert not row.omission.sure and f"{steps - 1} made" in row.omission.figure
+
+
+def test_the_worst_interval_counts() -> None:
+    """Of all cameras: an interval is still where the light of all of them is."""
+    light, found = np.zeros((2, 2), np.float32), Subframes()
+    for k, shift_px in enumerate((None, 0.5, 4.0, 1.0)):
+        frames = Frame(light + k, k * INTERVAL_NS), Frame(light, k * INTERVAL_NS)
+        found.see(Instant(frames, k * INTERVAL_NS, shift_px=shift_px))
+    assert found.worst_us == found.left_us == pytest.approx(1e6 * KAPPA_PER_PX * 4.0 * INTERVAL_NS * 1e-9 / 8)
+    assert found.speed_px_per_s == pytest.approx(4.0 / (INTERVAL_NS * 1e-9))
+    assert (found.intervals, found.still) == (3, 0)
 
 
 def test_a_still_clip_needs_no_subframes_and_no_flow(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,9 +77,12 @@ def test_the_bound_is_the_formula_beside_the_source() -> None:
 
 
 def test_the_range_is_that_of_all_frames_where_depth_is_known() -> None:
-    found = seen_range(np.array([[np.nan, 0, -3, 2.0]]), np.array([[np.inf, 4.0]]), np.array([[np.nan]]))
+    maps = [np.array([[np.nan, 0, -3, 1e-9, 2.0]]), np.array([[np.inf, 4.0]]), np.array([[np.nan]]), np.array([[8.0]])]
+    found = seen_range(*maps)
     found.see(None)
     assert (found.near, found.far) == (0.5, 0.0)
+    found = seen_range(*maps[::2], *maps[3:], maps[0])
+    assert (found.near, found.far) == (0.5, 0.125)
 
 
 def test_of_what_is_infinitely_far_a_homography_is_exact() -> None:
@@ -118,6 +121,10 @@ def test_a_view_takes_no_more_than_it_needs(tmp_path: Path) -> None:
     assert mapped["here"] == plane["here"] and mapped["turned"][:2] == ("replaced", "exact")
     expected = recipe.rig.source.focal_px[0] * 0.04 * (1 / 2 - 1 / 4) / 2
     assert mapped["beside"] == ("kept", "bound", f"{expected:.2g} px")
+    bent = rig(tmp_path)
+    lens = 'distortion_model = "radtan"\ndistortion = [-0.1, 0, 0, 0]\n'
+    bent.write_text(f"[source]\nfov_deg = 60\n{lens}{bent.read_text()}")
+    assert rows_of_views(Recipe.of(CLIP, rig=bent, depth=tmp_path / "depth.npy"))["beside"][1] == "estimate"
 
 
 def test_one_table_for_each_camera(tmp_path: Path) -> None:

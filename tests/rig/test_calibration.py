@@ -211,7 +211,7 @@ def test_rows_of_a_rectified_pair_show_the_same(tmp_path: Path) -> None:
     "changed",
     [
         {"size": (320, 240)},
-        {"translation_mm": (0, 0, 0)},
+        {"translation_mm": (1e-8, 0, 0)},
         {"distortion_model": "equidistant", "distortion": (0.1, 0, 0, 0)},
         {"kind": "cis"},
     ],
@@ -365,7 +365,7 @@ def test_what_opencvs_files_leave_open_is_told_by_their_numbers(tmp_path: Path) 
     )
     assert read(distortion_coefficients=0 * four).distortion_model == "none"
     with pytest.raises(DataError, match="not a camera matrix of fx, 0, cx"):
-        read(camera_matrix=matrix + [[0, 0.5, 0]] * 3)
+        read(camera_matrix=matrix + np.eye(3, k=1) * [0, 0.5, 0])
     for first in ("%YAML:1.0", "# YAML"):  # (lines are counted with the first one)
         (tmp_path / "broken.yml").write_text(f"{first}\nsize: [\n  ]]\n")
         with pytest.raises(DataError, match="line 3"):

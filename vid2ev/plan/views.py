@@ -57,7 +57,7 @@ def view_row(mount: Mount, recipe: Recipe, depth: DepthRange) -> Row:
         return _row("kept", Omission(None, "no bound yet", "a picture of its own", "scenes are rendered"), 0.0)
     moved = pose.translation_m.any()
     if not moved or plane_m is not None:
-        away = _away(_places(source, camera, pose, plane_m if plane_m is not None and moved else math.inf), source)
+        away = _away(_places(source, camera, pose, math.inf if plane_m is None else plane_m), source)
         why = "exact for a scene that is a plane" if moved else "exact for a camera that is turned only"
         return _row("replaced", Omission(0.0, "exact", f"a homography{away}", why), HOMOGRAPHY_NS)
     if depth.far == math.inf:
