@@ -210,7 +210,12 @@ def stopped_at(last: int) -> Any:
 
 @pytest.mark.parametrize(
     ("option", "name", "settings"),
-    [("network", "firenet", {}), ("hdr", "hdr", {}), ("hdr", "hdr", {"second": "frames"})],
+    [
+        ("network", "firenet", {}),
+        ("hdr", "hdr", {}),
+        ("hdr", "hdr", {"colours": 1}),
+        ("hdr", "hdr", {"second": "frames"}),
+    ],
 )
 @pytest.mark.parametrize("at", [5, 11])
 def test_what_remembers_goes_on_with_what_it_knew(
