@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.formats.columns import pixels, whole_us
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
@@ -77,10 +78,9 @@ class Hdf5Events:
             last = len(columns["t"]) if stop_us is None else _position(file, stop_us - self.start_us)
             for at in range(first, last, block):
                 part = slice(at, min(at + block, last))
-                t = columns["t"][part].astype(np.int64) + self.start_us
+                t = whole_us(self.path, columns["t"][part]) + self.start_us
                 label = columns["label"][part] if self.labelled else None
-                x, y, p = (columns[name][part] for name in "xyp")
-                yield Events(t, x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8), label)
+                yield Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
 
     def frames(self) -> Iterator[Picture]:
         """None."""
@@ -166,6 +166,9 @@ def _check(file: h5py.File, path: Path) -> None:
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
         raise DataError(f"{path} has no events/t, x, y, p; expected an event file in the layout of DSEC")
+    if any(column.dtype.kind not in "iufb" for column in columns):
+        types = ", ".join(str(column.dtype) for column in columns)
+        raise DataError(f"{path} has events/t, x, y, p of types {types}; expected numbers")
     others = [file[name] for name in BESIDE if name in file]
     if not all(isinstance(each, h5py.Dataset) for each in others):
         raise DataError(f"{path} is damaged: {', '.join(BESIDE)} are arrays; make it again or get another copy")

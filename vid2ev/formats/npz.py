@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, read_as
+from vid2ev.formats.columns import pixels
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array
 from vid2ev.formats.sequential import Sequential, reading
@@ -92,12 +93,8 @@ class NpzEvents(Sequential):
             t = np.rint(t.astype(np.float64) * scale)
             if not np.all(np.abs(t) < 1 << 62):
                 raise DataError(f"{self.path} has times that are no number of microseconds; get another copy")
-        x, y = column["x"], column["y"]
-        if any(len(values) and not 0 <= values.min() <= values.max() <= 0xFFFF for values in (x, y)):
-            raise DataError(f"{self.path} has columns or rows that are not within 0 ... 65535; get another copy")
         label = column["label"].astype(np.uint8) if self.labelled else None
-        p = (column["p"] > 0).astype(np.uint8)
-        return Events(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), p, label)
+        return Events(t.astype(np.int64), *pixels(self.path, *(column[name] for name in "xyp")), label)
 
     @contextmanager
     def _opened(self) -> Iterator[dict[str, Array]]:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
+from vid2ev.formats.columns import pixels
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.formats.sequential import Sequential
@@ -54,10 +55,9 @@ class V2eEvents(Sequential):
             table = file["events"]
             for at in range(0, len(table), PART):
                 rows = table[at : at + PART]
-                t, (x, y, p) = rows[:, 0].astype(np.int64), (rows[:, k].astype(np.uint16) for k in (1, 2, 3))
-                if rows.dtype.itemsize > 2 and rows[:, 1:3].max(initial=0) >> 16:
-                    raise DataError(f"{self.path} is damaged: it has columns or rows beyond 65535; get another copy")
-                events, left = self._inside(Events(t + self.start_us, x, y, (p != 0).astype(np.uint8)))
+                t, x, y, p = (rows[:, k] for k in range(COLUMNS))
+                events = Events(t.astype(np.int64) + self.start_us, *pixels(self.path, x, y, p))
+                events, left = self._inside(events)
                 outside += left
                 yield events
         self._leave_out(outside, f"{self._outside} are")

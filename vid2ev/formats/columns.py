@@ -1,0 +1,29 @@
+"""Columns of numbers, of whatever type a file has them, as those of events: none becomes another number unseen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vid2ev.errors import DataError
+
+
+def whole_us(path: Path, t: np.ndarray) -> np.ndarray:
+    """Times that are stored in microseconds, as int64.  Raises DataError for fractions and what is no number."""
+    if t.dtype.kind == "f" and not (np.array_equal(t, np.rint(t)) and np.all(np.abs(t) < 1 << 62)):
+        raise DataError(f"{path} has times that are no whole microseconds; write them as such")
+    return t.astype(np.int64)
+
+
+def pixels(path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns and rows uint16, polarities uint8: 1 is ON, of what is above 0.
+
+    Raises DataError for fractions, what is no number, and columns and rows that no sensor has.
+    """
+    if any(values.dtype.kind == "f" and not np.array_equal(values, np.rint(values)) for values in (x, y, p)):
+        raise DataError(f"{path} has columns, rows or polarities that are no whole numbers; round them first")
+    wide = [values for values in (x, y) if len(values) and values.dtype not in (np.uint8, np.uint16)]
+    if any(values.min() < 0 or values.max() > 0xFFFF for values in wide):
+        raise DataError(f"{path} has columns or rows that are not within 0 ... 65535; get another copy")
+    return x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8)
