@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -271,6 +273,21 @@ def test_what_cannot_be_split_is_refused(
     with pytest.raises(UsageError, match=sentence):
         convert_split(clip, tmp_path / "made", kind, 2, here, fps=50, **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_has_no_events_or_passes_once_is_not_split(
+    clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rig.toml").write_text('[[camera]]\nname = "still"\nkind = "cis"\n')
+    film = b"YUV4MPEG2 W4 H4 F50:1 Cmono\n" + 3 * (b"FRAME\n" + bytes(16))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=BytesIO(film), isatty=lambda: False))
+    for video, options, sentence in (
+        (clip, {"rig": tmp_path / "rig.toml"}, "cannot do a rig without event cameras; convert it at once"),
+        ("-", {}, "cannot do -; keep it in a file first"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            convert_split(video, tmp_path / "made", "tiles", 2, here, fps=50, **options)
+    assert [path.name for path in tmp_path.iterdir()] == ["rig.toml"]
 
 
 def test_parts_with_a_warm_up_differ_from_their_seam_to_the_next_cut_and_the_manifest_lists_seams(

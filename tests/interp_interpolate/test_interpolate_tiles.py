@@ -51,6 +51,18 @@ def test_tiles_cover_all_and_their_weights_add_up(size: tuple[int, int], tile: s
     torch.testing.assert_close(total, torch.ones_like(total))
 
 
+@pytest.mark.parametrize("side", [64, 128, 512, 1024])
+def test_the_outer_quarters_of_an_overlap_do_not_count_and_between_them_weights_are_even(side: int) -> None:
+    """A quarter of a tile overlaps the next one, or 128 pixels."""
+    one, other, *_ = parse_tiling(f"{side}x{side}", (3 * side, side), 2)
+    overlap = one.right - other.left
+    assert overlap == min(side // 4, 128)
+    rising = parse_tiling(f"{side}x{side}", (3 * side, side), 2).weights(other)[0, :overlap]
+    quarter = overlap // 4
+    assert not rising[:quarter].any() and rising[quarter:-quarter].all() and bool((rising[-quarter:] == 1).all())
+    torch.testing.assert_close(rising + rising.flip(0), torch.ones(overlap))
+
+
 def test_small_frames_are_not_divided_and_large_ones_into_tiles_that_fit() -> None:
     assert len(parse_tiling("auto", (1280, 800), 32)) == 1
     for size in ((1920, 1080), (3840, 2160), (1025, 4000)):
