@@ -361,6 +361,8 @@ def test_of_a_source_of_unknown_length_size_alone_decides():
     large, small = Work(3840 * 2160, None, 17.0), Work(64 * 48, None, 17.0)
     assert device_for("auto", large, 2).name == "cuda" and device_for("auto", small, 2).name == "cpu"
     assert f"its length is unknown, and taken for {UNKNOWN_FRAMES} frames" in device_for("auto", small, 2).why
+    assert " s of 2 threads, and " in device_for("auto", small, 2).why
+    assert " s of 1 thread, and " in device_for("auto", small, 1).why
 
 
 def test_little_is_known_to_be_little_without_looking_for_a_card(monkeypatch):

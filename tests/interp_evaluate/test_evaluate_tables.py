@@ -99,6 +99,12 @@ def test_bins_hold_every_value_once(spread: tuple[float, float]) -> None:
     assert all(float(digit) == round(float(digit), 1) for digit in digits), "edges are round numbers"
 
 
+def test_wide_conditions_have_round_edges_over_two_decades_and_one_bin_below() -> None:
+    assert edges_of(np.geomspace(0.001, 80, 60)) == [0, 1, 2, 5, 10, 20, 50, 100]
+    assert edges_of(np.linspace(0, 50, 60)) == [0, 1, 2, 5, 10, 20, 50]
+
+
 def test_a_condition_that_does_not_vary_has_no_bins() -> None:
+    assert edges_of(np.array([90.5, 100.0])) == edges_of(np.array([-100.0, -90.5])) == []
     assert edges_of(np.array([2.0, 2.0, NAN])) == []
     assert edges_of(np.array([0.408, 0.412, 0.418])) == [] and edges_of(np.array([0.4, 0.45])) == [0.4, 0.45, 0.45]

@@ -215,7 +215,17 @@ def test_fewer_pictures_than_a_checkpoint_knows_of_are_refused(tmp_path: Path) -
     for exposure in exposures(3):
         at_work.add(exposure)
     (tmp_path / "raw" / "000001.png").unlink()
-    with pytest.raises(DataError, match="holds 2 pictures, expected 3"):
+    with pytest.raises(DataError, match="holds 2 pictures with times, expected 3"):
+        files(tmp_path).keep(3)
+
+
+def test_fewer_times_than_a_checkpoint_knows_of_are_refused(tmp_path: Path) -> None:
+    at_work = files(tmp_path)
+    for exposure in exposures(3):
+        at_work.add(exposure)
+    times = tmp_path / "raw" / "timestamps.txt"
+    times.write_text("".join(times.read_text().splitlines(keepends=True)[:2]))
+    with pytest.raises(DataError, match="holds 1 pictures with times, expected 3"):
         files(tmp_path).keep(3)
 
 

@@ -51,6 +51,30 @@ def test_the_hierarchy_finds_the_nearest_triangle(count):
         np.testing.assert_allclose(picture.depth, tried_all(mesh, pose, CAMERA), rtol=1e-5)
 
 
+def test_of_several_meshes_the_nearest_triangle_of_all_is_seen():
+    rng = np.random.default_rng(1)
+    spots = [(rng.uniform(-2, 2, (200, 1, 3)) + rng.uniform(-0.3, 0.3, (200, 3, 3))).reshape(-1, 3) for _ in range(3)]
+    things = [
+        Thing(
+            f"{k}", Shape("mesh", mesh=Mesh(places, np.arange(600).reshape(-1, 3))), pose=Pose.of((0, 0, 0), (0, 0, 5))
+        )
+        for k, places in enumerate(spots)
+    ]
+    alone = np.stack([seen(thing).depth for thing in things])
+    together = seen(*things)
+    np.testing.assert_array_equal(together.depth, alone.min(axis=0))
+    there = np.isfinite(together.depth)
+    np.testing.assert_array_equal(together.thing[there], alone.argmin(axis=0)[there])
+
+
+def test_triangles_are_smooth_together_where_their_corners_have_a_normal_in_common():
+    places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])[[0, 1, 2, 0, 2, 3]]
+    for tilt, parts in ((0, 1), (1, 2)):
+        normals = np.array([[0, 0, -1]] * 3 + [[tilt, 0, -1]] * 3)
+        mesh = Mesh(places, np.arange(6).reshape(2, 3), normals=normals)
+        assert len(set(mesh.numbers.part.tolist())) == parts
+
+
 def test_a_mesh_of_a_sphere_is_nearly_a_sphere(tmp_path):
     trimesh.creation.icosphere(5).export(tmp_path / "ball.ply")
     ball, pose = load_mesh(tmp_path / "ball.ply"), Pose.of((10, 20, 30), (0.3, -0.2, 5))

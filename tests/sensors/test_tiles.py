@@ -28,6 +28,11 @@ def test_no_tile_is_empty_where_there_is_hardly_a_block_for_each(count, more, sl
         assert cuts[0] == 0 and cuts[-1] == count + more and all(a < b for a, b in pairwise(cuts))
 
 
+def test_cuts_go_half_way_at_a_time():
+    """To where both tiles would take as long it is 50 / 3 blocks."""
+    assert balanced([0, 50, 100], [3.0, 1.0]) == [0, round(50 - 50 / 6), 100]
+
+
 def test_cuts_settle_where_tiles_take_as_long():
     cost = np.linspace(1, 7, 1000)  # of a block
     cuts = [0, 250, 500, 750, 1000]

@@ -73,8 +73,10 @@ class ExposureFiles:
             times = folder / TIMESTAMPS
             lines = times.read_text(encoding="utf-8").splitlines(keepends=True)[1:] if times.exists() else []
             there = [path for path in folder.glob("*.png") if path.stem.isdecimal() and int(path.stem) < count]
-            if min(len(lines), len(there)) < count:
-                raise DataError(f"{folder} holds {len(there)} pictures, expected {count}; start again with --overwrite")
+            if (held := min(len(lines), len(there))) < count:
+                raise DataError(
+                    f"{folder} holds {held} pictures with times, expected {count}; start again with --overwrite"
+                )
             with whole_file(times) as file:
                 file.write("".join([HEADER, *lines[:count]]).encode())
             for path in {*folder.iterdir()} - {*there, times}:
