@@ -20,7 +20,7 @@ class Auto(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
         if value == self.word or isinstance(value, int):
             return value
-        if not re.fullmatch(r"-?[0-9]{1,18}", value):
+        if not re.fullmatch(r"-?[0-9]{1,1000}", value):
             self.fail(f"'{value}' is neither '{self.word}' nor a whole number", param, ctx)
         number = int(value)
         if number < self.least:
