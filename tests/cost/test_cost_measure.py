@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -95,6 +96,9 @@ def test_the_table_the_json_and_the_picture_say_the_same(cost: Cost, tmp_path: P
     assert [line[1] for line in lines if line[0] == ">"] == [told["recommended"]]
     assert recommendation(cost) == table(cost).splitlines()[-1]
     assert told["recommended"] in recommendation(cost)
+    assert told["warnings"] == [] and "warning" not in table(cost)
+    warned = replace(cost, warnings=("truncated",))
+    assert warned.describe()["warnings"] == ["truncated"] and "\nwarning: truncated\n" in table(warned)
     plot(cost, tmp_path / "cost.png")
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
 

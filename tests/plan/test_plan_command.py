@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from vid2ev import convert
 from vid2ev.commands.plan import plan
@@ -26,6 +27,14 @@ def test_the_table_and_the_json_say_the_same() -> None:
     lines = table.output.splitlines()
     assert [line.split()[:2] for line in lines[1 : len(rows) + 1]] == [[row["effect"], row["fate"]] for row in rows]
     assert lines[0].split() == ["effect", "fate", "distance", "kind", "figure", "cost", "why"]
+
+
+def test_what_the_source_warns_of_is_said_beside_the_plan(tmp_path: Path) -> None:
+    for number in (1, 2, 4):
+        Image.new("L", (16, 12), 60 * number).save(tmp_path / f"{number:03}.png")
+    found = CliRunner().invoke(plan, [str(tmp_path), "--fps", "100", "--json"])
+    assert found.exit_code == 0 and json.loads(found.stdout)[""]["rows"]
+    assert found.stderr.startswith("warning: ") and len(found.stderr.splitlines()) == 1, found.stderr
 
 
 def test_a_recording_is_planned_and_says_so(tmp_path: Path) -> None:

@@ -41,7 +41,10 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
     from vid2ev.plan.recordings import described, plans_of
     from vid2ev.seen.recipe import Recipe
 
-    plans = plans_of(Recipe.of(source, **options), effects, tolerance, usable_cores())
+    recipe = Recipe.of(source, **options)
+    plans = plans_of(recipe, effects, tolerance, usable_cores())
+    for warning in recipe.source.warnings:
+        click.echo(f"warning: {warning}", err=True)
     if as_json:
         click.echo(json.dumps(described(plans)["plan"], indent=2))
         return

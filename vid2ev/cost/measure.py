@@ -38,6 +38,7 @@ class Cost:
     size, span_s   of the source [px]; from the first light to the last on the recording's clock [s]
     steps          into how many the fastest interval was divided by default
     between        how well each way to make light between the frames makes a frame that is left out
+    warnings       of the source
     """
 
     clip: str
@@ -50,6 +51,7 @@ class Cost:
     rows: tuple[Row, ...]
     between: Mapping[str, Quality | None]
     budget: Budget
+    warnings: tuple[str, ...] = ()
 
     @property
     def settings(self) -> list[Row]:
@@ -84,6 +86,7 @@ class Cost:
             "interpolation": {name: found and found._asdict() for name, found in self.between.items()},
             "budget": self.budget.text,
             "recommended": None if best is None else best.rung.name,
+            "warnings": list(self.warnings),
         }
 
 
@@ -144,6 +147,7 @@ def measured(
         tuple(rows[1:]),
         _between(recipe, ladder),
         limits or Budget.parse(DEFAULT if any(mount.kind == "dvs" for mount in recipe.mounts) else DEFAULT_OF_FRAMES),
+        tuple(recipe.source.warnings),
     )
 
 

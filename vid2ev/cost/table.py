@@ -15,6 +15,7 @@ def table(cost: Cost, *, recommending: bool = True) -> str:
     for way, found in cost.between.items():
         if found is not None:
             lines.append(f"a frame left out, made by --upsample {way}: {_shown(found)}")
+    lines += [f"warning: {warning}" for warning in cost.warnings]
     return "\n".join([*lines, *[recommendation(cost)] * recommending]).rstrip()
 
 
