@@ -17,7 +17,7 @@ from interp.evaluate.published import of_gap
 from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_report
 from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
-from interp.evaluate.report.coverage import uneven
+from interp.evaluate.report.coverage import fullest, uneven
 from interp.evaluate.report.markdown import escaped, markdown
 from interp.evaluate.report.mean_plots import condition_plot
 from interp.evaluate.report.overview import (
@@ -225,10 +225,19 @@ def test_a_method_with_few_frames_is_not_the_best() -> None:
     assert any(cell.best for cell in position_table(rows, "psnr", "").lines[0].cells[2:]), "the only frame that it has"
     said = markdown(document(rows, {}))
     assert "all, 7 of 7 frames, has 32.00 ± 2.00 dB and SSIM 0.900 ± 0.000, worse, 7 of 7 frames, 20.00" in said
-    assert "dB; over fewer frames, and not to be compared: easy, 1 of 7 frames, 40.00 dB." in said
+    assert "dB; over other frames, and not to be compared: easy, 1 of 7 frames, 40.00 dB." in said
     warning = "Not all methods have scores of all frames: easy has 1 of 7 frames; 1 frame has those of all; only"
     assert said.index(warning) < said.index("Time Lens protocol")
     assert uneven(rows).startswith(warning) and not uneven(rows[:14])
+
+
+def test_as_many_frames_but_others_are_not_compared() -> None:
+    rows = [row(method=name, position=p, psnr=25.0, ssim=0.9) for name in ("a", "b") for p in (1, 2)]
+    rows += [row(method="others", position=p, psnr=40.0, ssim=0.9) for p in (2, 3)]
+    assert fullest(rows) == ["a", "b"] and best_method(rows) in ("a", "b")
+    assert "over other frames, and not to be compared: others, 2 of 3 frames, 40.00" in markdown(document(rows, {}))
+    assert uneven(rows).startswith("Not all methods have scores of all frames: others has 2 of 3 frames; 1 frame has")
+    assert fullest([]) == []
 
 
 def test_gaps_of_two_lengths_have_chapters_of_their_own(tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def document(rows: Sequence[Row], about: About, worst: Sequence[WorstFrame] = ()
 
 
 def _answer(rows: Sequence[Row]) -> str:
-    """The best method and the second, in one sentence; and those that have fewer frames, which are neither."""
+    """The best method and the second, in one sentence; and those that have other frames, which are neither."""
     parts, full, share = by_method(rows), fullest(rows), shares(rows)
     means = {method: pooled(part, "psnr") for method, part in parts.items()}
     scored = sorted((name for name in means if means[name].count), key=lambda name: -means[name].mean)
@@ -68,12 +68,12 @@ def _answer(rows: Sequence[Row]) -> str:
     named = {name: f"{name}, {share[name]}," if share else name for name in scored}
     psnr = {name: f"{spread(means[name], PSNR_DIGITS)} dB" for name in scored}
     ranked = [name for name in scored if name in full] or scored
-    best, *others = ranked
+    best, *next_best = ranked
     ssim = pooled(parts[best], "ssim")
     said += f": {named[best]} has {psnr[best]} and SSIM {spread(ssim, SSIM_DIGITS)}"
-    said += f", {named[others[0]]} {psnr[others[0]]}" if others else ""
-    fewer = several(f"{named[name]} {psnr[name]}" for name in scored if name not in ranked)
-    return f"{said}; over fewer frames, and not to be compared: {fewer}." if fewer else f"{said}."
+    said += f", {named[next_best[0]]} {psnr[next_best[0]]}" if next_best else ""
+    others = several(f"{named[name]} {psnr[name]}" for name in scored if name not in ranked)
+    return f"{said}; over other frames, and not to be compared: {others}." if others else f"{said}."
 
 
 def _from_truth(rows: Sequence[Row], simulated: Sequence[str]) -> Iterator[Block]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from interp.evaluate.remarks import several
@@ -20,9 +21,11 @@ def frames_of(rows: Sequence[Row]) -> dict[str, set[Frame]]:
 
 
 def fullest(rows: Sequence[Row]) -> list[str]:
-    """The methods that have the most frames: those that can be the best."""
-    counts = {method: len(frames) for method, frames in frames_of(rows).items()}
-    return [method for method, count in counts.items() if count == max(counts.values())]
+    """The methods that have the most frames, and the same ones: those that can be the best."""
+    frames = frames_of(rows)
+    alike = Counter(frozenset(own) for own in frames.values())
+    most = max(alike, key=lambda own: (len(own), alike[own]), default=frozenset())
+    return [method for method, own in frames.items() if own == most]
 
 
 def shares(rows: Sequence[Row]) -> dict[str, str]:
@@ -40,11 +43,11 @@ def uneven(rows: Sequence[Row]) -> str:
     if not told:
         return ""
     full = fullest(rows)
-    fewer = several(f"{method} has {share}" for method, share in told.items() if method not in full)
+    others = several(f"{method} has {share}" for method, share in told.items() if method not in full)
     common = len(set.intersection(*frames_of(rows).values()))
-    said = f"Not all methods have scores of all frames{f': {fewer}' if fewer else ''}"
-    best = "; only methods with the most frames can be the best" if fewer else ""
-    return f"{said}; {many(common, 'frame')} {'has' if common == 1 else 'have'} those of all{best}."
+    have = f"{many(common, 'frame')} {'has' if common == 1 else 'have'} those of all"
+    best = "only methods with the most frames, and the same ones, can be the best"
+    return f"Not all methods have scores of all frames: {others}; {have}; {best}."
 
 
 def many(count: int, name: str) -> str:

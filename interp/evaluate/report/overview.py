@@ -28,7 +28,7 @@ def by_method(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def best_method(rows: Sequence[Row]) -> str | None:
-    """The method of the highest mean PSNR, of those that have the most frames; None if none has a score."""
+    """The method of the highest mean PSNR, of those with the most frames, and the same; None if none has a score."""
     full = fullest(rows)
     means = {method: pooled(part, "psnr") for method, part in by_method(rows).items() if method in full}
     return max((name for name in means if means[name].count), key=lambda name: means[name].mean, default=None)
