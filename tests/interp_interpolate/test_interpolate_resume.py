@@ -21,6 +21,7 @@ from interp.networks import make
 from interp.weights import save
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.exposures import write_codes
+from vid2ev.recording.held import Held
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")]
 
@@ -179,6 +180,7 @@ def test_killed_while_it_is_put_in_place_it_is_there_or_goes_on(
                 patched.setattr(Path, "rename", kill)
             else:
                 patched.setattr(shelf.shutil, "rmtree", lambda *_, **__: None)
+                patched.setattr(Held, "close", lambda held: os.close(held._handle))  # (what the system does)
             if moment == "before":
                 patched.setattr(shelf, "join_films", kill)
                 with pytest.raises(Killed):

@@ -59,7 +59,11 @@ class Held:
         self._handle = None
 
     def __enter__(self) -> Self:
-        self.take()
+        try:
+            self.take()
+        except BaseException:  # (who was asked to end meanwhile holds it)
+            self.close()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
