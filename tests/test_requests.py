@@ -8,11 +8,16 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
+from interp.commands.interpolate import interpolate
 from interp.commands.making import contrast_of
+from interp.commands.reconstruct import reconstruct
+from interp.interpolate.take import Options
 from vid2ev import UsageError
 from vid2ev.commands.auto import Auto
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.convert import convert
+from vid2ev.commands.options import FiniteRange
 from vid2ev.cost.front import Budget
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.requests import number_of, setting
@@ -41,7 +46,7 @@ ASKED: dict[str, Callable[[str], object]] = {
     "synthetic": lambda text: parse_synthetic(f"sine,frequency_hz={text}"),
     "size": lambda text: parse_synthetic(f"sine,size={text}x{text}"),
     "contrast": contrast_of,
-    "option": lambda text: Finite(0).convert(text, None, None),
+    "option": lambda text: FiniteRange(0).convert(text, None, None),
     "whole": lambda text: Auto("auto", 1, "N").convert(text, None, None),
 }
 
@@ -62,3 +67,27 @@ def test_a_row_of_a_path_has_numbers(tmp_path: Path) -> None:
 
 def test_settings_are_toml_or_numbers_or_texts() -> None:
     assert setting("a=.5", "a=1")[1] == 0.5 and setting("a=1_0.", "a=1")[1] == "1_0."
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "1_0"])
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        (convert, ("--start", "--stop", "--slowdown", "--fps")),
+        (interpolate, ("--start", "--stop", "--refractory")),
+        (reconstruct, ("--start", "--stop", "--refractory", "--cutoff")),
+    ],
+)
+def test_seconds_and_microseconds_of_commands_are_finite_numbers(
+    command: click.Command, options: tuple[str, ...], text: str
+) -> None:
+    for option in options:
+        said = CliRunner().invoke(command, ["anything", option, text])
+        assert said.exit_code == 2 and f"'{text}': expected a finite number" in said.output
+
+
+@pytest.mark.parametrize("seconds", [math.nan, math.inf])
+def test_parts_of_what_is_interpolated_begin_and_end_at_finite_seconds(seconds: float) -> None:
+    for part in ({"start_s": seconds}, {"stop_s": seconds}):
+        with pytest.raises(UsageError, match="expected seconds"):
+            Options(**part)

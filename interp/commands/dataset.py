@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.worker_options import worker_options
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
     help="Of real videos, or a folder of them, in place of rendered scenes; may be repeated.",
 )  # fmt: skip
 @click.option(
-    "--slowdown", type=Finite(0, min_open=True), default=1.0, show_default=True, metavar="F",
+    "--slowdown", type=FiniteRange(0, min_open=True), default=1.0, show_default=True, metavar="F",
     help="The videos play F times slower than the world went.",
 )  # fmt: skip
 @click.option(

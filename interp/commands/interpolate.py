@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from interp import pretrained
-from interp.commands.making import bar, contrast_of, kept
+from interp.commands.making import bar, contrast_of, device_option, event_options, kept, run_options, what_options
+from vid2ev.commands.options import Finite
 from vid2ev.commands.worker_options import worker_options
 
 if TYPE_CHECKING:
@@ -39,38 +40,26 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     help="Give all frames, key frames too, the range that events show, by the weights for it that come with vid2ev.",
 )  # fmt: skip
 @click.option("--hdr-network", metavar="WEIGHTS", help="The same, by weights of `vid2ev train --network hdr`.")
-@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR",
-    help="What to make; of several sources the folder for all.  [default: NAME_x8.mp4 here]",
-)  # fmt: skip
-@click.option(
-    "--format", type=click.Choice(["mp4", "png", "exr"]),
-    help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
-)  # fmt: skip
-@click.option("--play", metavar="RATE", help="Frames per second of the film: 30 is slow motion.  [default: real time]")
+@what_options(
+    output="What to make; of several sources the folder for all.  [default: NAME_x8.mp4 here]",
+    play="Frames per second of the film: 30 is slow motion.  [default: real time]",
+)
 @click.option(
     "--events", type=click.Path(exists=True, path_type=Path), metavar="EVENTS",
     help="Event file to a video, images or a single frame, on their clock.",
 )  # fmt: skip
 @click.option(
     "--start",
-    type=float,
+    type=Finite(),
     metavar="S",
     help="Begin at the first frame from this second on; of recordings after the first frame.",
 )
-@click.option("--stop", type=float, metavar="S", help="End at the last frame up to there.")
+@click.option("--stop", type=Finite(), metavar="S", help="End at the last frame up to there.")
 @click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture.")
 @click.option("--size", metavar="W|WxH|WxH!", help="Pixels to bring a video to.")
 @click.option("--transfer", default="auto", show_default=True, metavar="CURVE", help="Of a video's codes.")
 @click.option("--source-fps", metavar="RATE", help="Of images without times.")
-@click.option(
-    "--contrast", metavar="C|OFF,ON",
-    help="What an event stands for [nat].  [default: as the recording says, or else what fits the frames]",
-)  # fmt: skip
-@click.option(
-    "--refractory", "refractory_us", type=float, metavar="US",
-    help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the recording"
-    " says, or else nothing is]",
-)  # fmt: skip
+@event_options(contrast="else what fits the frames")
 @click.option(
     "--tile", default="auto", show_default=True, metavar="WxH|auto|none",
     help="Pixels made at a time; auto: all of frames of up to a million, tiles of about as many of larger ones.",
@@ -79,9 +68,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     "--cuts", type=click.Choice(["hold", "keep"]), default="hold", show_default=True,
     help="At a cut hold the nearest frame, or interpolate as anywhere.",
 )  # fmt: skip
-@click.option("--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
-    help="Where; auto: on a GPU, if there is one.",
-)  # fmt: skip
+@device_option
 @click.option(
     "--precision", type=click.Choice(["float32", "bfloat16", "float16"]), default="float32", show_default=True,
     help="Of a network's convolutions: fewer bits are faster where hardware has them; `vid2ev cost SOURCE --rebuild 8`"
@@ -89,10 +76,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 )  # fmt: skip
 @click.option("--compile", "compiled", is_flag=True, help="Have torch compile a network first, for long footage.")
 @worker_options("Sources")
-@click.option("--overwrite", is_flag=True, help="Replace what is there.")
-@click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
-@click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs.")
-@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@run_options
 def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
     """Make the frames of each SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or
     BS-ERGB, an event file with frames, a video, or a folder of images; also a single frame with its events (--events,

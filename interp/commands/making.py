@@ -6,12 +6,55 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import click
 
 from vid2ev.commands import INTERRUPTED, tidy
+from vid2ev.commands.options import Finite, adding
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import number_of
+
+
+def what_options(output: str, play: str) -> Callable[..., Any]:
+    """A decorator that adds to a command what is to be made; `output` and `play` are help texts."""
+    return adding(
+        click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help=output),
+        click.option(
+            "--format", type=click.Choice(["mp4", "png", "exr"]),
+            help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
+        ),
+        click.option("--play", metavar="RATE", help=play),
+    )  # fmt: skip
+
+
+def event_options(contrast: str) -> Callable[..., Any]:
+    """A decorator that adds to a command what events are of; `contrast` is said of those without a recording's word."""
+    return adding(
+        click.option(
+            "--contrast", metavar="C|OFF,ON",
+            help=f"What an event stands for [nat].  [default: as the recording says, or {contrast}]",
+        ),
+        click.option(
+            "--refractory", "refractory_us", type=Finite(), metavar="US",
+            help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the"
+            " recording says, or else nothing is]",
+        ),
+    )  # fmt: skip
+
+
+device_option = click.option(
+    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
+    help="Where; auto: on a GPU, if there is one.",
+)  # fmt: skip
+
+
+run_options = adding(  # what becomes of what is there, and what is printed
+    click.option("--overwrite", is_flag=True, help="Replace what is there."),
+    click.option("--resume", is_flag=True, help="Go on where an interrupted run was."),
+    click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs."),
+    click.option("-q", "--quiet", is_flag=True, help="Print errors only."),
+)
 
 
 def contrast_of(text: str | None) -> tuple[float, float] | None:

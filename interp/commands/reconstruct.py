@@ -11,7 +11,8 @@ from typing import Any
 
 import click
 
-from interp.commands.making import bar, contrast_of, kept
+from interp.commands.making import bar, contrast_of, device_option, event_options, kept, run_options, what_options
+from vid2ev.commands.options import Finite
 
 M_TRIM_THRESHOLD, M_MMAP_MAX, LARGEST_INT = -1, -4, 2**31 - 1  # of glibc's malloc.h
 EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elapsed} gone, {remaining} left"
@@ -19,13 +20,12 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
 
 @click.command(short_help="Make pictures from the events of any event file alone.")
 @click.argument("events")
-@click.option("-o", "--output", type=Path, metavar="FILE.mp4|DIR", help="What to make.  [default: NAME_seen.mp4 here]")
 @click.option(
     "--network", metavar="WEIGHTS",
     help="Of `vid2ev train --network e2vid` or firenet.  [default: the FireNet that comes with vid2ev]",
 )  # fmt: skip
 @click.option(
-    "--cutoff", "cutoff_hz", type=float, metavar="HZ",
+    "--cutoff", "cutoff_hz", type=Finite(), metavar="HZ",
     help="A high-pass filter in place of a network: what changes more slowly fades to grey.  [default: 1]",
 )  # fmt: skip
 @click.option("--fps", metavar="RATE", help="Pictures per second of the scene's time.  [default: 30]")
@@ -33,29 +33,15 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
     "--events-per-frame", type=int, metavar="N",
     help="A picture after each N events, instead; one of each microsecond at most.",
 )  # fmt: skip
-@click.option(
-    "--format", type=click.Choice(["mp4", "png", "exr"]),
-    help="A film, or a folder of PNG or of EXR (linear light).  [default: as the output's name says]",
-)  # fmt: skip
-@click.option("--play", metavar="RATE", help="Pictures per second of the film.  [default: real time; 30 with N events]")
-@click.option("--start", "start_s", type=float, metavar="S", help="Begin S seconds after the beginning.")
-@click.option("--stop", "stop_s", type=float, metavar="S", help="End S seconds after the beginning.")
-@click.option(
-    "--contrast", metavar="C|OFF,ON", help="What an event stands for [nat].  [default: as the recording says, or 0.15]"
+@what_options(
+    output="What to make.  [default: NAME_seen.mp4 here]",
+    play="Pictures per second of the film.  [default: real time; 30 with N events]",
 )
-@click.option(
-    "--refractory", "refractory_us", type=float, metavar="US",
-    help="For how long a pixel is blind after an event: what it misses then is made good.  [default: as the recording"
-    " says, or else nothing is]",
-)  # fmt: skip
-@click.option(
-    "--device", type=click.Choice(["cpu", "cuda", "auto"]), default="auto", show_default=True,
-    help="Where; auto: on a GPU, if there is one.",
-)  # fmt: skip
-@click.option("--overwrite", is_flag=True, help="Replace what is there.")
-@click.option("--resume", is_flag=True, help="Go on where an interrupted run was.")
-@click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs.")
-@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@click.option("--start", "start_s", type=Finite(), metavar="S", help="Begin S seconds after the beginning.")
+@click.option("--stop", "stop_s", type=Finite(), metavar="S", help="End S seconds after the beginning.")
+@event_options(contrast="0.15")
+@device_option
+@run_options
 def reconstruct(
     events: str, output: Path | None, contrast: str | None, as_json: bool, quiet: bool, **options: Any
 ) -> None:

@@ -309,8 +309,6 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
         (["a.npz", "--start", "5"], 2, "no events from 5 s on"),
         (["a.npz", "--stop", "-1"], 2, "no events from 0 s to -1 s"),
         (["empty.csv"], 1, "empty.csv holds no events"),
-        (["a.npz", "--start", "nan"], 2, "expected seconds"),
-        (["a.npz", "--stop", "inf"], 2, "expected seconds"),
         (["a.npz", "--start", "0.5", "--stop", "0.2"], 2, "not after"),
     ],
 )
@@ -354,6 +352,8 @@ def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> Non
         ("cutoff_hz", "1", "from 0 to 10000"),
         ("network", 3, "weights 3: no such file"),
         ("start_s", "1", "expected seconds"),
+        ("start_s", math.nan, "expected seconds"),
+        ("stop_s", math.inf, "expected seconds"),
         ("refractory_us", 0.5, "refractory period 0.5 us: expected 1 to 1e"),
         ("refractory_us", math.nan, "refractory period nan us"),
     ],

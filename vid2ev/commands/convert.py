@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from vid2ev.commands.auto import Auto
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.source_options import source_options
 from vid2ev.commands.worker_options import worker_options
 
@@ -108,7 +108,7 @@ from vid2ev.commands.worker_options import worker_options
     " That says what matters; it rarely saves time, and may take twice as long.",
 )  # fmt: skip
 @click.option(
-    "--tolerance", type=Finite(0, 1), default=0.01, show_default=True, metavar="D",
+    "--tolerance", type=FiniteRange(0, 1), default=0.01, show_default=True, metavar="D",
     help="How far from those of all effects events and frames may be with auto, as a distance.",
 )  # fmt: skip
 @click.option(
@@ -147,7 +147,7 @@ from vid2ev.commands.worker_options import worker_options
 @click.option(
     "--truth-rate",
     "truth_rate_hz",
-    type=Finite(0, min_open=True),
+    type=FiniteRange(0, min_open=True),
     default=30,
     show_default=True,
     metavar="HZ",

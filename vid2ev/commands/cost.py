@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vid2ev.commands.auto import Auto
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.source_options import camera_options, source_options
 from vid2ev.errors import UsageError
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     help="What a setting may cost: vR=0.05 (distance), count=0.01, us=50 (median timing error), lsb=1 (frames),"
     " time=10x (multiples of the clip's length).  [default: vR=0.05, of frame cameras alone lsb=1]",
 )  # fmt: skip
-@click.option("--duration", "duration_s", type=Finite(0, min_open=True), metavar="S", help="How much of the"
+@click.option("--duration", "duration_s", type=FiniteRange(0, min_open=True), metavar="S", help="How much of the"
     " middle of the clip to take.  [default: 30 frames of 640x480, less of larger ones]")  # fmt: skip
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="How often to time each setting.")
 @camera_options
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     "--bayer", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"], case_sensitive=False), help="As for convert."
 )
 @click.option("--effects", default="all", metavar="all|auto|none|NAME[,NAME...]", help="This in all settings.")
-@click.option("--tolerance", type=Finite(0, 1), default=0.01, metavar="D", help="Of --effects auto.")
+@click.option("--tolerance", type=FiniteRange(0, 1), default=0.01, metavar="D", help="Of --effects auto.")
 @click.option(
     "--rebuild", "multiple", type=click.IntRange(2), metavar="N",
     help="Of rebuilding N times the frames by `interpolate`, in place of converting: methods and networks.",

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.source_options import camera_options, source_options
 
 
@@ -25,7 +25,7 @@ from vid2ev.commands.source_options import camera_options, source_options
     "--effects", default="auto", show_default=True, metavar="auto|all|none|NAME[,NAME...]", help="Effects to keep."
 )
 @click.option(
-    "--tolerance", type=Finite(0, 1), default=0.01, show_default=True, metavar="D",
+    "--tolerance", type=FiniteRange(0, 1), default=0.01, show_default=True, metavar="D",
     help="How far events and frames may be from those of all effects, as a distance.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.finite import SECONDS
+from vid2ev.commands.options import SECONDS
 
 
 @click.command(short_help="Turn an event file into one of another format.")

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.finite import SECONDS, Finite
+from vid2ev.commands.options import SECONDS, FiniteRange
 
 
 @click.command(short_help="Make a film or a picture of any event file.")
@@ -32,7 +32,7 @@ from vid2ev.commands.finite import SECONDS, Finite
 )
 @click.option(
     "--fps",
-    type=Finite(0.01, 1000),
+    type=FiniteRange(0.01, 1000),
     default=30,
     show_default=True,
     metavar="RATE",
@@ -40,7 +40,7 @@ from vid2ev.commands.finite import SECONDS, Finite
 )
 @click.option(
     "--speed",
-    type=Finite(1e-6, 1e6),
+    type=FiniteRange(1e-6, 1e6),
     metavar="FACTOR",
     help="Of the film against reality; 0.1 is slow motion.  [default: 1]",
 )

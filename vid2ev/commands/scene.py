@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import FiniteRange
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,10 +33,10 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the scene: duration_s=1, objects.box.count=5."
 )
 @click.option("--size", metavar="WxH", help="Pixels of the reference camera.")
-@click.option("--duration", type=Finite(0, 1e5, min_open=True), metavar="S", help="Seconds of the scene.")
+@click.option("--duration", type=FiniteRange(0, 1e5, min_open=True), metavar="S", help="Seconds of the scene.")
 @click.option(
     "--fps",
-    type=Finite(0, 1e6, min_open=True),
+    type=FiniteRange(0, 1e6, min_open=True),
     metavar="RATE",
     help="Frames per second.  [default: as many as motion and light ask for]",
 )

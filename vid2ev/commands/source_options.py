@@ -1,15 +1,12 @@
-"""The options that say how a source is read, the same for every command that reads one."""
+"""The options that say how a source is read, and what cameras look at it, the same for every command that has them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
-
 import click
 
-from vid2ev.commands.finite import Finite
+from vid2ev.commands.options import Finite, FiniteRange, adding
 
-SOURCE_OPTIONS = (
+source_options = adding(  # those of `open_source`
     click.option(
         "--transfer",
         default="auto",
@@ -20,15 +17,15 @@ SOURCE_OPTIONS = (
     ),
     click.option(
         "--fps",
-        type=Finite(0, min_open=True),
+        type=FiniteRange(0, min_open=True),
         metavar="RATE",
         help="Frames per second, instead of the source's own times.",
     ),
-    click.option("--start", type=float, metavar="S", help="Begin at this second of the source's own clock."),
-    click.option("--stop", type=float, metavar="S", help="End there."),
+    click.option("--start", type=Finite(), metavar="S", help="Begin at this second of the source's own clock."),
+    click.option("--stop", type=Finite(), metavar="S", help="End there."),
     click.option(
         "--slowdown",
-        type=Finite(0, min_open=True),
+        type=FiniteRange(0, min_open=True),
         metavar="F",
         help="The footage plays F times slower than the world went: 8 for 240 fps that play at 30.",
     ),
@@ -46,7 +43,7 @@ SOURCE_OPTIONS = (
 )
 
 
-CAMERA_OPTIONS = (
+camera_options = adding(  # of `convert`, for commands that write no recording
     click.option("--sensor", default="paper", show_default=True, metavar="PRESET|FILE", help="As for convert."),
     click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a value of the sensor."),
     click.option("--rig", metavar="FILE", type=click.Path(dir_okay=False), help="Cameras around the source's."),
@@ -54,19 +51,3 @@ CAMERA_OPTIONS = (
     click.option("--frames", "frame_camera", is_flag=True, help="A frame camera, too, in the same place."),
     click.option("--cis", metavar="PRESET|FILE", help="Sensor of frame cameras; without a rig, as --frames."),
 )
-
-
-def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command with the options of `open_source`, in this order."""
-    return _with(SOURCE_OPTIONS, command)
-
-
-def camera_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command with the options of cameras that `convert` has, for those that write no recording."""
-    return _with(CAMERA_OPTIONS, command)
-
-
-def _with(options: Sequence[Callable[..., Any]], command: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(options):
-        command = option(command)
-    return command

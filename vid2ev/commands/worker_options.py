@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vid2ev.commands.options import adding
+
 if TYPE_CHECKING:
     from vid2ev.cluster.workers import Workers
 
@@ -15,7 +17,7 @@ NAMES = ("jobs", "scheduler", "retries", "memory")
 
 def worker_options(what: str, default: str = "1") -> Callable[..., Any]:
     """A decorator that adds the options to a command; `what` is done at a time, and so many without --jobs."""
-    options = (
+    return adding(
         click.option(
             "--jobs", type=click.IntRange(1), metavar="N", help=f"{what} made at a time, each by a process of its own;"
             f" changes nothing but the time it takes.  [default: {default}]",
@@ -33,13 +35,6 @@ def worker_options(what: str, default: str = "1") -> Callable[..., Any]:
             " more is ended.  [default: its share of the machine's]",
         ),
     )  # fmt: skip
-
-    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
-        for option in reversed(options):
-            command = option(command)
-        return command
-
-    return decorate
 
 
 def workers_of(options: dict[str, Any], jobs: int = 1) -> Workers:
