@@ -8,7 +8,7 @@ unit).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -95,17 +95,11 @@ class ArrayStack:
 
     def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
         """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
-        clock, index = Clock(self._fps), 0
+        clock = Clock(self._fps)
+        stamps: Sequence[Fraction | None] = self._stamps or [None] * self._stack.shape[0]
         with self._stack.opened() as read:
-            for k in range(self._stack.shape[0]):
-                t_ns = clock.next(self._stamps[k] if self._stamps else None)
-                if t_ns is None or (since_ns is not None and t_ns < since_ns):
-                    continue
-                if until_ns is not None and t_ns > until_ns:
-                    return
-                if index >= start:
-                    yield Frame(self._reader.light(read(k)), t_ns)
-                index += 1
+            for k, t_ns in clock.within(enumerate(stamps), since_ns, until_ns, start):
+                yield Frame(self._reader.light(read(k)), t_ns)
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _find_times(self) -> None:

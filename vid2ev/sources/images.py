@@ -114,17 +114,10 @@ class Images:
 
     def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
         """The frames from `since_ns` to `until_ns`, both included, None without end; from index `start` among these."""
-        clock, index, pages = Clock(self._fps), 0, None if self.path.is_dir() else PageReader(self.path)
+        clock, pages = Clock(self._fps), None if self.path.is_dir() else PageReader(self.path)
         stamps: Sequence[Fraction | None] = self._stamps or [None] * len(self._places)
-        for (file, page), stamp in zip(self._places, stamps, strict=True):
-            t_ns = clock.next(stamp)
-            if t_ns is None or (since_ns is not None and t_ns < since_ns):
-                continue
-            if until_ns is not None and t_ns > until_ns:
-                return
-            if index >= start:
-                yield Frame(self._light(file, pages.read(page) if pages else read_picture(file)), t_ns)
-            index += 1
+        for (file, page), t_ns in clock.within(zip(self._places, stamps, strict=True), since_ns, until_ns, start):
+            yield Frame(self._light(file, pages.read(page) if pages else read_picture(file)), t_ns)
         self.warnings.extend(remark for remark in clock.remarks() if remark not in self.warnings)
 
     def _light(self, file: Path, picture: Picture) -> np.ndarray:

@@ -20,10 +20,11 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,6 +36,7 @@ UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]
 GUESSED = " (by spacing)"  # after the name of a unit that nothing states
 DECIMAL_COMMA = re.compile(r"(?:^|[\s;])([+-]?\d{1,50})(?:,(\d{1,50}))?\s*$")  # or whole numbers, in columns
 LONGEST_WORD = 100  # digits of a time
+T = TypeVar("T")
 SLOWEST_HZ = 1e-6  # of frames: 12 days from one to the next
 LONGEST_NS = 2**62  # 146 years: sums and differences of two times stay in int64
 
@@ -80,6 +82,22 @@ class Clock:
             return None
         self._last_ns, self._last = t_ns, seconds
         return t_ns
+
+    def within(
+        self, stamped: Iterable[tuple[T, Fraction | None]], since_ns: int | None, until_ns: int | None, start: int = 0
+    ) -> Iterator[tuple[T, int]]:
+        """The frames from `since_ns` to `until_ns`, both included, None without end, with their times [ns]; from index
+        `start` among these.  `stamped` are all frames with their stamps; no more are asked for than it takes."""
+        index = 0
+        for frame, stamp in stamped:
+            t_ns = self.next(stamp)
+            if t_ns is None or (since_ns is not None and t_ns < since_ns):
+                continue
+            if until_ns is not None and t_ns > until_ns:
+                return
+            if index >= start:
+                yield frame, t_ns
+            index += 1
 
     def remarks(self) -> list[str]:
         """What a person should know about the stamps."""
