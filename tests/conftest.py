@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import signal
+
 from hypothesis import settings
 
 # (tests say nothing of how long things take: the first example of many compiles kernels)
 settings.register_profile("without a clock", deadline=None)
 settings.load_profile("without a clock")
+
+# (a shell has what it starts in the background ignore Ctrl-C, and so would all that tests start)
+signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -265,13 +265,9 @@ def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, m
         flock(handle, flags)
         signal.raise_signal(signal.SIGINT)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # (ignored where tests run in the background)
-    try:
-        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            patch.setattr(fcntl, "flock", asked)
-            write_dataset(tmp_path / "set", DatasetSpec(**QUICK))
-    finally:
-        signal.signal(signal.SIGINT, before)
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(fcntl, "flock", asked)
+        write_dataset(tmp_path / "set", DatasetSpec(**QUICK))
     assert not list(tmp_path.iterdir())
     with Held(tmp_path / "set.partial"):
         pass
