@@ -1,6 +1,6 @@
 # make demo        install into .venv and convert the clip in examples/
 # make test        the tests of every day, in the same environment
-# make test-long   those that kill programs, play GPUs, draw sensors at random or train
+# make test-long   those that kill programs, play GPUs, draw sensors at random, compile for rare ones, or train
 # make lint        style, format and types
 
 PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11; do \

@@ -211,6 +211,7 @@ def test_the_simpler_timings(order, timing, taus):
     assert assert_one_to_one(pixel, t_ns, light, play(sensor(pixel), t_ns, light)) > 150
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "order"),
     [

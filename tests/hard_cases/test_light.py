@@ -29,6 +29,7 @@ def test_black_or_saturated_all_over_is_silent(light, curve, order):
     assert len(play(spec, np.arange(50) * 7_000_003, frames)) == 0
 
 
+@pytest.mark.long
 def test_black_keeps_its_noise():
     """All black at 0.1 frames per second: shot noise at its dark rate, several events per pixel and interval."""
     frames = np.zeros((4, 64, 64), np.float32)

@@ -74,7 +74,7 @@ def test_noise_larger_than_the_threshold(effect):
         assert counts.max() < 400
 
 
-@pytest.mark.parametrize("kind", ["quantised", "track"])
+@pytest.mark.parametrize("kind", ["quantised", pytest.param("track", marks=pytest.mark.long)])
 def test_dead_time_longer_than_the_clip(kind):
     """Each pixel sends its first crossing and no more."""
     rng = np.random.default_rng(1)

@@ -118,6 +118,7 @@ def test_time_that_repeats_or_runs_back_is_refused_and_changes_nothing(back_ns):
     assert np.array_equal(Events.concatenate(parts).t, want.t)
 
 
+@pytest.mark.long
 def test_leak_at_a_million_frames_per_second():
     """Steps of 1 us, each 1/1000 of the time to a leak event: all 20 come, each at its microsecond."""
     t_ns = np.arange(20_500) * 1_000

@@ -34,7 +34,7 @@ def given(case: str) -> tuple[torch.Tensor, torch.Tensor, EventCounts]:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("case", ["black", "even", "no events", "one event"])
-@pytest.mark.parametrize("name", FRAME_FED)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] * (n == "timelens")) for n in FRAME_FED])
 def test_networks_of_frames_have_finite_gradients(name: str, case: str, kind: torch.dtype) -> None:
     network = make(name, zero_heads=False)
     first, second, events = given(case)

@@ -19,7 +19,7 @@ from interp.cost.ways import Anew, Tiled, ways
 from interp.evaluate.run import evaluate
 from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS, Gap, open_method
-from interp.methods.running import Running
+from interp.methods.running import Running, compiles
 from interp.pretrained import HERE
 from interp.representation.event_counts import EventCounts
 from vid2ev.commands import main
@@ -33,6 +33,7 @@ QUICK = {*METHODS, "rrin_events_guided-tiny", "rrin_events_guided-tiny, bfloat16
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without what takes long."""
+    monkeypatch.setattr("interp.cost.ways.compiles", lambda device: False)
     monkeypatch.setattr(measure, "ways", lambda *asked: [way for way in ways(*asked) if way.name in QUICK])
 
 
@@ -134,7 +135,8 @@ def test_what_cannot_be_meant_is_one_sentence(options: list[str], said: str, tmp
     assert not list(tmp_path.iterdir())
 
 
-def test_every_way_is_there_and_says_how_to_ask_for_it() -> None:
+def test_every_way_is_there_and_says_how_to_ask_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("interp.cost.ways.compiles", lambda device: True)
     names = {way.name: way for way in ways([], "cpu")}
     assert {*METHODS} <= {*names} and {*names} >= QUICK
     assert names["rrin_events_guided-tiny, compiled"].asked == "--network rrin_events_guided-tiny --compile"
@@ -173,7 +175,7 @@ def test_compiled_it_makes_the_same() -> None:
     times = torch.tensor([0.2, 0.7])
     exact = open_method(str(WEIGHTS)).between(gap(), times)
     made = open_method(str(WEIGHTS), running=Running(compiled=True)).between(gap(), times)
-    assert counters["stats"]["unique_graphs"] > 0
+    assert counters["stats"]["unique_graphs"] > 0 and compiles("cpu")
     torch.testing.assert_close(made, exact, atol=1e-4, rtol=0)
 
 

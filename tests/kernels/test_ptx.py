@@ -160,6 +160,7 @@ def test_numpy_without_a_name_that_numba_cuda_asks_for_stays_without_it():
     assert done.stdout.split() == ["False", "numba.cuda.cudaimpl"], done.stderr
 
 
+@pytest.mark.long
 def test_a_glance_at_a_pixel_is_in_registers():
     for spec in SENSORS.values():
         assert ".local" not in strictly(flags_of(spec, labels=False), "glance")

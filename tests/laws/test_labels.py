@@ -23,7 +23,7 @@ def moving() -> tuple[np.ndarray, np.ndarray]:
     [
         ({"leak_rate_hz": 10}, Label.LEAK),
         ({"leak_rate_hz": 10, "random_phase": True}, Label.LEAK),
-        ({"leak_rate_hz": 10, "timing": "linear"}, Label.LEAK),
+        pytest.param({"leak_rate_hz": 10, "timing": "linear"}, Label.LEAK, marks=pytest.mark.long),
         ({"shot_rate_hz": 10}, Label.SHOT),
         ({"hot_probability": 0.2, "hot_rate_hz": 100}, Label.HOT),
     ],
@@ -55,6 +55,7 @@ def test_events_of_moving_light_are_signal():
     assert (sent.label == Label.SIGNAL).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("refractory", ["quantised", "track"])
 def test_hot_pixels_send_only_hot_events(refractory):
     """Also once they have been blind."""

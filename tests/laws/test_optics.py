@@ -39,6 +39,7 @@ def test_shading_changes_no_contrast_without_dark_level():
     assert np.abs(plain.t - shaded.t).max() <= 1  # the order of events of one microsecond may differ
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("level", [0.02, 0.3, 1.0, 4.0])
 @orders
 def test_bandwidth_follows_the_light_after_a_step(level, order):

@@ -26,9 +26,13 @@ MORE = {
     "linear timing": EVERYTHING.model_copy(update={"timing": "linear", "filter": "after"}),
     "v2e-noisy": load_sensor("v2e-noisy"),
 }
+RARE = ["after, tracking"]  # (nobody else's kernel)
 sensors = pytest.mark.parametrize(
     "spec",
-    [*SENSORS.values(), *(pytest.param(spec, marks=pytest.mark.slow) for spec in MORE.values())],
+    [
+        *(pytest.param(spec, marks=[pytest.mark.long] * (name in RARE)) for name, spec in SENSORS.items()),
+        *(pytest.param(spec, marks=pytest.mark.slow) for spec in MORE.values()),
+    ],
     ids=[*SENSORS, *MORE],
 )
 

@@ -23,6 +23,7 @@ SENSORS = {
     "after, tracking": AFTER_TRACKING,
     "v2e-noisy": load_sensor("v2e-noisy"),
 }
+RARE = ["leak before the log", "leak after the log", "shots between", "after, tracking"]  # nobody else's kernels
 
 
 def solve_all(dvs: Dvs) -> None:
@@ -35,7 +36,10 @@ def solve_all(dvs: Dvs) -> None:
     dvs.restore(state)
 
 
-@pytest.mark.parametrize("spec", SENSORS.values(), ids=SENSORS)
+@pytest.mark.parametrize(
+    "spec",
+    [pytest.param(spec, marks=[pytest.mark.long] * (name in RARE), id=name) for name, spec in SENSORS.items()],
+)
 def test_no_pixel_that_has_an_event_is_left_out(spec):
     """Light goes here and there in steps about as long as the time constants, so that many signals turn within one."""
     rng = np.random.default_rng(4)

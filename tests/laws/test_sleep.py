@@ -266,6 +266,7 @@ def assert_alike(spec: DvsSpec, light: np.ndarray, t_ns: np.ndarray, seed: int =
     assert_same_state(skips, walks)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dt_ns", [100_000, 5_000_000])
 def test_a_pixel_by_itself_wakes_for_what_its_shots_leave_to_be_reached(dt_ns):
     """It sleeps between its levels, near one and then near the other: a shot has it go on from where it is, and from

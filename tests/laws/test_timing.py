@@ -11,7 +11,14 @@ SIZE, FRAMES = (32, 16), 30
 SHOTS = {"shot_rate_hz": 40.0}
 
 
-@pytest.mark.parametrize(("refractory", "noise"), [("quantised", SHOTS), ("track", SHOTS), ("track", {})])
+@pytest.mark.parametrize(
+    ("refractory", "noise"),
+    [
+        ("quantised", SHOTS),
+        pytest.param("track", SHOTS, marks=pytest.mark.long),
+        pytest.param("track", {}, marks=pytest.mark.long),
+    ],
+)
 def test_events_of_light_come_with_the_frames(refractory, noise):
     rng = np.random.default_rng(4)
     t_ns = 777 + np.cumsum(rng.integers(2_000_000, 20_000_000, FRAMES))

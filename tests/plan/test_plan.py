@@ -167,6 +167,7 @@ def test_a_still_scene_needs_no_poles() -> None:
     assert isinstance(plan, Plan) and plan.distance == 0.0
 
 
+@pytest.mark.long
 def test_where_nothing_moves_the_leak_still_sends_events_that_move_with_the_thresholds() -> None:
     frames = [Frame(np.full((8, 8), 0.3, np.float32), k * 100_000_000) for k in range(20)]
     spec = DvsSpec(mismatch=0.02, leak_rate_hz=3.0, refractory_us=0, crossing_noise=0, **NO_POLES)
@@ -266,6 +267,7 @@ def trembling(reach_nat: float, frames: int = 300) -> list[Frame]:
     return [Frame(np.full((48, 64), 0.2 * np.exp(-each), np.float32), k * 1_000_000) for k, each in enumerate(level)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ["follower", "photoreceptor", "mismatch", "crossing_noise"])
 def test_light_that_trembles_below_the_mean_threshold_moves_pixels_of_lower_ones(effect: str) -> None:
     size, spec, frames = (64, 48), DvsSpec(), trembling(0.12)
@@ -281,6 +283,7 @@ def test_of_hardly_any_events_of_thresholds_that_differ_nothing_is_sure() -> Non
     assert plan.gone in ((), ("refractory",)) and "estimate" in {row.omission.kind for row in plan.rows}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.6, 3.0])
 def test_pixels_of_low_thresholds_send_more_densely(share: float) -> None:
     """What is spread as far as thresholds may be: mismatch, and pixels that are silent."""
@@ -295,6 +298,7 @@ def test_pixels_of_low_thresholds_send_more_densely(share: float) -> None:
         assert distance(sent(spec, size, frames), left, size) <= said.distance
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ["cold", "delay", "refractory"])
 def test_events_of_a_frame_that_come_at_once_are_dense(effect: str) -> None:
     more = {"cold": {"cold_probability": 0.2}, "delay": {"delay_us": 300.0}, "refractory": {"refractory_us": 100.0}}
@@ -352,6 +356,7 @@ def held(spec: DvsSpec, size: tuple[int, int], frames: list[Frame], *effects: st
         assert 0 < changed <= said.distance, effect
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("more", [{"mismatch": 0.015}, {"crossing_noise": 0.01}, {"threshold_off": 0.2}])
 def test_what_trembling_light_has_brought_to_rest_is_not_counted_on(more: dict) -> None:
     """Levels that are farther apart than light goes: plays have hundreds of events for each one that is sent."""
@@ -361,6 +366,7 @@ def test_what_trembling_light_has_brought_to_rest_is_not_counted_on(more: dict) 
     held(spec, (32, 24), frames, "shot", "hot")
 
 
+@pytest.mark.long
 def test_less_is_sent_at_least_than_by_any_thresholds() -> None:
     """Of trembling light, of light that goes one way all pixels send what plays have."""
     size, thresholds = (64, 48), {"threshold_on": 0.15, "threshold_off": 0.2}
@@ -372,6 +378,7 @@ def test_less_is_sent_at_least_than_by_any_thresholds() -> None:
         assert least <= 1.01 * many and (not all_of_it or least >= 0.95 * many)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("timing", ["response", "frame"])
 def test_pixels_that_are_blind_may_be_set_to_the_other_half_of_a_flicker(timing: str) -> None:
     """Shots have them send ON events of light whose OFF events they would send; other pixels see a slow ramp."""
@@ -387,6 +394,7 @@ def test_events_that_hot_pixels_do_not_send_of_light_are_as_dense_as_these() -> 
     held(spec, (32, 24), flashing(3.0, 200_000, 200), "hot")
 
 
+@pytest.mark.long
 def test_where_nothing_moves_the_photoreceptors_noise_sends_events() -> None:
     """Which move with thresholds, are swallowed, missing and late; and auto leaves out nothing that they depend on."""
     frames = [Frame(np.full((24, 32), 0.3, np.float32), k * 1_000_000) for k in range(40)]
@@ -410,6 +418,7 @@ def scrolling(px_s: float, fps: float, seconds: float, size: tuple[int, int] = (
     return frames
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theta", [0.15, 0.05, 0.02])
 @pytest.mark.parametrize("mismatch", [0.0, 0.3])
 @pytest.mark.parametrize(("px_s", "fps"), [(120, 120), (3000, 6000)])

@@ -189,7 +189,8 @@ def test_a_folder_named_like_a_sensor_file_is_refused(tmp_path: Path) -> None:
     ("name", "shortest_us", "longest_us"),
     [
         pytest.param("davis346", 20, 20, marks=pytest.mark.slow),  # (a pixel of its own, compiled for 20 s)
-        ("prophesee-gen31", 40, 200), ("prophesee-gen41", 20, 150), ("imx636", 0, 100),
+        pytest.param("prophesee-gen31", 40, 200, marks=pytest.mark.long),
+        ("prophesee-gen41", 20, 150), ("imx636", 0, 100),
     ],
 )  # fmt: skip
 def test_a_camera_in_bright_light_has_its_published_latency(name: str, shortest_us: int, longest_us: int) -> None:
