@@ -39,6 +39,7 @@ USES = {
     "fixed_pattern": {"prnu": 0.01, "dsnu": 3},
     "shot_noise": {"shot_noise": True, "white_e": 5000},
     "full_well": {"full_well_e": 2500, "white_e": 5000},
+    "full_well of a gain": {"full_well_e": 2500, "white_e": 2500, "exposure_gain": 2},
     "full_well of shots": {"full_well_e": 2500, "white_e": 5000, "shot_noise": True, "prnu": 0.01},
     "read_noise": {"read_noise_e": 3, "white_e": 5000},
     "noise": {"noise_lsb": 5.2 * FINE},
@@ -124,12 +125,34 @@ def test_auto_keeps_within_the_tolerance(name: str, tolerance: float) -> None:
     spec = load_cis(name, ["cis.colour=false"])
     plan = frame_plan_of(exposed(spec, size, light), spec, tolerance)
     assert plan.distance is not None and plan.distance <= tolerance
+    assert f"tolerance {tolerance:g}: {math.sqrt(tolerance / 12):.2g} LSB" in plan.in_all()
     change = codes(spec, size, light) - codes(plan.spec, size, light)
     assert np.abs(change).max(initial=0) <= math.floor(plan.max_lsb) + 1
     assert [row.effect for row in plan.rows] == [*spec.effects(), *ALWAYS]
     assert plan.spec.line_us == spec.line_us
     assert all(row.effect in str(plan) and row.omission.why for row in plan.rows)
     assert json.loads(json.dumps(plan.describe(), allow_nan=False))["max_lsb"] == plan.max_lsb
+
+
+def test_auto_leaves_out_as_much_as_there_is_room_for_together() -> None:
+    """Roots of distances add up; with any effect more that costs something it would be too much."""
+    size, light = frames("edge")
+    faint = {"noise_lsb": 0.01, "read_noise_e": 0.05, "prnu": 2e-5, "shading": (-2e-5,), "exposure_us": 0}
+    spec = CisSpec(colour=False, **faint)
+    seen = exposed(spec, size, light)
+    roots = {name: math.sqrt(FRAME_EFFECTS[name].omission(seen, spec).distance) for name in spec.effects()}
+    assert len(roots) == 4 and min(roots.values()) > 0 and sum(roots.values()) < 1
+    for count in range(1, 5):
+        for share in (0.99, 1.01):
+            tolerance = (share * sum(sorted(roots.values())[:count])) ** 2
+            plan = frame_plan_of(seen, spec, tolerance)
+            gone = plan.gone
+            room = math.sqrt(tolerance) - sum(roots[name] for name in gone)
+            assert room >= 0 and all(roots[name] > room for name in roots.keys() - {*gone})
+            assert len(gone) >= (count if share > 1 else count - 1)
+            assert plan.max_lsb == pytest.approx(sum(roots[name] for name in gone) / math.sqrt(12))
+    for some in ((), ("noise",), ("noise", "shading")):
+        assert {*frame_plan_of(seen, spec, 1.0, among=some).gone} == {*some}
 
 
 def test_a_still_clip_needs_no_exposure_and_keeps_its_times() -> None:
@@ -177,9 +200,16 @@ def test_what_is_seen_is_all_there_is() -> None:
     lit = np.where((made >= 4096 / 65535) & (made <= white), made, 0)
     found = seen.lit_max, seen.lit_mean, seen.lit_square
     assert found == pytest.approx((lit.max(), lit.mean(), (lit**2).mean()), rel=1e-6)
-    levels = (made * 65535 - 4096) / 55
-    clipped = (np.abs(levels - np.clip(levels, 0, 1023))).max()
-    assert ALWAYS["clip"](seen, spec).levels.most == pytest.approx(clipped, rel=1e-5)
+    bare = Cis(plain.model_copy(update={"shading": ()}), (8, 6), linear=True).run(light)
+    shaded = np.clip(made, 4096 / 65535, white) - np.clip([each.light for each in bare], 4096 / 65535, white)
+    found = seen.changes["shading"].most, seen.changes["shading"].square
+    assert found == pytest.approx((np.abs(shaded).max(), (shaded**2).mean()), rel=1e-5)
+    for scale in (1, 0.01):  # (mostly beyond white, and all below black)
+        levels = (scale * made * 65535 - 4096) / 55
+        clipped = levels - np.clip(levels, 0, 1023)
+        found = exposed(spec, (8, 6), [Frame(np.float32(scale) * frame.light, frame.t_ns) for frame in light])
+        said = ALWAYS["clip"](found, spec).levels
+        assert (said.most, said.square) == pytest.approx((np.abs(clipped).max(), (clipped**2).mean()), rel=1e-5)
     assert seen.changes["full_well"].most == pytest.approx(white - 0.9, rel=1e-5)
     within = exposed(spec, (8, 6), [Frame(frame.light / 6 + 0.1, frame.t_ns) for frame in light])
     assert ALWAYS["clip"](within, spec).levels.most == 0 and ALWAYS["clip"](within, spec).kind == "exact"
@@ -243,8 +273,8 @@ def test_bounds_add_up(name: str) -> None:
 
 
 def test_an_exposure_costs_as_many_frames_of_light_as_are_in_it_and_one_at_least() -> None:
-    """Of 1000 frames a second."""
-    light = [Frame(np.full((4, 4), 0.5, np.float32), k * 10**6) for k in range(101)]
+    """Of 1000 frames a second, whenever the first of them was."""
+    light = [Frame(np.full((4, 4), 0.5, np.float32), 7 * 10**9 + k * 10**6) for k in range(101)]
 
     def cost_ns(exposure_us: float) -> float:
         spec = PLAIN.model_copy(update={"exposure_us": exposure_us})

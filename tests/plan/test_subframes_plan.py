@@ -67,6 +67,7 @@ def test_what_is_made_keeps_to_the_upsampler_s_tolerance() -> None:
         assert found.left_us == pytest.approx(found.worst_us / steps**2)
         assert found.speed_px_per_s == pytest.approx(shift_px / (end_ns * 1e-9))
         assert not row.omission.sure and f"{steps - 1} made" in row.omission.figure
+        assert (row.ns_per_pixel > 0) == (steps > 1)
 
 
 def test_the_worst_interval_counts() -> None:
@@ -78,6 +79,7 @@ def test_the_worst_interval_counts() -> None:
     assert found.worst_us == found.left_us == pytest.approx(1e6 * KAPPA_PER_PX * 4.0 * INTERVAL_NS * 1e-9 / 8)
     assert found.speed_px_per_s == pytest.approx(4.0 / (INTERVAL_NS * 1e-9))
     assert (found.intervals, found.still) == (3, 0)
+    assert (found.row().fate, found.row().ns_per_pixel) == ("kept", 0.0)  # (of sub-frames none are made)
 
 
 def test_a_still_clip_needs_no_subframes_and_no_flow(monkeypatch: pytest.MonkeyPatch) -> None:

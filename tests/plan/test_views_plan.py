@@ -114,17 +114,35 @@ def test_a_view_takes_no_more_than_it_needs(tmp_path: Path) -> None:
     plane = rows_of_views(Recipe.of(CLIP, rig=rig(tmp_path), depth="plane:2"))
     assert plane["here"] == ("dropped", "exact", "the source's picture")
     assert plane["turned"][:2] == plane["beside"][:2] == ("replaced", "exact")
-    assert "px from the source's" in plane["beside"][2]
+    focal_px = Recipe.of(CLIP, rig=rig(tmp_path), depth="plane:2").rig.source.focal_px[0]
+    assert plane["beside"][2] == f"a homography, up to {focal_px * 0.04 / 2:.2g} px from the source's"
     np.save(tmp_path / "depth.npy", np.linspace(2, 4, 32 * 48, dtype=np.float32).reshape(32, 48))
     recipe = Recipe.of(CLIP, rig=rig(tmp_path), depth=tmp_path / "depth.npy")
     mapped = rows_of_views(recipe)
     assert mapped["here"] == plane["here"] and mapped["turned"][:2] == ("replaced", "exact")
-    expected = recipe.rig.source.focal_px[0] * 0.04 * (1 / 2 - 1 / 4) / 2
+    expected = focal_px * 0.04 * (1 / 2 - 1 / 4) / 2
     assert mapped["beside"] == ("kept", "bound", f"{expected:.2g} px")
-    bent = rig(tmp_path)
+    bent, own = rig(tmp_path), rig(tmp_path).read_text()
     lens = 'distortion_model = "radtan"\ndistortion = [-0.1, 0, 0, 0]\n'
-    bent.write_text(f"[source]\nfov_deg = 60\n{lens}{bent.read_text()}")
-    assert rows_of_views(Recipe.of(CLIP, rig=bent, depth=tmp_path / "depth.npy"))["beside"][1] == "estimate"
+    for text, kind in ((f"[source]\nfov_deg = 60\n{lens}{own}", "estimate"), (f"{own}{lens}", "bound")):
+        bent.write_text(text)
+        assert rows_of_views(Recipe.of(CLIP, rig=bent, depth=tmp_path / "depth.npy"))["beside"][1] == kind
+
+
+def test_how_far_pixels_are_from_those_of_the_source_is_not_said_where_they_are_fewer(tmp_path: Path) -> None:
+    coarse = rig(tmp_path)
+    coarse.write_text(f"{coarse.read_text()}size = [24, 16]\n")
+    found = rows_of_views(Recipe.of(CLIP, rig=coarse, depth="plane:2"))
+    assert found["beside"] == ("replaced", "exact", "a homography")
+
+
+def test_cameras_of_a_scene_have_pictures_of_their_own(tmp_path: Path) -> None:
+    """Rendered ones, which neither a homography nor light between frames could take the place of."""
+    plans = plans_of(Recipe.of("scene:parallax,size=48x36", rig=rig(tmp_path), stop=0.02))
+    for name in ("turned", "beside"):
+        row = plans[name].rows[0]
+        assert (row.effect, row.fate, row.omission.figure) == ("view", "kept", "a picture of its own")
+        assert row.ns_per_pixel == 0 and "subframes" not in [each.effect for each in plans[name].rows]
 
 
 def test_one_table_for_each_camera(tmp_path: Path) -> None:
