@@ -12,7 +12,7 @@ import pytest
 from recordings import all_events, assert_same, dense, events_of, recording_of, written
 
 from vid2ev.errors import DataError
-from vid2ev.formats import describe_events, format_named, open_events, prophesee, read_events, recognise
+from vid2ev.formats import FORMATS, describe_events, format_named, open_events, prophesee, read_events, recognise
 from vid2ev.formats.event_file import EventFile
 from vid2ev.formats.sequential import Unwrapped, pieces
 from vid2ev.stream.events import Events
@@ -163,6 +163,15 @@ def test_evt2_sends_time_in_silence(tmp_path: Path) -> None:
     words = np.frombuffer(path.read_bytes().partition(b"% end\n")[2], "<u4")
     high = (words[words >> 28 == 8] & 0xFFFFFFF).astype(np.int64) * 64
     assert high[0] == 0 and np.diff(high).max() <= 4096 and high[-1] > 21_000_000 - 64
+
+
+@pytest.mark.parametrize("name", [name for name in FORMATS if format_named(name).write])
+def test_files_grow_in_silence_by_no_more_than_their_format_says(tmp_path: Path, name: str) -> None:
+    kind, sizes = format_named(name), list[int]()
+    for seconds in (10, 110):
+        none = recording_of(events_of(np.array([], np.int64), (640, 480)), (640, 480), 0, seconds * 10**6)
+        sizes.append(written(kind, none, tmp_path).stat().st_size)
+    assert 0 <= sizes[1] - sizes[0] <= 100 * kind.idle_bytes + 50  # (half a byte a second is rounded off)
 
 
 def test_times_of_dat_start_anew_and_may_go_back(tmp_path: Path) -> None:

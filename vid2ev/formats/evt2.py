@@ -71,6 +71,6 @@ FORMAT = Format(
     open=Evt2Events,
     write=write_events,
     largest=(2048, 2048),
-    idle_bytes=488,  # a word of 4 bytes in 8192 us
+    idle_bytes=977,  # a word of 4 bytes in 4096 us
     keeps=frozenset({"size", "start"}),
 )
