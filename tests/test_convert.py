@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from vid2ev import DataError, Events, UsageError, convert, events_of, load_sensor, open_source, read_events
+from vid2ev.formats import open_events
 from vid2ev.making.conversion import Paused
 from vid2ev.seen import instants
 from vid2ev.seen.instants import AHEAD_PX, LEAST_AHEAD, MOST_AHEAD, Instant, frames_ahead
@@ -172,6 +173,14 @@ def test_a_recording_counts_from_its_first_frame(tmp_path: Path) -> None:
         assert file["events/t"][0] > 0 and file["events/t"][-1] <= 110_000
     (events,) = read_events(tmp_path / "out")
     assert start_us < events.t[0] and events.t[-1] <= start_us + 110_000
+
+
+def test_files_of_events_have_the_frames_of_the_recording_and_no_others(tmp_path: Path) -> None:
+    """The source goes on where a recording is ended by hand, and begins before one with a warm-up."""
+    options = {"formats": "aedat4", "preview": False, "upsample": "none", "threads": 1}
+    convert(CLIP, tmp_path / "out", since_ns=50_000_000, report=lambda _, done: done.frames == 4, **options)
+    times_us = [picture.t_us for picture in open_events(tmp_path / "out").frames()]
+    assert times_us == [50_000, 60_000, 70_000, 80_000]
 
 
 def test_event_frames_later_than_the_last_frame_are_kept(tmp_path: Path) -> None:

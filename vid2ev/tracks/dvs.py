@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import dropwhile, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -193,6 +195,12 @@ class DvsTrack:
             self.events,
             lambda: self._columns.blocks(BLOCK),
             self.dvs.labels,
-            self._pictures if self.outputs.want_frames else None,
+            partial(self._pictures_of, frame_us) if self._pictures and self.outputs.want_frames else None,
             frame_us,
         )
+
+    def _pictures_of(self, frame_us: np.ndarray) -> Iterator[Picture]:
+        """The pictures of the frames that were recorded: the source may have some before and after them."""
+        assert self._pictures
+        coming = dropwhile(lambda picture: picture.t_us < frame_us[0], self._pictures())
+        return takewhile(lambda picture: picture.t_us <= frame_us[-1], coming)
