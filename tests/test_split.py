@@ -99,6 +99,15 @@ def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(tmp_path:
     assert sent == [([10], [0]), ([20, 20, 20], [3, 5, 3]), ([21], [0]), ([30], [5])]
 
 
+def test_of_a_part_that_has_fewer_events_than_were_sent_nobody_waits_for_more(tmp_path: Path) -> None:
+    (tmp_path / "0.csv").write_text("t,x,y,p\n10,0,0,1\n")
+    mount: Any = SimpleNamespace(size=(8, 2), within="", sensor=SimpleNamespace(spec=DvsSpec()))
+    replayed = Replayed(mount, [tmp_path / "0.csv"], False)
+    replayed.restore({"sent": np.array([1], np.int64)})
+    with pytest.raises(UsageError, match="state of 2 events sent of a part that has 1"):
+        replayed.restore({"sent": np.array([2], np.int64)})
+
+
 def test_who_goes_on_keeps_to_the_clock_of_the_readout(tmp_path: Path) -> None:
     part = tmp_path / "0.csv"
     part.write_text("t,x,y,p\n27,0,0,1\n47,3,0,1\n67,3,1,0\n87,0,0,1\n")

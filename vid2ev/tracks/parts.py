@@ -156,7 +156,8 @@ class _Stream:
         self._blocks: Iterator[Events] = read_events(part / within, block=BLOCK)
         self._held = Events.empty()
         while self.sent < sent:
-            self._fill()
+            if not self._fill():
+                raise UsageError(f"state of {sent} events sent of a part that has {self.sent}")
             self._take(min(len(self._held), sent - self.sent))
 
     def until(self, last_us: int) -> Events:
