@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from interp.evaluate import kept as kept_module
 from interp.evaluate.kept import Kept
 from interp.train.run_folder import RunFolder
 from vid2ev import Cis, Dvs, convert, load_cis, load_sensor
+from vid2ev.commands import main
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.recording.destination import partial_of
@@ -84,6 +86,15 @@ def test_a_checkpoint_that_is_cut_short_is_one_sentence(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DataError, match=r"checkpoint.npz is damaged, or not of this recording \(BadZipFile\)"):
         convert(CLIP, tmp_path / "out", resume=True, **OPTIONS)
+
+
+def test_of_a_damaged_checkpoint_nobody_is_told_that_it_can_be_gone_on_with(tmp_path: Path) -> None:
+    path = begun(tmp_path / "out")
+    options = [f"--{key}={value}" for key, value in (("threads", 1), ("output", tmp_path / "out"))]
+    options += [f"--set={change}" for change in OPTIONS["overrides"]]  # type: ignore[attr-defined]
+    path.write_bytes(path.read_bytes()[:-100])
+    said = CliRunner().invoke(main, ["convert", CLIP, *options, "--resume"])
+    assert said.exit_code == 1 and said.output.endswith("--overwrite starts again\n")
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "evt3", "csv"])

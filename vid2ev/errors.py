@@ -38,6 +38,10 @@ class DataError(Vid2evError, OSError):
     exit_code = 1
 
 
+class SavedError(DataError):
+    """What was kept to go on from does not hold what it should: to go on once more mends nothing."""
+
+
 class DiskError(DataError):
     """A disk that does not take what is to be written: nobody's file is at fault, and all work ends there."""
 

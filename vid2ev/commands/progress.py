@@ -14,7 +14,7 @@ from click.core import ParameterSource
 
 from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, SavedError
 from vid2ev.terminal import counting
 
 if TYPE_CHECKING:
@@ -33,13 +33,15 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {elapsed} gone, {
 
 @contextmanager
 def kept(directory: Path, again: bool = True) -> Iterator[None]:
-    """What goes wrong within says so if it can be resumed; `again`: the source can be read again."""
+    """What goes wrong within says so if it can be resumed; `again`: the source can be read again.  What was kept and is
+    damaged cannot."""
     from vid2ev.recording.destination import partial_of
 
     try:
         yield
     except (DataError, KeyboardInterrupt) as error:
-        kept = again and (partial_of(directory) / "checkpoint.npz").exists()
+        resumable = again and not isinstance(error, SavedError)
+        kept = resumable and (partial_of(directory) / "checkpoint.npz").exists()
         remedy = (
             "; what is done is kept, the same command with --resume goes on" if kept else "; nothing is left behind"
         )

@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import DataError, SavedError, UsageError
 from vid2ev.light.picture_files import decoded
 from vid2ev.light.tags import tag_of
 from vid2ev.recording.disk import sync, whole_file
@@ -67,14 +67,14 @@ class ExposureFiles:
     def keep(self, count: int) -> None:
         """Begin with the first `count` exposures that are there; what there is of others is removed.
 
-        Raises DataError if there are fewer."""
+        Raises SavedError if there are fewer."""
         for folder in self._folders.values():
             folder.mkdir(parents=True, exist_ok=True)
             times = folder / TIMESTAMPS
             lines = times.read_text(encoding="utf-8").splitlines(keepends=True)[1:] if times.exists() else []
             there = [path for path in folder.glob("*.png") if path.stem.isdecimal() and int(path.stem) < count]
             if (held := min(len(lines), len(there))) < count:
-                raise DataError(
+                raise SavedError(
                     f"{folder} holds {held} pictures with times, expected {count}; start again with --overwrite"
                 )
             with whole_file(times) as file:

@@ -28,7 +28,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.errors import DataError, SavedError, UsageError, Vid2evError
 from vid2ev.formats.eager import EagerFile
 from vid2ev.recording.destination import begun_at, check_folder, partial_of
 from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
@@ -141,7 +141,7 @@ class Folder:
             raise
         except Exception as error:  # (numpy, zipfile and zlib have a dozen of their own; the state may be of anything)
             said = (str(error).splitlines() or [""])[0] if isinstance(error, Vid2evError) else type(error).__name__
-            raise DataError(
+            raise SavedError(
                 f"{self.partial / 'checkpoint.npz'} is damaged, or not of this recording ({said[:150]}); --overwrite"
                 " starts again"
             ) from error
@@ -198,7 +198,7 @@ class Folder:
             path = self.partial / name
             there = path.stat().st_size if path.is_file() else 0
             if not 0 <= sizes[name] <= there:
-                raise DataError(
+                raise SavedError(
                     f"{path} has {there:,} bytes, and {sizes[name]:,} at the last checkpoint; --overwrite starts again"
                 )
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import SavedError, UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.formats.frame_index import FrameIndex
@@ -132,8 +132,8 @@ class Outputs:
     def write(self, folder: Path, recording: Recording) -> None:
         """Write the files of a recording, but for the preview.
 
-        Raises OSError, UsageError for times that a format cannot hold and DataError for events that cannot be: what was
-        kept of them to go on from was damaged.
+        Raises OSError, UsageError for times that a format cannot hold and SavedError for events that cannot be: what
+        was kept of them to go on from was damaged.
         """
         files = self.files()
         for kind in self.kinds():
@@ -143,7 +143,7 @@ class Outputs:
             except UsageError:
                 raise
             except ValueError as error:
-                raise DataError(
+                raise SavedError(
                     f"{folder}: {error}; what was kept to go on from is damaged, --overwrite starts again"
                 ) from error
         if recording.frame_us is not None and "hdf5" not in self.formats:  # (which has it inside)
