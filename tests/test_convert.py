@@ -175,6 +175,18 @@ def test_a_recording_counts_from_its_first_frame(tmp_path: Path) -> None:
     assert start_us < events.t[0] and events.t[-1] <= start_us + 110_000
 
 
+@pytest.mark.parametrize("fps", [1000, 30])
+def test_before_time_0_cameras_that_send_nothing_have_the_length_of_the_light(tmp_path: Path, fps: int) -> None:
+    """An event camera in the dark, and a frame camera for less light than it takes an exposure; then it sends some."""
+    rig = tmp_path / "rig.toml"
+    cameras = (f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\nclock_offset_us = -5000000\n' for kind in ("dvs", "cis"))
+    rig.write_text("".join(cameras))
+    clip = f"synthetic:black,size=16x12,fps={fps},duration_s={3 / fps}"
+    manifest = convert(clip, tmp_path / "out", "ideal", rig=rig, cis="ideal", upsample="none", threads=1)
+    for result in manifest["results"].values():
+        assert (result["start_us"], result["duration_us"]) == (-5_000_000, 3_000_000 // fps)
+
+
 def test_files_of_events_have_the_frames_of_the_recording_and_no_others(tmp_path: Path) -> None:
     """The source goes on where a recording is ended by hand, and begins before one with a warm-up."""
     options = {"formats": "aedat4", "preview": False, "upsample": "none", "threads": 1}

@@ -12,6 +12,8 @@ import numpy as np
 
 from vid2ev.stream.frames import Frame
 
+NEVER_US = -(1 << 62)  # before all times, of which some are before 0
+
 
 class Track(Protocol):
     """A camera of a recording: `begin` comes first, then `add` for each frame that follows, then `finish` and `write`.
@@ -19,7 +21,7 @@ class Track(Protocol):
     Between two frames `state` is all there is to it beside the folder's files, and `restore` brings it back.
     """
 
-    last_us: int  # the last thing that it sent, on its own clock; 0 if it sent nothing
+    last_us: int  # the last thing that it sent, on its own clock; NEVER_US if it sent nothing
 
     @property
     def events(self) -> int:

@@ -11,6 +11,7 @@ from vid2ev.recording.exposures import KINDS, ExposureFiles
 from vid2ev.recording.folder import Folder
 from vid2ev.sensors.cis import Cis
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks import NEVER_US
 from vid2ev.tracks.outputs import Outputs
 
 
@@ -21,7 +22,7 @@ class CisTrack:
 
     def __init__(self, cis: Cis, folder: Folder, outputs: Outputs, *, within: str = ""):
         self.cis = cis
-        self.last_us = 0
+        self.last_us = NEVER_US
         self._begun = False
         spec = cis.spec
         self._files = ExposureFiles(

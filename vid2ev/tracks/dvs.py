@@ -22,6 +22,7 @@ from vid2ev.recording.probe import HEADER, Probe, plot
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks import NEVER_US
 from vid2ev.tracks.outputs import Outputs
 from vid2ev.views.on_disk import KINDS
 
@@ -53,7 +54,7 @@ class DvsTrack:
         probed: Callable[[], Iterator[bytes]] | None = None,
     ):
         self.dvs, self.folder, self.outputs = dvs, folder, outputs
-        self.last_us = 0
+        self.last_us = NEVER_US
         self._within, self._pictures, self._probed = within, pictures, probed
         self._columns = EventColumns(folder, within, dvs.labels)
         self._film = Preview(dvs.size, folder.partial / within, wanted=outputs.preview, rate=rate)
