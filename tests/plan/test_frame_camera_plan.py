@@ -117,6 +117,21 @@ def test_light_beyond_the_range_makes_no_bound_loose(use: str, electrons: dict) 
     assert said.levels.most <= 10 * max(most, FINE * math.sqrt(0.01 / 12))
 
 
+@pytest.mark.parametrize("name", ["phone", "rolling-shutter"])
+@pytest.mark.parametrize("noise", [{}, {"shot_noise": False}, {"shot_noise": False, "read_noise_e": 0.0}])
+def test_a_well_that_is_full_near_white_changes_what_is_left_to_white(name: str, noise: dict) -> None:
+    """However bright: of lamps, and of much that is a little darker and a little brighter than the well."""
+    spec = load_cis(name, ["cis.colour=false"]).model_copy(update=noise)
+    full = spec.full_well_e / (spec.white_e * spec.exposure_gain)
+    ramp = np.linspace(0.9 * full, 1.1 * full, 40 * 30, dtype=np.float32).reshape(30, 40)
+    lamps = np.where(ramp > 1.05 * full, 50 * ramp, ramp)
+    light = [Frame(lamps, k * 10_000_000) for k in range(30)]
+    most, rms, said = changed(spec, "full_well", (40, 30), light)
+    assert most <= math.floor(said.levels.most) + 1
+    assert rms <= said.levels.rms + 1
+    assert said.levels.most <= 5 * max(most, 1)  # (read noise of 10^12 values, of which these are a few thousand)
+
+
 @pytest.mark.parametrize("name", cis_names())
 @pytest.mark.parametrize("tolerance", [0.0, 0.01, 1.0])
 def test_auto_keeps_within_the_tolerance(name: str, tolerance: float) -> None:

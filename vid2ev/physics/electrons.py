@@ -104,7 +104,8 @@ def omission_of_shot_noise(seen: Exposed, spec: Any) -> LevelChange:
 def omission_of_full_well(seen: Exposed, spec: Any) -> LevelChange:
     """The full well w; `changes` has what of the light it does not hold.
 
-    With shot noise (n - w)+ <= (mu - w)+ + |n - mu|, and it is 0 but for the share of values that are near w.
+    With shot noise (n - w)+ <= (mu - w)+ + |n - mu|, and it is 0 but for the share of values that are near w.  However
+    much there is, levels go on from that of w to white only.
     """
     beyond = seen.changes["full_well"].times(spec.white_e * spec.exposure_gain)
     electrons = _electrons(seen.lit_max, spec)
@@ -112,8 +113,11 @@ def omission_of_full_well(seen: Exposed, spec: Any) -> LevelChange:
         reach = poisson_most(electrons, seen.draws)
         shot = surely_square(electrons * beyond.near, reach, seen.draws)
         most = max(electrons + reach - spec.full_well_e, beyond.most)
-        beyond = Change(most, (beyond.rms + shot.rms) ** 2)
-    kind = "99.9 % bound" if spec.shot_noise else "bound"
+        beyond = Change(most, (beyond.rms + shot.rms) ** 2, beyond.near)
+    to_white_e = max(_range_e(spec)[1] - spec.full_well_e + _fixed_e(spec), 0.0)
+    random = spec.shot_noise or (spec.read_noise_e > 0 and to_white_e < beyond.most)
+    beyond = Change(min(beyond.most, to_white_e), min(beyond.square, beyond.near * to_white_e**2))
+    kind = "99.9 % bound" if random else "bound"
     why = f"the well holds {spec.full_well_e:g}, the brightest light that is not clipped is {electrons:.3g} electrons"
     return level_change(beyond.times(lsb_per_electron(spec)), kind, why)
 
@@ -128,9 +132,8 @@ def omission_of_read_noise(seen: Exposed, spec: Any) -> LevelChange:
 def always_clipped(spec: Any) -> tuple[float, float]:
     """The light below which all levels are clipped to black, and that above which all are to white, whatever noise and
     fixed pattern do; but for one of 10^12 values."""
-    e, black_e = spec.white_e * spec.exposure_gain, spec.min_illuminance / WHITE * spec.white_e
-    white_e = black_e + ((1 << spec.bits) - 1) / lsb_per_electron(spec)
-    fixed_e = spec.read_noise_e * normal_most(10**12) + LIMIT * spec.dsnu
+    e, fixed_e = spec.white_e * spec.exposure_gain, _fixed_e(spec)
+    black_e, white_e = _range_e(spec)
 
     def reach_e(mean: float) -> float:
         return fixed_e + (poisson_most(mean, 10**12) if spec.shot_noise else 0.0)
@@ -141,6 +144,17 @@ def always_clipped(spec: Any) -> tuple[float, float]:
     least = least_gain(spec)
     dark = max(black_e - reach_e(black_e), 0.0) / (e * greatest_gain(spec))
     return dark, bright_e * (1 + 1e-9) / (e * least) if least > 0 else math.inf
+
+
+def _range_e(spec: Any) -> tuple[float, float]:
+    """The electrons of the first code and of the last."""
+    black_e = spec.min_illuminance / WHITE * spec.white_e
+    return black_e, black_e + ((1 << spec.bits) - 1) / lsb_per_electron(spec)
+
+
+def _fixed_e(spec: Any) -> float:
+    """What read noise and dark signal add to a pixel, or take from it, at most [electrons]; but for one of 10^12."""
+    return float(spec.read_noise_e * normal_most(10**12) + LIMIT * spec.dsnu)
 
 
 def near_full_well(spec: Any) -> float:
