@@ -12,7 +12,16 @@ import pytest
 from recordings import all_events, assert_same, dense, events_of, recording_of, written
 
 from vid2ev.errors import DataError
-from vid2ev.formats import FORMATS, describe_events, format_named, open_events, prophesee, read_events, recognise
+from vid2ev.formats import (
+    FORMATS,
+    describe_events,
+    format_named,
+    npy_arrays,
+    open_events,
+    prophesee,
+    read_events,
+    recognise,
+)
 from vid2ev.formats.event_file import EventFile
 from vid2ev.formats.sequential import Unwrapped, pieces
 from vid2ev.stream.events import Events
@@ -180,6 +189,15 @@ def test_times_of_dat_start_anew_and_may_go_back(tmp_path: Path) -> None:
     file = opened(tmp_path, content + b"abc", "dat")
     assert rows(file) == [(5, 0, 0, 1), (3, 2, 0, 0), (2**32 - 1, 0, 3, 0), (2**32, 4, 0, 0)]
     assert file.warnings == ["3 bytes at the end, where the file is cut within an event, are left out"]
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.25])
+def test_seconds_are_seconds_though_the_first_ones_are_whole(tmp_path: Path, first_s: float) -> None:
+    t_s = np.concatenate([np.full(npy_arrays.PART, first_s), [0.5, 1.0]])
+    none = np.zeros(len(t_s), np.uint8)
+    np.savez(tmp_path / "seconds.npz", t=t_s, x=none, y=none, p=none)
+    t_us = Events.concatenate(read_events(tmp_path / "seconds.npz")).t
+    assert t_us[0] == 1e6 * first_s and t_us[-2:].tolist() == [500_000, 1_000_000]
 
 
 @pytest.mark.parametrize("kind", [1, 2])

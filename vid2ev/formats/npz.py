@@ -17,7 +17,7 @@ Times that are fractions are seconds.  Source: https://numpy.org/doc/stable/refe
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -69,23 +69,30 @@ class NpzEvents(Sequential):
             count = min(len(array) for array in files.values())
             if any(len(array) != count for array in files.values()):
                 raise DataError(f"{self.path} is damaged: its arrays t, x, y, p differ in length; get another copy")
-            outside, scale = 0, 0
-            step = min(PART, *(max(MOST_OF_A_PART // array.row_bytes, 1) for array in files.values()))
+            outside, scale = 0, self._scale()
+            step = _at_a_time(files.values())
             for at in range(0, count, step):
                 parts = {key: array.read(min(step, count - at)) for key, array in files.items()}
                 column = {name: _take(parts[id(array)], key) for name, (array, key) in columns.items()}
-                scale = scale or self._scale(column["t"])
                 events, left = self._inside(self._events(column, scale))
                 outside += left
                 yield events
         self._leave_out(outside, f"{self._outside} are")
 
-    def _scale(self, t: np.ndarray) -> int:
-        """Microseconds in the unit of time."""
-        if t.dtype.kind != "f" or np.array_equal(t, np.rint(t)):
-            return 1
-        self.warnings += ["times are fractions; they are taken for seconds"] if not self.warnings else []
-        return 1_000_000
+    def _scale(self) -> int:
+        """Microseconds in the unit of time, of all times: the first ones may be whole seconds."""
+        with self._opened() as arrays:
+            array, key = (_columns(arrays) or {})["t"]
+            if (array.dtype[key] if isinstance(key, str) else array.dtype).kind != "f":
+                return 1
+            step = _at_a_time([array])
+            for at in range(0, len(array), step):
+                t = _take(array.read(min(step, len(array) - at)), key)
+                if not np.array_equal(t, np.rint(t)):
+                    said = "times are fractions; they are taken for seconds"
+                    self.warnings += [said] if said not in self.warnings else []
+                    return 1_000_000
+        return 1
 
     def _events(self, column: dict[str, np.ndarray], scale: int) -> Events:
         t = column["t"]
@@ -155,6 +162,11 @@ def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
         found = {name: (table, (slice(None), column)) for column, name in enumerate("txyp")}
     kinds = [(array.dtype[key] if isinstance(key, str) else array.dtype).kind for array, key in found.values()]
     return found if set("txyp") <= set(found) and all(kind in "iufb" for kind in kinds) else None
+
+
+def _at_a_time(arrays: Iterable[Array]) -> int:
+    """How many rows of arrays are read together."""
+    return min(PART, *(max(MOST_OF_A_PART // array.row_bytes, 1) for array in arrays))
 
 
 def _take(part: np.ndarray, key: Any) -> np.ndarray:
