@@ -51,7 +51,8 @@ def test_a_file_out_of_order_is_taken_with_a_warning(tmp_path: Path) -> None:
     t = [5, 3, 8, 8, 7, 20]
     lines = ["t,x,y,p", *(f"{at},{k},0,1" for k, at in enumerate(t)), ""]
     (tmp_path / "events.csv").write_text("\n".join(lines))
-    assert describe_events(tmp_path / "events.csv")["times_going_back"] == 2
+    found = describe_events(tmp_path / "events.csv")
+    assert (found["times_going_back"], found["first_us"], found["last_us"]) == (2, 3, 20)
     file = open_events(tmp_path / "events.csv")
     recording = survey(file)
     events = Events.concatenate(recording.blocks())

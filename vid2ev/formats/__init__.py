@@ -88,18 +88,18 @@ def read_events(
 
 
 def describe_events(path: str | Path) -> dict[str, Any]:
-    """What is in an event file: format, counts, times [us], size [pixels] where it is stated.  Raises as `read_events`
-    does."""
+    """What is in an event file: format, counts, the earliest and the latest time [us], size [pixels] where it is
+    stated.  Raises as `read_events` does."""
     kind, file = _opened(path)
     count, on, disorder = 0, 0, Disorder()
-    first = last = None
+    first: int | None = None
     for events in file.events():
         if not len(events):
             continue
         disorder.add(events.t)
         count, on = count + len(events), on + int(np.count_nonzero(events.p))
-        first = int(events.t[0]) if first is None else first
-        last = int(events.t[-1])
+        earliest = int(events.t.min())
+        first = earliest if first is None else min(first, earliest)
     return {
         "kind": "events",
         "format": kind.name,
@@ -110,7 +110,7 @@ def describe_events(path: str | Path) -> dict[str, Any]:
         "off": count - on,
         "start_us": file.start_us,
         "first_us": first,
-        "last_us": last,
+        "last_us": disorder.latest_us,
         "times_going_back": disorder.places,
         "labels": file.labelled,
         "frames": file.has_frames,
