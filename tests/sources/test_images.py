@@ -55,7 +55,7 @@ def test_codes_of_a_sensor_in_16_bits_are_light_where_their_bits_are_said(tmp_pa
 
 def test_bits_that_codes_cannot_have_are_refused(tmp_path: Path) -> None:
     write(tmp_path, ["0.png"])
-    for transfer in ("linear:10bit", "linear:0bit", "linear:17bit", "linear:manybit", "x:10bit"):
+    for transfer in ("linear:10bit", "linear:0bit", "linear:17bit", "linear:manybit", "linear:0_8bit", "x:10bit"):
         with pytest.raises(UsageError, match=r"bit|transfer 'x'"):
             open_source(tmp_path, fps=1, transfer=transfer)
 

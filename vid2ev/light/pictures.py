@@ -97,7 +97,7 @@ def with_bits(transfer: str) -> tuple[str, int | None]:
     if not colon or not said.endswith(UNIT):
         return transfer, None
     try:
-        return name, bits_of(int(said.removesuffix(UNIT)))
+        return name, bits_of(int(number) if (number := said.removesuffix(UNIT)).isdecimal() else number)
     except ValueError:
         raise UsageError(f"transfer '{transfer}': expected 1 to {MOST} bits, such as linear:10{UNIT}") from None
 
