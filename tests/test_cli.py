@@ -130,6 +130,18 @@ def test_a_dry_run_says_all_and_does_nothing() -> None:
     refused(2, "threshold_onn", "convert", CLIP, "--dry-run", "--set", "threshold_onn=1")
 
 
+@pytest.mark.parametrize("more", [[], ["--frames", "--cis-out", "png"], ["--format", "csv", "--frames-out", "npz"]])
+def test_a_dry_run_names_the_files_that_are_made(more: list[str]) -> None:
+    arguments = ["convert", CLIP, "-o", "out", "--truth", "poses", *QUICK, *more]
+    line = next(line for line in vid2ev(*arguments, "--dry-run").stdout.splitlines() if line.startswith("output"))
+    assert vid2ev(*arguments, "-q").exit_code == 0
+    folders = [folder for folder in Path("out").iterdir() if (folder / "manifest.json").exists()]
+    made = [*Path("out").iterdir(), *(file for folder in folders for file in folder.iterdir())]
+    assert set(line.partition("out: ")[2].split(", ")) == {
+        file.relative_to("out").as_posix() for file in made if file not in folders
+    }
+
+
 def test_verbose_says_before_what_it_does() -> None:
     result = vid2ev("convert", CLIP, "-o", "out", "-v", *QUICK)
     assert result.stdout.index("effects") < result.stdout.index("took")

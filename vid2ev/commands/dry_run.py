@@ -35,7 +35,9 @@ def planned(
     conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
-    files = [f"{mount.within}{name}" for mount in recipe.mounts for name in outputs.names(mount.kind)]
+    truth = ["truth"] * (recipe.truth is not None)
+    files = [f"{mount.within}{name}" for mount in recipe.mounts for name in [*outputs.names(mount.kind), *truth]]
+    files += [] if recipe.alone else ["rig.toml", "manifest.json"]
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
     facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
     text = lines([*facts, *([("threads", str(threads))] if threads else [])])
