@@ -16,8 +16,10 @@ import av
 import numpy as np
 import pytest
 
+from vid2ev import convert
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import live, open_source
+from vid2ev.tracks.recorder import Progress
 
 ROOT = Path(__file__).parents[2]
 
@@ -94,6 +96,26 @@ def test_y4m(pipe) -> None:
     steps = np.unique(np.round([frame.light.mean() for frame in frames], 5))
     assert steps.size == 7
     assert source.describe() == about
+
+
+def test_of_a_conversion_that_cannot_be_taken_up_nothing_is_left(pipe, tmp_path: Path) -> None:
+    """Nobody can go on with what passes once, wherever it is interrupted; and the next one finds the place free."""
+    options = {"upsample": "none", "threads": 1, "preview": False}
+
+    def interrupted(_: object, done: Progress) -> None:
+        if done.frames == 5:
+            raise KeyboardInterrupt
+
+    pipe(y4m(noise(7)))
+    with pytest.raises(KeyboardInterrupt):
+        convert("-", tmp_path / "out", "ideal", piece=1, report=interrupted, **options)
+    assert not [*tmp_path.iterdir()]
+    pipe(y4m(noise(7)))
+    manifest = convert("-", tmp_path / "out", "ideal", piece=1, **options)
+    pipe(y4m(noise(7)))
+    assert convert("-", tmp_path / "whole", "ideal", **options)["counts"] == manifest["counts"]
+    made, whole = (tmp_path / name / "events.h5" for name in ("out", "whole"))
+    assert made.read_bytes() == whole.read_bytes() and {*tmp_path.iterdir()} == {made.parent, whole.parent}
 
 
 def test_a_second_time_is_refused(pipe) -> None:

@@ -170,14 +170,16 @@ class Recorder:
         self.checkpoint()
 
     def checkpoint(self) -> None:
-        """Make this the point from which an interrupted recording goes on."""
+        """Make this the point from which an interrupted recording goes on; one of a source that passes once cannot, so
+        that nothing of it is to be left."""
         state: dict[str, np.ndarray] = {}
         with self.folder.writing():
             for mount, track in zip(self.recipe.mounts, self.tracks, strict=True):
                 track.close()
                 state |= {f"track{mount.number}.{name}": array for name, array in track.state().items()}
             self.done.events = sum(track.events for track in self.tracks)
-            self.folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(self.done)))})
+            if self.recipe.source.rewindable:
+                self.folder.checkpoint(state | {"progress": np.array(json.dumps(asdict(self.done)))})
 
     def give_up(self) -> None:
         """Make nothing more of this recording, and forget what was made."""
