@@ -132,13 +132,16 @@ def test_by_hand(encode, make_picture) -> None:
         np.testing.assert_allclose(frame.light, code_table(name, 8)[grey], rtol=1e-6)
 
 
-def test_ycgco_against_its_definition(encode, make_picture) -> None:
+@pytest.mark.parametrize("color_range", [FULL, LIMITED])
+def test_ycgco_against_its_definition(encode, make_picture, color_range: int) -> None:
+    """Which is one of codes, whatever their range (Rec. ITU-T H.273, 8.3)."""
     rng = np.random.default_rng(1)
     planes = [rng.integers(60, 190, (6, 8)).astype(np.uint8), *rng.integers(110, 146, (2, 6, 8)).astype(np.uint8)]
-    clip = [make_picture(planes, "yuv444p", colorspace=8, color_range=FULL)]
-    (frame,) = open_source(encode("a.mkv", clip, colorspace=8, color_range=FULL)).frames()
-    y, cg, co = planes[0] / 255, (planes[1] - 128.0) / 255, (planes[2] - 128.0) / 255
-    rgb = np.stack([y - cg + co, y + cg, y - cg - co], -1)
+    clip = [make_picture(planes, "yuv444p", colorspace=8, color_range=color_range)]
+    (frame,) = open_source(encode("a.mkv", clip, colorspace=8, color_range=color_range)).frames()
+    y, cg, co = planes[0].astype(float), planes[1] - 128.0, planes[2] - 128.0
+    codes = np.stack([y - cg + co, y + cg, y - cg - co], -1)
+    rgb = codes / 255 if color_range == FULL else (codes - 16) / 219
     exact = parse_transfer("bt709").to_light(rgb) @ np.array(WEIGHTS[1])
     np.testing.assert_allclose(frame.light, exact, atol=6e-7)
 

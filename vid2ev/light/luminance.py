@@ -9,7 +9,8 @@ before the channels are added, because luminance is a sum of light, not of codes
 in limited range) become light above 1; a channel that the matrix makes negative is black, and one that it makes larger
 than 1.25, which no camera means, is 1.25.
 
-Y'CgCo has R' = Y' - Cg + Co, G' = Y' + Cg, B' = Y' - Cg - Co instead.
+Y'CgCo has R' = Y' - Cg + Co, G' = Y' + Cg, B' = Y' - Cg - Co instead, of codes: in limited range red, green and blue
+have it, so that steps of Cg and Co are those of Y', a 219th, and not a 224th.
 
 Chroma of 4:2:0 and 4:2:2 is interpolated linearly, sited left in a row and centred between rows, which is what H.264
 and HEVC mean when they say nothing.  The curve is read from a table of 4096 steps per unit of signal and interpolated:
@@ -67,7 +68,7 @@ class Steps(NamedTuple):
         steps = round((table.size - 2) / TOP)
         unit = 2.0 ** (code.bits - 8)
         luma = 1 / (2**code.bits - 1) if code.full_range else 1 / (219 * unit)
-        chroma = 1 / (2**code.bits - 1) if code.full_range else 1 / (224 * unit)
+        chroma = luma if code.full_range or code.kr_kb is None else 1 / (224 * unit)
         black = 0.0 if code.full_range else 16 * unit
         per_cb, per_cr = _chroma_shares(code.kr_kb, chroma)
         return cls(
