@@ -6,9 +6,11 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -16,13 +18,14 @@ from footage_made import SIZE, pictures, write_film, write_hsergb
 from rows_read import TYPES, read_rows
 from scored import METHODS as METHODS_SCORED
 from scored import scored
+from skimage.metrics import structural_similarity
 
 from interp.commands.evaluate import evaluate as command
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.report.content import FROM_TRUTH
 from interp.evaluate.row import Row
 from interp.evaluate.rows import write_rows
-from interp.evaluate.scoring import conditions_of, rows_of, scores_of
+from interp.evaluate.scoring import conditions_of, contrast_of, rows_of, scores_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.tables import binned, edges_of, values
@@ -108,6 +111,62 @@ def test_motion_that_is_not_found_is_not_taken_for_none(changed: Callable[[np.nd
     group.keys[1] = changed(group.keys[0])
     found = conditions_of(group)
     assert all(math.isnan(found[name]) for name in ("motion_px", "motion_px_per_s", "blur_px"))
+
+
+def test_motion_of_most_of_a_picture_is_found() -> None:
+    """Three of eight pixels show another thing."""
+    group = moved(8)
+    group.keys[1, :, :48] = np.roll(group.keys[1], 37, axis=0)[:, ::-1][:, :48]
+    assert conditions_of(group)["motion_px"] == pytest.approx(8, abs=0.5)
+
+
+def test_motion_is_that_of_light_by_the_curve_of_the_codes() -> None:
+    """Codes of which light changes visibly by one curve, and by another does not."""
+    group = moved(8)
+    faint = replace(group, keys=(200 + group.keys // 51).astype(np.uint8))
+    assert conditions_of(replace(faint, curve="gamma:10"))["motion_px"] == pytest.approx(8, abs=0.5)
+    assert not conditions_of(faint)["motion_px"] > 0
+
+
+def test_events_are_counted_for_each_pixel_of_their_own_camera() -> None:
+    group = moved(8)
+    counts = EventCounts.none(1, (24, 32), 4)
+    counts.off_on[0, 0, 0], counts.off_on[0, 1, 3] = 1, 4
+    assert conditions_of(replace(group, events=counts))["events_per_px"] == 5
+
+
+def test_contrast_is_that_of_the_log_of_light_by_its_curve() -> None:
+    """Of a picture that is half of one code and half of another: half of what their logs are apart."""
+    true = np.full((4, 6, 3), 40, np.uint8)
+    true[:, :3] = 200
+    linear = {"srgb": lambda signal: ((signal + 0.055) / 1.055) ** 2.4, "gamma:2.2": lambda signal: signal**2.2}
+    for curve, light in linear.items():
+        expected = math.log((light(200 / 255) + 1e-3) / (light(40 / 255) + 1e-3)) / 2
+        assert contrast_of(true, curve) == pytest.approx(expected, rel=1e-5)
+        group = replace(moved(0), truth=true[None], keys=np.stack([true, true]), curve=curve)
+        none, one = (rows_of("seq", "m", group, [made], conditions_of(moved(0))) for made in (None, true))
+        assert none == [] and one[0].contrast == contrast_of(true, curve)
+        assert (one[0].position, one[0].t_us, one[0].multiple) == (1, 5_000, 2)
+
+
+def test_the_worst_window_and_the_whole_are_those_of_scikit_image() -> None:
+    """Windows of 99 x 99 pixels, of the squared error and of SSIM by a range of 255."""
+    draws = np.random.default_rng(4)
+    true = cv2.GaussianBlur(draws.integers(0, 256, (120, 150, 3)).astype(np.uint8), (0, 0), 1.5)
+    made = np.clip(true + draws.normal(0, 3, true.shape), 0, 255).round().astype(np.uint8)
+    made[70:, 100:] = np.clip(made[70:, 100:] + draws.normal(0, 30, (50, 50, 3)), 0, 255).astype(np.uint8)
+    found = scores_of(made, true, np.stack([true, true]))
+    options = {"data_range": 255, "channel_axis": -1, "gaussian_weights": True, "use_sample_covariance": False}
+    mean, plane = structural_similarity(true, made, full=True, **options)
+    squares = ((true.astype(float) - made) ** 2).mean(2)
+    errors, alike = (
+        np.lib.stride_tricks.sliding_window_view(each, (99, 99)).mean((2, 3))
+        for each in (squares, plane.mean(2)[5:-5, 5:-5])
+    )
+    assert found["ssim_255"] == pytest.approx(mean, abs=1e-9)
+    assert found["patch_ssim"] == pytest.approx(alike.min(), abs=1e-9) and alike.min() < mean - 0.01
+    assert found["patch_psnr"] == pytest.approx(10 * math.log10(255**2 / errors.max()), abs=1e-9)
+    assert (found["patch_y"], found["patch_x"]) == np.unravel_index(errors.argmax(), errors.shape) == (21, 51)
 
 
 def test_moving_pixels_and_the_worst_window_are_scored_apart() -> None:

@@ -179,12 +179,22 @@ def test_a_film_that_plays_frames_evenly_which_are_not_says_so(tmp_path: Path, u
         assert any("17 to 33 ms apart" in text for text in told["remarks"]) == (uneven and output == "a.mp4")
 
 
-@pytest.mark.parametrize(("times_ms", "even"), [([0, 17, 33, 50], True), ([0, 8, 17, 25], True), ([0, 1, 3, 4], False)])
-def test_frames_at_a_constant_rate_whose_file_counts_milliseconds_are_even(
-    tmp_path: Path, times_ms: list[int], even: bool
+@pytest.mark.parametrize(
+    ("times_us", "even"),
+    [
+        ([0, 17_000, 33_000, 50_000], True),
+        ([0, 8_000, 17_000, 25_000], True),
+        ([0, 1_000, 3_000, 4_000], False),
+        ([0, 16_000, 34_000, 50_000], False),  # (more than rounding makes)
+        ([0, 10_000, 20_900, 30_900], False),  # (as little, but not of whole milliseconds)
+        ([0, 10_000, 20_400, 30_400], True),  # (by less than a twentieth)
+    ],
+)
+def test_frames_at_a_constant_rate_whose_file_rounds_times_are_even(
+    tmp_path: Path, times_us: list[int], even: bool
 ) -> None:
     source = images(tmp_path / "in", moving(4))
-    (source / "timestamps.txt").write_text("# us\n" + "".join(f"{t}000\n" for t in times_ms))
+    (source / "timestamps.txt").write_text("# us\n" + "".join(f"{t}\n" for t in times_us))
     told = interpolate(source, tmp_path / "film.mp4", multiple=2, method="linear")
     assert any("ms apart" in text for text in told["remarks"]) != even
 

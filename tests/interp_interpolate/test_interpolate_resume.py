@@ -102,6 +102,15 @@ def test_a_film_goes_on_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Mo
     assert not partial.exists()
 
 
+def test_a_film_has_its_last_frame_though_all_others_are_in_pieces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pieces of eight frames, and the last key frame alone."""
+    monkeypatch.setattr(shelf, "PIECE", 7)
+    told = interpolate(images(tmp_path / "in", moving(3)), tmp_path / "film.mp4", multiple=4, method="linear")
+    assert told["frames"] == len(decoded(tmp_path / "film.mp4")) == 9
+
+
 def test_what_was_cut_off_in_writing_does_not_count(tmp_path: Path) -> None:
     source = recording(tmp_path / "in", moving(6))
     interpolate(source, tmp_path / "once", multiple=3)

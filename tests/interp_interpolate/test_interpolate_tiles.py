@@ -64,7 +64,9 @@ def test_the_outer_quarters_of_an_overlap_do_not_count_and_between_them_weights_
 
 
 def test_small_frames_are_not_divided_and_large_ones_into_tiles_that_fit() -> None:
-    assert len(parse_tiling("auto", (1280, 800), 32)) == 1
+    for size in ((1280, 800), (2048, 512), (512, 2048)):  # (of up to a million pixels, whatever their shape)
+        assert len(parse_tiling("auto", size, 32)) == 1
+    assert len(parse_tiling("auto", (2050, 512), 32)) > 1
     for size in ((1920, 1080), (3840, 2160), (1025, 4000)):
         tiling = parse_tiling("auto", size, 32)
         assert len(tiling) > 1
