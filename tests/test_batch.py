@@ -12,7 +12,9 @@ from click.testing import CliRunner, Result
 
 from vid2ev import Events, read_events
 from vid2ev.commands import batch, main
+from vid2ev.formats.event_file import Recording
 from vid2ev.sources import many
+from vid2ev.tracks.outputs import write_frame_index
 
 QUICK = ["--upsample", "none", "--threads", "1", "--fps", "100", "--no-preview"]
 
@@ -147,6 +149,13 @@ def test_other_formats_have_an_index_of_frames_beside_them() -> None:
     t = Events.concatenate(read_events("out")).t
     assert index[:, 0].tolist() == [0, 10_000, 20_000, 30_000]
     assert index[:, 1].tolist() == [np.count_nonzero(t <= at) for at in index[:, 0]]
+    events = Events(t, *(np.zeros(len(t), kind) for kind in (np.uint16, np.uint16, np.uint8)))
+    blocks = [events.stretch(first, min(first + 3, len(t))) for first in range(0, len(t), 3)]
+    recording = Recording((8, 6), 0, 30_000, len(t), lambda: iter(blocks), frame_us=index[:, 0].copy())
+    write_frame_index(Path("again.csv"), recording)
+    assert len(blocks) > 3 and Path("again.csv").read_bytes() == Path("out/frame_index.csv").read_bytes()
+    assert vid2ev("clips/a9.npy", "-o", "both", "--format", "hdf5,csv").exit_code == 0
+    assert not Path("both/frame_index.csv").exists()  # (which is in events.h5)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +163,7 @@ def test_other_formats_have_an_index_of_frames_beside_them() -> None:
     [
         (["--format", "mp3"], "expected one of"),
         (["--format", "es"], "cannot be written"),
+        (["--frames-by", "source"], "expected frames to write; add --frames-out"),
         (["--frames-out", "npz", "--frames-by", "week:1"], "expected duration:10ms"),
         (["--frames-out", "npz", "--frames-as", "cubist"], "expected counts"),
         (["--probe", "8,0"], "expected a pixel of a sensor of 8x6"),

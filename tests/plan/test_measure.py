@@ -52,6 +52,7 @@ def test_extremes_and_times_are_those_of_all_pixels() -> None:
         assert scene.light_min[tile] == light[:, part].min() and scene.light_max[tile] == light[:, part].max()
         assert scene.slope_max[tile] == pytest.approx(steepest[part].max(), rel=1e-4)
     assert scene.seconds == pytest.approx(t_s[-1] - t_s[0]) and scene.frames == len(frames)
+    assert scene.shortest_s == pytest.approx(np.diff(t_s).min()) and np.diff(t_s)[-1] > 1.5 * scene.shortest_s
     assert scene.pushed_s.sum() <= scene.seconds * scene.pixels
 
 

@@ -165,6 +165,10 @@ def test_the_most_steps_are_kept_to_and_counted() -> None:
     interval = upsampler.between(Frame(before, 0), Frame(after, INTERVAL_NS))
     assert len(list(interval)) == 5 and interval.limited
     assert not upsampler.between(Frame(before, 0), Frame(before, INTERVAL_NS)).limited
+    ends = Frame(before, 0), Frame(after, INTERVAL_NS)
+    asked = len(list(FlowUpsampling("auto", 1000).between(*ends)))
+    assert [FlowUpsampling("auto", asked - k).between(*ends).limited for k in (0, 1)] == [False, True]
+    assert not FlowUpsampling(3, 2).between(*ends).limited  # (which is what was asked for)
 
 
 def test_what_a_thing_has_just_passed_is_not_said_to_be_still() -> None:
@@ -284,6 +288,16 @@ def test_motion_goes_as_far_in_the_frame_as_on_its_grid(shape: tuple[int, int]) 
     x, y, _ = Moving(Motion(flow, -flow, sure, sure, 2.0, 1.0), shape).at(F(0.5))
     np.testing.assert_allclose(x[6:-6, 6:-6], shape[1] / columns, rtol=1e-4)
     np.testing.assert_allclose(y[6:-6, 6:-6], -0.5 * shape[0] / rows, rtol=1e-4)
+
+
+@pytest.mark.parametrize("time", [0.25, 0.5, 0.75])
+def test_what_grows_is_seen_by_both_frames_though_its_pixels_are_thrown_apart(time: float) -> None:
+    """Nearer by a factor of 1.6 everywhere: pixels of the frame before become fewer, those of the one after more."""
+    place = np.stack(np.meshgrid(np.arange(60) - 29.5, np.arange(40) - 19.5), axis=-1).astype(F)
+    sure = np.ones((40, 60), F)
+    moving = Moving(Motion(F(0.6) * place, F(-0.6 / 1.6) * place, sure, sure, 40.0, 1.0), (80, 120))
+    share = moving.at(F(time))[2][30 - moving.top : 50 - moving.top, 50 - moving.left : 70 - moving.left]
+    np.testing.assert_allclose(share, 1 - time, atol=0.04)
 
 
 @pytest.mark.parametrize("time", [0.25, 0.5, 0.75])
