@@ -23,7 +23,7 @@ def clip(frames: int = 20, shape=(6, 9)) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("late_ns", [3 * HOUR_NS, 30 * 24 * HOUR_NS, 292 * 365 * 24 * HOUR_NS])
-@pytest.mark.parametrize("spec", [DvsSpec(), clean(), TRACKING])
+@pytest.mark.parametrize("spec", [DvsSpec(), clean(), pytest.param(TRACKING, marks=pytest.mark.long)])
 def test_a_clip_that_starts_late_has_the_same_events_later(spec, late_ns):
     """First frame at 3 h, 30 days, 292 years (int64's end): bit for bit those of a clip at 0, shifted."""
     t_ns, light = clip()

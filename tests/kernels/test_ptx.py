@@ -109,7 +109,9 @@ def strictly(flags: Flags, kernel: str) -> str:
         return ptx_of(flags, kernel)
 
 
-@pytest.mark.parametrize("kernel", ["glance", "walk", "settle", "undo", "propose"])
+@pytest.mark.parametrize(
+    "kernel", ["glance", pytest.param("walk", marks=pytest.mark.long), "settle", "undo", "propose"]
+)
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SENSORS]
 )

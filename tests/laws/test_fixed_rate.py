@@ -150,6 +150,7 @@ def test_free_running_holds_nothing_back():
     assert len(dvs.flush()) == 0
 
 
+@pytest.mark.long
 def test_a_static_scene_with_noise_still_sends_one_event_per_frame_at_most():
     """Hot pixels at 50 kHz in a 1 kHz camera: each sends in every event frame, once."""
     t_ns = np.arange(0, 100_000_001, 10_000_000)

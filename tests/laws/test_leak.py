@@ -26,7 +26,12 @@ def crossings(signal: np.ndarray) -> list[tuple[int, int]]:
 
 @pytest.mark.parametrize(
     ("order", "tau_s", "log_curve"),
-    [("before", 0.0, "offset"), ("before", TAU_S, "offset"), ("before", TAU_S, "toe"), ("after", TAU_S, "offset")],
+    [
+        ("before", 0.0, "offset"),
+        ("before", TAU_S, "offset"),
+        pytest.param("before", TAU_S, "toe", marks=pytest.mark.long),
+        pytest.param("after", TAU_S, "offset", marks=pytest.mark.long),
+    ],
 )
 def test_a_leak_that_falling_light_overtakes(order, tau_s, log_curve):
     """Light falls along a line and takes the signal back to about where it was, but the leak has lifted it meanwhile.
@@ -57,7 +62,14 @@ def test_a_leak_that_falling_light_overtakes(order, tau_s, log_curve):
     np.testing.assert_allclose(sent.t, 1e6 * t_s[[i for i, _ in expected]], atol=1.0)
 
 
-@pytest.mark.parametrize(("order", "follower_us"), [("after", 0.0), ("after", 200.0), ("before", 0.0)])
+@pytest.mark.parametrize(
+    ("order", "follower_us"),
+    [
+        pytest.param("after", 0.0, marks=pytest.mark.long),
+        pytest.param("after", 200.0, marks=pytest.mark.long),
+        ("before", 0.0),
+    ],
+)
 def test_a_dip_that_the_leak_makes_up_for_before_the_next_frame(order, follower_us):
     """Light that was falling rises: the signal falls on for a while, and the leak has lifted it beyond where it was by
     the next frame.  The same light in fifty steps has the same events."""

@@ -54,6 +54,7 @@ def test_bandwidth_follows_the_light_after_a_step(level, order):
     assert judge_clip(pixel, t_ns, light, sent).events == len(sent) >= 9
 
 
+@pytest.mark.long
 @orders
 def test_bandwidth_follows_light_that_moves(order):
     """A sine of the light in frames of 50 us against Heun steps of 1 us of both poles' equations."""

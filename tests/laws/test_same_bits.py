@@ -251,7 +251,9 @@ def test_threads_beyond_the_pixels_are_fine():
     assert isinstance(Dvs(clean(), (1, 1), threads=64), Dvs)
 
 
-@pytest.mark.parametrize("name", ["default", "clean", "everything", "after, tracking"])
+@pytest.mark.parametrize(
+    "name", ["default", "clean", "everything", pytest.param("after, tracking", marks=pytest.mark.long)]
+)
 def test_after_a_restart_a_sensor_owes_nothing_to_what_was_before(name: str) -> None:
     _, (first, second, third) = clip(3)
     old, new = (start(SENSORS[name], first, seed=3, origin_ns=0) for _ in range(2))

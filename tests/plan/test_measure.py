@@ -243,6 +243,7 @@ def test_no_number_of_any_light_is_negative_or_none(curve: str, more: dict[str, 
             assert np.isfinite(value).all() and (value >= 0).all(), name
 
 
+@pytest.mark.long
 def test_memories_that_jump_have_the_fewer_events() -> None:
     """Travel is the threshold times the events of a pixel that is blind in between, too."""
     frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 400_000_000, 1_000_000)]

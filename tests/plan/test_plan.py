@@ -389,6 +389,7 @@ def test_pixels_that_are_blind_may_be_set_to_the_other_half_of_a_flicker(timing:
     held(spec, (32, 24), frames, "shot")
 
 
+@pytest.mark.long
 def test_events_that_hot_pixels_do_not_send_of_light_are_as_dense_as_these() -> None:
     spec = clean(random_phase=True, hot_probability=0.1, hot_rate_hz=1.0, threshold_on=0.1, threshold_off=0.1)
     held(spec, (32, 24), flashing(3.0, 200_000, 200), "hot")
@@ -432,6 +433,7 @@ def test_where_signals_are_several_levels_apart_their_number_counts_squared(
     held(spec, (48, 32), frames, "follower", "photoreceptor", *["mismatch"] * (mismatch > 0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dt_us", [30, 100, 300, 1000])
 @pytest.mark.parametrize("taus_us", [(300.0, 100.0), (0.0, 18.0), (40.0, 0.0)])
 def test_shots_that_end_before_the_poles_have_answered(dt_us: int, taus_us: tuple[float, float]) -> None:
