@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vid2ev import Dvs, load_sensor
 from vid2ev.errors import UsageError
+from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
 from vid2ev.upsample import METHODS, make_upsampler
 
@@ -21,6 +23,11 @@ def two_frames(shape: tuple[int, int] = (48, 64), shift: int = 2, length_ns: int
     texture = (texture - texture.min()) / np.ptp(texture) + np.float32(0.02)
     before, after = texture[:, shift:], texture[:, : shape[1]]
     return Frame(before.copy(), 10**9), Frame(after.copy(), 10**9 + length_ns)
+
+
+def in_colours(*frames: Frame) -> list[Frame]:
+    """Grey frames in red, green and blue."""
+    return [replace(frame, light=np.stack([frame.light] * 3, axis=-1)) for frame in frames]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -76,6 +83,26 @@ def test_frames_that_are_not_finite_do_not_stop_it(method: str) -> None:
     assert list(make_upsampler(method, 3).between(a, b))[-1].light is b.light
 
 
+@pytest.mark.parametrize("colours", [False, True])
+@pytest.mark.parametrize("odd", [np.inf, -np.inf, np.nan, 3e38])
+@pytest.mark.parametrize("method", METHODS)
+def test_steady_light_that_is_none_is_steady_in_between(method: str, odd: float, colours: bool) -> None:
+    """A pixel that is infinite in both frames sends nothing, beside a texture that moves; it is counted, whether a
+    sensor looks at what it is told to be still or not."""
+    a, b = two_frames((96, 128))
+    for frame in (a, b):
+        frame.light[60:, :] = 0.3
+        frame.light[90, 100] = odd
+    sent = []
+    for skip in (True, False):
+        dvs = Dvs(load_sensor("ideal"), (128, 96), skip=skip)
+        frames = [a, *make_upsampler(method, 8).between(*(in_colours(a, b) if colours else (a, b)))]
+        events = Events.concatenate([dvs.see(replace(frame, light=frame.luminance)) for frame in frames])
+        assert len(events) > 1000 and not np.any((events.x == 100) & (events.y == 90))
+        sent.append((events.t, dvs.counts["not_finite"]))
+    assert np.array_equal(sent[0][0], sent[1][0]) and sent[0][1] == sent[1][1] >= 2
+
+
 @pytest.mark.parametrize("arguments", [
     ("slow",), ("flow", 0), ("linear", -3), ("flow", "auto", 0), ("flow", 2, 9, 0.0), ("flow", 2, 9, float("nan")),
 ])  # fmt: skip
@@ -91,7 +118,7 @@ def test_what_is_said_to_be_still_is(method: str, colours: bool) -> None:
     b.light[20:] = a.light[20:]
     b.light[66, 60], a.light[60, 0], b.light[60, 0] = np.nan, -1.0, -1.0
     if colours:
-        a, b = (replace(frame, light=np.stack([frame.light] * 3, axis=-1)) for frame in (a, b))
+        a, b = in_colours(a, b)
         b.light[50, 300, 1] += 0.1
     before = a
     for frame in make_upsampler(method, 4).between(a, b):

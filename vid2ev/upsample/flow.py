@@ -19,8 +19,9 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still, strip_count
 from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval, warp_tensors
+from vid2ev.upsample.mended import mended, mended_tensor
 from vid2ev.upsample.motion import SHRINK, Motion, MotionEstimator
-from vid2ev.upsample.proxies import finite
+from vid2ev.upsample.stillness import still_strips
 from vid2ev.upsample.subframes import instants, steps_for
 from vid2ev.upsample.warp import AFTER, BEFORE, carry, moving_of, settle, splat
 
@@ -124,10 +125,11 @@ class Moving:
 
 def carried(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int]) -> Iterator[Frame]:
     """The frames at instants between a and b, in order, and b."""
-    before, after = (list(map(with_margin, channels_of(frame.light))) for frame in (a, b))
+    lights = [mended(frame.light) for frame in (a, b)]
+    before, after = (list(map(with_margin, channels_of(light))) for light in lights)
     height, width = a.light.shape[:2]
     moving, last = Moving(motion, (height, width)), a.light
-    was_still = np.ones(strip_count(width, height), np.bool_)
+    was_still, is_light = (as_it_should_be(*each) for each in zip((a.light, b.light), lights, strict=True))
     for t_ns in times_ns:
         time = F((t_ns - a.t_ns) / (b.t_ns - a.t_ns))
         motion_there = moving.at(time)
@@ -139,12 +141,12 @@ def carried(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int]) -> Iter
         is_still = np.logical_and.reduce(still)
         yield Frame(light, t_ns, original=False, still=Still(last, is_still & was_still))
         last, was_still = light, is_still
-    yield b if last is a.light else replace(b, still=Still(last, was_still))
+    yield b if last is a.light else replace(b, still=Still(last, was_still & is_light))
 
 
 def carried_there(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int], upload: Upload) -> Iterator[Frame]:
     """`carried` on a device, some instants at a time: what goes there is the light of a and b, and the motion."""
-    before, after = (warp_tensors.with_margin(upload.light(frame.light)) for frame in (a, b))
+    before, after = (warp_tensors.with_margin(mended_tensor(upload.light(frame.light))) for frame in (a, b))
     forward, backward, sure_before, sure_after = map(upload.tensor, motion[:4])
     (height, width), (rows, columns) = a.light.shape[:2], motion.sure_before.shape
     some = max(1, AT_ONCE // (height * width))
@@ -162,6 +164,12 @@ def carried_there(a: Frame, b: Frame, motion: Motion, times_ns: Sequence[int], u
     yield upload.frame(b)
 
 
+def as_it_should_be(light: np.ndarray, mended_light: np.ndarray) -> np.ndarray:
+    """The strips of a frame that may be said to be still: not those that were mended, which a sensor has to count."""
+    height, width = light.shape[:2]
+    return np.ones(strip_count(width, height), np.bool_) if light is mended_light else still_strips(light, light)
+
+
 def channels_of(light: np.ndarray) -> list[np.ndarray]:
     """Luminance, or red, green and blue, each [H, W]."""
     return [light] if light.ndim == 2 else [np.ascontiguousarray(light[..., channel]) for channel in range(3)]
@@ -169,4 +177,4 @@ def channels_of(light: np.ndarray) -> list[np.ndarray]:
 
 def with_margin(light: np.ndarray) -> np.ndarray:
     """The image with its border repeated outwards, as `warp.carry` wants it."""
-    return cv2.copyMakeBorder(finite(light), BEFORE, AFTER, BEFORE, AFTER, cv2.BORDER_REPLICATE)
+    return cv2.copyMakeBorder(light, BEFORE, AFTER, BEFORE, AFTER, cv2.BORDER_REPLICATE)

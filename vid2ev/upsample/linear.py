@@ -11,6 +11,7 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import Still
 from vid2ev.stream.upload import Upload
 from vid2ev.upsample import Interval
+from vid2ev.upsample.mended import mended, mended_tensor
 from vid2ev.upsample.stillness import still_strips
 from vid2ev.upsample.subframes import instants
 
@@ -29,15 +30,15 @@ class LinearUpsampling:
 
     def _faded(self, a: Frame, b: Frame) -> Iterator[Frame]:
         last, still = a.light, still_strips(a.light, b.light)
+        before, after = mended(a.light), mended(b.light)
         for t_ns, share in self._shares(a, b):
-            with np.errstate(invalid="ignore"):  # (what is not finite is the sensor's to mend and to count)
-                light = a.light + np.float32(share) * (b.light - a.light)
+            light = before + np.float32(share) * (after - before)
             yield Frame(light, t_ns, original=False, still=Still(last, still))
             last = light
         yield replace(b, still=Still(last, still))
 
     def _faded_there(self, a: Frame, b: Frame, upload: Upload) -> Iterator[Frame]:
-        before, after = upload.light(a.light), upload.light(b.light)
+        before, after = (mended_tensor(upload.light(frame.light)) for frame in (a, b))
         for t_ns, share in self._shares(a, b):
             yield Frame(before + share * (after - before), t_ns, original=False)
         yield upload.frame(b)

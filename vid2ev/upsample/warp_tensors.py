@@ -114,10 +114,9 @@ def carry(before: Any, after: Any, motion: tuple[Any, Any, Any], time: Any) -> A
 
 
 def with_margin(light: Any) -> Any:
-    """Channels [C, H + 3, W + 3] of light [H, W] or [H, W, 3]: what is not finite is 0, and borders go on outwards."""
+    """Channels [C, H + 3, W + 3] of light [H, W] or [H, W, 3]: borders go on outwards."""
     import torch
 
-    light = torch.where(light.isfinite(), light, 0.0)
     channels = light[None] if light.ndim == 2 else light.movedim(-1, 0)
     return torch.nn.functional.pad(channels[None], (BEFORE, AFTER, BEFORE, AFTER), mode="replicate")[0].contiguous()
 
