@@ -9,6 +9,8 @@ import pytest
 
 from vid2ev.bounds.chances import _pixels, surely
 from vid2ev.bounds.scene import Scene
+from vid2ev.physics.mismatch import clipped, fill_thresholds
+from vid2ev.physics.thresholds import chances_below
 from vid2ev.sensors.spec import DvsSpec
 
 from .clips import clip
@@ -81,3 +83,18 @@ def test_busy_pixels_do_not_take_memory_for_each_of_their_events() -> None:
     exact = np.bincount(np.searchsorted(most, np.arange(100_000) + 2), np.arange(100_000), len(most))
     np.testing.assert_allclose(sent, exact)
     assert (np.diff(most) <= np.maximum(1, most[1:] / 300)).all()
+
+
+@pytest.mark.parametrize("mismatch", [0.0, 0.05])
+@pytest.mark.parametrize("noise", [0.03, 0.05, 0.15, 0.3])
+def test_thresholds_are_at_or_below_a_level_as_often_as_drawn_ones(noise: float, mismatch: float) -> None:
+    """Each pixel's as often as it meets them; all of them from the end of the clip on."""
+    theta, mean = np.empty((2000, 2), np.float32), 0.15
+    fill_thresholds(theta, np.uint64(1), 0, 0, mean, mean, max(mismatch, 1e-9))
+    pixels, draws = theta[:, 0].astype(np.float64), np.random.default_rng(2).standard_normal(500)
+    drawn = np.array([[clipped(pixel, noise, z) for z in draws] for pixel in pixels])
+    spec = DvsSpec(threshold_on=mean, threshold_off=mean, mismatch=mismatch, crossing_noise=noise)
+    for level in (0.01, 0.05, 0.1, 0.15, 0.2, 0.25, 0.28, 0.2851, 0.4, 0.7):
+        reference = np.average((drawn <= level).mean(axis=1), weights=1.0 / pixels)
+        assert chances_below(level, mean, spec)[0] == pytest.approx(reference, abs=0.06)
+    assert chances_below(1.91 * pixels.max(), mean, spec)[0] == 1.0

@@ -3,10 +3,13 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vid2ev.sensors.tiles import balanced
+from vid2ev import Dvs, load_sensor
+from vid2ev.errors import UsageError
+from vid2ev.sensors.tiles import Part, balanced
 
 
 @given(
@@ -40,3 +43,9 @@ def test_cuts_settle_where_tiles_take_as_long():
         cuts = balanced(cuts, [float(cost[first:last].sum()) for first, last in pairwise(cuts)])
     seconds = [cost[first:last].sum() for first, last in pairwise(cuts)]
     assert max(seconds) < 1.05 * min(seconds)
+
+
+@pytest.mark.parametrize("part", [Part(0, 5), Part(4, 5), Part(2, 2), Part(-1, 2), Part(0, 0)])
+def test_a_part_of_no_pixels_is_refused(part):
+    with pytest.raises(UsageError, match="expected one"):
+        Dvs(load_sensor("ideal"), (64, 64), part=part)  # (two blocks)

@@ -48,11 +48,11 @@ def chances_below(level: float, mean: float, spec: Any) -> tuple[float, float]:
     if level < 0.0:
         return 0.0, 0.0
     pixels = _limited(np.full(STEPS, mean), spec.mismatch, _deviates())
-    reached = level >= _limited(pixels, spec.crossing_noise, np.full(STEPS, -np.inf))
+    reached, passed = (level >= _limited(pixels, spec.crossing_noise, np.full(STEPS, end)) for end in (-np.inf, np.inf))
     chances = reached.astype(np.float64)
     if spec.crossing_noise > 0:
         normal = NormalDist()
-        for k in np.flatnonzero(reached):
+        for k in np.flatnonzero(reached & ~passed):
             chances[k] = normal.cdf((level - pixels[k]) / spec.crossing_noise)
     often = mean / pixels
     met = float((chances * often).sum())

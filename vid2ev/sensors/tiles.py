@@ -7,6 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
+from vid2ev.errors import UsageError
+
 R = TypeVar("R")
 
 
@@ -31,6 +33,8 @@ class Tiles:
     """
 
     def __init__(self, blocks: int, threads: int, part: Part = WHOLE):
+        if not 0 <= part.number < part.parts <= blocks:
+            raise UsageError(f"part {part.number} of {part.parts}: expected one from 0 on, of {blocks} at most")
         first, last = part.within(blocks)
         self.count = min(threads, last - first)
         self._cuts = [first + (last - first) * k // self.count for k in range(self.count + 1)]
