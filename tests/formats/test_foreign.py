@@ -123,12 +123,23 @@ def test_evt21_before_the_first_time_and_beyond_the_edge(tmp_path: Path) -> None
     assert [text[:27] for text in file.warnings] == ["2 events before the first t", "3 events outside of the 640"]
 
 
-@pytest.mark.parametrize("legacy", [False, True])
-def test_evt21(tmp_path: Path, legacy: bool) -> None:
+@pytest.mark.parametrize(
+    ("lines", "legacy"),
+    [
+        ("format EVT21;height=480;width=640", False),
+        ("format EVT21;endianness=legacy;height=480;width=640", True),
+        ("endianness legacy\n% format EVT21;height=480;width=640", True),
+        ("endianness legacy\n% format EVT21;height=480;width=640;endianness=little", False),
+        ("evt 2.1\n% geometry 640x480\n% system_ID 49\n% integrator_name Prophesee", True),  # 0x31, EVK3 of IMX636
+        ("evt 2.1\n% geometry 640x480\n% system_ID 64\n% integrator_name Prophesee", False),  # 0x40, EVK3 of GenX320
+        ("evt 2.1\n% geometry 640x480\n% system_ID 49\n% integrator_name Somebody", False),
+    ],
+)
+def test_evt21(tmp_path: Path, lines: str, legacy: bool) -> None:
+    """The halves of a word as OpenEB takes them (psee_raw_file_header.cpp, `check_header`)."""
     words = [0x8000_0001_0000_0000, 0x1 << 60 | 5 << 54 | 32 << 43 | 7 << 32 | 0x8000_0005]
     words = [word >> 32 | (word & 0xFFFFFFFF) << 32 for word in words] if legacy else words
-    head = f"% format EVT21;{'endianness=legacy;' if legacy else ''}height=480;width=640\n% end\n"
-    file = opened(tmp_path, raw("2.1", words, 64, head), "evt2")
+    file = opened(tmp_path, raw("2.1", words, 64, f"% {lines}\n% end\n"), "evt2")
     assert rows(file) == [(69, 32, 7, 1), (69, 34, 7, 1), (69, 63, 7, 1)]
     assert file.size == (640, 480)
 

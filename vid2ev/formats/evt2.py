@@ -6,7 +6,7 @@
     A  EXT_TRIGGER     F continued words   E others                passed over
 
 EVT 2.1, which is only read, has 32 more bits, one for each of the pixels from that column on; they come first, but
-last where the header says `endianness=legacy`.
+last where the byte order in the header is "legacy".
 
 The writer sends an EVT_TIME_HIGH wherever the events need one, and in silence one every 4.096 ms, as EVT 3 does: enough
 for Prophesee's decoder, which follows the new start of time only over gaps of less than 10 ms, and 1 kB per second of
@@ -37,7 +37,7 @@ class Evt2Events(RawEvents):
     def _vectors(self) -> Callable:
         from vid2ev.formats.evt2_words import decode_vectors
 
-        if "endianness=legacy" not in self._header.fields.get("format", ""):
+        if self._header.byte_order != "legacy":
             return decode_vectors
         half = np.uint64(32)
         return lambda state, left, start_us, words, *rest: decode_vectors(

@@ -3,6 +3,7 @@
     % evt 3.0                                 version of the words; absent in DAT files
     % format EVT3;height=720;width=1280       the same in newer files
     % geometry 1280x720                       (DAT files: Width, Height)
+    % endianness little                       order of the bytes of words; an option of the format, too
     % start_us 81000                          the instant from which times count, on the clock of the source
     % end                                     newer files only
 
@@ -28,6 +29,7 @@ from vid2ev.stream.events import Events
 
 WORDS = 1 << 18  # written at a time
 UNKNOWN_SIZE = (2048, 2048)  # all that the words can say
+MAKER, ORDERED_FROM = "Prophesee", 0x37  # the first of its systems that has the halves of 64 bits in their order
 
 
 class Header(NamedTuple):
@@ -50,6 +52,21 @@ class Header(NamedTuple):
         sides = found.groups() if found else [_number(rf"{side}=(\d{{1,5}})\b", both) for side in ("width", "height")]
         width, height = (int(side or 0) for side in sides)
         return (width, height) if width and height else None
+
+    @property
+    def byte_order(self) -> str:
+        """Of the words: "little", "big", or "legacy", of halves of 32 bits with the upper one first.
+
+        It is an option of the format, or a line of its own; of neither, Prophesee's own older systems are known by
+        their number, as its SDK knows them.
+        """
+        _, given, option = self.fields.get("format", "").partition("endianness=")
+        if given or "endianness" in self.fields:
+            return (option.partition(";")[0] if given else self.fields["endianness"]).lower()
+        makers = {self.fields.get(f"{part}integrator_name", MAKER) for part in ("", "plugin_", "camera_")}
+        system = self.fields.get("system_id", "")
+        number = int(system) if re.fullmatch(r"\d{1,5}", system) else ORDERED_FROM
+        return "legacy" if makers == {MAKER} and 0 < number < ORDERED_FROM else "little"
 
     @property
     def start_us(self) -> int | None:
@@ -86,7 +103,7 @@ class RawEvents(Sequential):
         self.size, self.start_us, self.says_start = header.size, header.start_us or 0, header.start_us is not None
         self._header = header
         dtype, self._decoder = kinds[header.version]
-        self._dtype = np.dtype(dtype).newbyteorder(">" if header.fields.get("endianness") == "big" else "<")
+        self._dtype = np.dtype(dtype).newbyteorder(">" if header.byte_order == "big" else "<")
 
     def describe(self) -> dict[str, Any]:
         """The lines of the header."""
