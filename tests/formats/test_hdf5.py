@@ -171,6 +171,28 @@ def test_files_of_others_without_size_and_index_are_read(tmp_path: Path) -> None
     assert describe_events(tmp_path / "other.h5")["size"] is None
 
 
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    t=st.lists(st.integers(0, 5000), max_size=40),
+    window=st.tuples(*[st.none() | st.integers(-9, 5009)] * 2),
+    version=st.sampled_from([None, "2", 2, [1, 1]]),
+)
+def test_any_window_of_times_of_others_in_whatever_order_is_found(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, t: list[int], window: tuple[int | None, int | None], version: Any
+) -> None:
+    """Times can be looked up only where they are in order, and an index may say anything."""
+    monkeypatch.setattr("vid2ev.formats.hdf5.BLOCK", 4)
+    times, places = np.array(t, np.uint32), np.arange(len(t), dtype=np.uint16)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        for name, values in {"t": times, "x": places, "y": places, "p": places % 2}.items():
+            file[f"events/{name}"] = values
+        file["ms_to_idx"] = np.searchsorted(times, np.arange(6) * 1000)
+        file.attrs.update({} if version is None else {"version": version})
+    start, stop = (-(1 << 40) if window[0] is None else window[0]), (1 << 40 if window[1] is None else window[1])
+    found = Events.concatenate(read_events(tmp_path / "other.h5", *window, block=3))
+    np.testing.assert_array_equal(found.x, places[(times >= start) & (times < stop)])
+
+
 @pytest.mark.parametrize(
     "packing",
     [

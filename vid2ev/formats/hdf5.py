@@ -30,7 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.formats.columns import pixels, whole_us
-from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised
+from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.stream.ahead import ahead
@@ -65,22 +65,54 @@ class Hdf5Events:
             self.labelled = "label" in file["events"]
             self.frame_us = file["frames/t"][:] + self.start_us if "frames/t" in file else None
             self._time_type = str(file["events/t"].dtype)
+            # (only `write_events` is known to have put them in order, and to have counted them)
+            self._indexed = np.array_equal(file.attrs.get("version"), VERSION) and "ms_to_idx" in file
+            self._in_order = True if self._indexed else None
 
     def describe(self) -> dict[str, Any]:
         """How times are stored."""
         return {"time_type": self._time_type}
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
-        """The events with start_us <= t < stop_us; only what is asked for is read."""
+        """The events with start_us <= t < stop_us; no more than that is read of files in order of time, but for the
+        times of all, once, where another program wrote them."""
         with opened(self.path, _check) as file:
-            columns = file["events"]
-            first = 0 if start_us is None else _position(file, start_us - self.start_us)
-            last = len(columns["t"]) if stop_us is None else _position(file, stop_us - self.start_us)
-            for at in range(first, last, block):
-                part = slice(at, min(at + block, last))
-                t = whole_us(self.path, columns["t"][part]) + self.start_us
-                label = columns["label"][part] if self.labelled else None
-                yield Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
+            t = file["events/t"]
+            if start_us is None and stop_us is None:
+                yield from self._stretch(file, 0, len(t), block)
+            elif self._is_in_order(t):
+                first = 0 if start_us is None else self._position(file, start_us - self.start_us)
+                last = len(t) if stop_us is None else self._position(file, stop_us - self.start_us)
+                yield from self._stretch(file, first, last, block)
+            else:
+                yield from regrouped(within(self._stretch(file, 0, len(t), BLOCK), start_us, stop_us), block)
+
+    def _stretch(self, file: h5py.File, first: int, last: int, block: int) -> Iterator[Events]:
+        """The events number first ... last - 1."""
+        columns = file["events"]
+        for at in range(first, last, block):
+            part = slice(at, min(at + block, last))
+            t = whole_us(self.path, columns["t"][part]) + self.start_us
+            label = columns["label"][part] if self.labelled else None
+            yield Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
+
+    def _is_in_order(self, t: h5py.Dataset) -> bool:
+        """Whether no time goes back, without which none can be looked up."""
+        if self._in_order is None:
+            parts = (t[max(at - 1, 0) : at + BLOCK] for at in range(0, len(t), BLOCK))
+            self._in_order = not any(np.any(part[1:] < part[:-1]) for part in parts)
+        return self._in_order
+
+    def _position(self, file: h5py.File, t_us: int) -> int:
+        """The number of events with t < t_us, t relative to t_offset."""
+        t = file["events/t"]
+        low, high = 0, len(t)
+        if self._indexed and 0 <= t_us // MS_US < len(file["ms_to_idx"]) - 1:
+            low, high = (int(k) for k in file["ms_to_idx"][t_us // MS_US : t_us // MS_US + 2])
+        while high - low > BLOCK:
+            middle = (low + high) // 2
+            low, high = (middle + 1, high) if t[middle] < t_us else (low, middle)
+        return low + int(np.searchsorted(t[low:high].astype(np.int64), t_us))
 
     def frames(self) -> Iterator[Picture]:
         """None."""
@@ -146,18 +178,6 @@ def _index(index: h5py.Dataset, first: int, last: int, t: np.ndarray, start: int
         edges = np.arange(at, min(at + BLOCK, last)) * MS_US
         index[at : at + len(edges)] = start + np.searchsorted(t, edges)
     return max(first, last)
-
-
-def _position(file: h5py.File, t_us: int) -> int:
-    """The number of events with t < t_us, t relative to t_offset."""
-    t = file["events/t"]
-    low, high = 0, len(t)
-    if "ms_to_idx" in file and 0 <= t_us // MS_US < len(file["ms_to_idx"]) - 1:
-        low, high = (int(k) for k in file["ms_to_idx"][t_us // MS_US : t_us // MS_US + 2])
-    while high - low > BLOCK:
-        middle = (low + high) // 2
-        low, high = (middle + 1, high) if t[middle] < t_us else (low, middle)
-    return low + int(np.searchsorted(t[low:high].astype(np.int64), t_us))
 
 
 def _check(file: h5py.File, path: Path) -> None:
