@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import ROUND_HALF_UP, Decimal
 from functools import partial
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import foreign
 import h5py
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 from recordings import all_events, assert_same, dense, events_of, recording_of, written
 
 from vid2ev.errors import DataError
@@ -413,3 +416,39 @@ def test_text_that_is_wrong_is_refused_with_its_line(tmp_path: Path) -> None:
 def test_seconds_since_1970_lose_nothing(tmp_path: Path) -> None:
     text = b"1468941032.229165635 128 154 1\n1468941032.229165 0 0 0\n"
     assert [row[0] for row in rows(opened(tmp_path, text, "rpg"))] == [1468941032229166, 1468941032229165]
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    digits=st.integers(0, 10**18) | st.integers(0, 2 * 10**18),
+    decimals=st.integers(0, 30),
+    negative=st.booleans(),
+    exponent=st.none() | st.integers(-12, 12),
+)
+@example(digits=1_700_000_000_123_456_789, decimals=0, negative=False, exponent=None)  # of a clock that has nanoseconds
+@example(digits=1_700_000_000_123_456_789, decimals=6, negative=False, exponent=None)
+@example(digits=5 * 10**18, decimals=25, negative=False, exponent=None)
+@example(digits=5 * 10**18 - 1, decimals=25, negative=True, exponent=None)
+def test_times_of_text_are_the_nearest_microseconds(
+    tmp_path: Path, digits: int, decimals: int, negative: bool, exponent: int | None
+) -> None:
+    """As `decimal` rounds them; a time that is too late for that is refused."""
+    padded = str(digits).rjust(decimals + 1, "0")
+    seconds = f"{padded[: len(padded) - decimals]}.{padded[len(padded) - decimals :]}"
+    seconds = f"{'-' * negative}{seconds}{'' if exponent is None else f'e{exponent}'}"
+    expected = int((Decimal(seconds) * 10**6).to_integral_value(ROUND_HALF_UP))
+    file = opened(tmp_path, f"{seconds} 1 2 1\n".encode(), "rpg")
+    if abs(expected) < 1 << 61:
+        assert rows(file) == [(expected, 1, 2, 1)]
+    elif abs(expected) >= 1 << 63:
+        with pytest.raises(DataError, match="line 1: "):
+            rows(file)
+
+
+@pytest.mark.parametrize("name", ["csv", "rpg"])
+def test_times_of_any_length_come_back_from_text(tmp_path: Path, name: str) -> None:
+    """Of clocks that have nanoseconds, too, which are taken for microseconds."""
+    edges = np.array([1, 10**6, 10**15, 10**17, 2**58, 10**18, 1_700_000_000_123_456_789, 2**62])
+    t = np.sort((edges[:, None] + np.arange(-2, 3)).ravel())
+    path = written(format_named(name), recording_of(events_of(t, (50, 40)), (50, 40), int(t[0])), tmp_path)
+    assert [row[0] for row in rows(open_events(path))] == t.tolist()

@@ -10,8 +10,8 @@ from vid2ev.compiling.cache import cached
 
 NOTHING, T, X, Y, P, LABEL = -1, 0, 1, 2, 3, 4  # what a field can be
 WIDEST = 48  # bytes of a line that is written
-DIGITS = 18  # that an int64 holds
-TOO_LARGE = 10 ** (DIGITS - 1)  # to have one more
+DIGITS = 19  # of the largest int64
+TOO_LARGE = (2**63 - 1) // 10  # to have one more
 TAB, NEWLINE, RETURN, BLANK = 9, 10, 13, 32
 HASH, PERCENT, PLUS, COMMA, MINUS, POINT, ZERO, NINE, SEMICOLON, LARGE_E, SMALL_E = tuple(b"#%+,-.09;Ee")
 
@@ -63,11 +63,14 @@ def number(data: np.ndarray, at: int, power: int) -> tuple[int, int, bool]:
     while shift > 0 and value:
         good = good and value < 1 << 58
         value, shift = value * 10 if good else 0, shift - 1
-    if shift < 0:
-        divisor = 10 ** np.int64(min(-shift, DIGITS))
-        whole = value // divisor if -shift <= DIGITS else 0
+    if shift <= -DIGITS:  # (less than one, and half of one at most where as many digits follow the point)
+        good = good and (power > 0 or value == 0)
+        value = np.int64(shift == -DIGITS and value >= 5 * 10 ** (DIGITS - 1))
+    elif shift < 0:
+        divisor = 10 ** np.int64(-shift)
+        whole = value // divisor
         good = good and (power > 0 or whole * divisor == value)
-        value = whole + (-shift <= DIGITS and (value - whole * divisor) * 2 >= divisor)
+        value = whole + ((value - whole * divisor) * 2 >= divisor)
     return -value if negative else value, at, good
 
 
