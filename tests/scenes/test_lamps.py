@@ -58,6 +58,24 @@ def test_things_cast_shadows_if_the_lamp_does(kind):
     assert (middle_of(Lamp("sun", direction=(0, 1, 1)), things=(between,)) > 0.1).all()
 
 
+def test_each_of_many_lamps_has_shadows_of_its_own():
+    camera, ball = Intrinsics.of_field((64, 48), 60), Thing("ball", Shape("sphere", (0.6, 0.6, 0.6)))
+    ball = Thing("ball", ball.shape, pose=Pose.of((0, 0, 0), (0, 0, 3)))
+    turns = 2 * np.pi * np.arange(2 * 16) / (2 * 16)  # (every other one without)
+    lamps = [
+        Lamp("sun", (0.1, 0.1, 0.1), direction=(np.cos(turn), np.sin(turn), 1), shadows=bool(k % 2))
+        for k, turn in enumerate(turns)
+    ]
+
+    def light(*some: Lamp) -> np.ndarray:
+        return render(Snapshot([WALL, ball], some), camera, IDENTITY, threads=1).light.astype(np.float64)
+
+    # (pixels in which many edges of shadows meet are not measured to the last bit)
+    np.testing.assert_allclose(light(*lamps), sum(light(lamp) for lamp in lamps), atol=0.01)
+    with pytest.raises(UsageError, match="17 lamps with shadows"):
+        light(*lamps, lamps[1])
+
+
 def test_the_edge_of_a_shadow_is_smooth():
     camera = Intrinsics.of_field((64, 48), 60)
     frames = []

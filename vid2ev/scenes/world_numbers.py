@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from vid2ev.errors import UsageError
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.mesh_numbers import joined
-from vid2ev.scenes.rays.layout import NOTHING, POINT, SUN, World
+from vid2ev.scenes.rays.layout import MOST_THINGS, NOTHING, POINT, SHADOW_BITS, SUN, World
 from vid2ev.scenes.snapshot import KINDS, Lamp, Shape, Snapshot, Texture, Thing
 from vid2ev.scenes.surroundings import irradiance_of
 
 
 def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
-    """What rays from a camera (camera to world) meet."""
+    """What rays from a camera (camera to world) meet.  Raises UsageError for more than a key can tell apart."""
     things = list(snapshot.things)
+    _check_counts(things, snapshot.lamps)
     to_things = [thing.pose.inverse() @ camera for thing in things]
     balls = np.array([_ball(thing, camera) for thing in things]).reshape(-1, 4)
     nearest = np.maximum(np.linalg.norm(balls[:, :3], axis=1) - balls[:, 3], 0)
@@ -58,6 +60,16 @@ def numbers_of(snapshot: Snapshot, camera: Pose) -> World:
         triangle_colours=mesh.colours,
         triangle_part=mesh.part,
     )
+
+
+def _check_counts(things: Sequence[Thing], lamps: Sequence[Lamp]) -> None:
+    casting = sum(lamp.shadows for lamp in lamps if lamp.kind != "ambient")
+    if casting > SHADOW_BITS:
+        raise UsageError(
+            f"{casting} lamps with shadows; expected at most {SHADOW_BITS}: let the fainter ones shine without"
+        )
+    if len(things) > MOST_THINGS:
+        raise UsageError(f"{len(things):,} things; expected at most {MOST_THINGS:,}: make meshes of several")
 
 
 def _rows(values: Sequence, *shape: int) -> np.ndarray:
@@ -109,7 +121,8 @@ def _to_environment(snapshot: Snapshot, camera: Pose) -> np.ndarray:
 def _lamps(lamps: Sequence[Lamp], things: Sequence[Thing], camera: Pose) -> dict[str, Any]:
     """The fields of the world that tell of lamps."""
     ambient = sum((np.array(lamp.colour) for lamp in lamps if lamp.kind == "ambient"), np.zeros(3))
-    others = [lamp for lamp in lamps if lamp.kind != "ambient"]
+    # (those with shadows first: the number of a lamp is that of its bit in a key)
+    others = sorted((lamp for lamp in lamps if lamp.kind != "ambient"), key=lambda lamp: not lamp.shadows)
     spots = [np.array(lamp.position_m if lamp.kind == "point" else lamp.direction, np.float64) for lamp in others]
     poses = [thing.pose for thing in things]
     return {

@@ -20,10 +20,11 @@ STACK = 96  # nodes of a hierarchy that wait to be looked at; its depth is at mo
 
 # A key says what a pixel shows; light is smooth wherever it stays the same.  From the low end: lamps that are hidden,
 # whether a mesh is met behind the depth at which it hides itself in this pixel, the part, the thing.
-SHADOW_BITS, PART_BITS = 8, 31
+SHADOW_BITS, PART_BITS = 16, 31
 BEHIND = 1 << SHADOW_BITS
 PART = BEHIND << 1
 THING = PART << PART_BITS
+MOST_THINGS = (1 << 63) // THING
 JUMP = 6.0  # steps of a pixel in depth from one to the next, steeper than 80 degrees: there a mesh may hide itself
 
 
@@ -49,7 +50,7 @@ class World(NamedTuple):
     irradiance: np.ndarray  # float64 [9, 3]: the environment's, in spherical harmonics; all 0 without one
     ambient: np.ndarray  # float64 [1, 3]
     casts: int  # whether any lamp casts shadows
-    lamp_kind: np.ndarray  # int64 [lamps]
+    lamp_kind: np.ndarray  # int64 [lamps]; those with shadows first, SHADOW_BITS at most
     lamp_colour: np.ndarray  # float64 [lamps, 3]
     lamp_reach2: np.ndarray  # float64 [lamps]
     lamp_shadows: np.ndarray  # int64 [lamps]

@@ -14,7 +14,7 @@ environment maps", SIGGRAPH 2001 (equation 12).
 from __future__ import annotations
 
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import POINT, SHADOW_BITS
+from vid2ev.scenes.rays.layout import POINT
 from vid2ev.scenes.rays.meet import row, turned
 from vid2ev.scenes.rays.surface import dot, unit
 
@@ -29,7 +29,7 @@ def lit(world, thing, p, normal, view, albedo, shadows):
     red, green, blue = red + emission, green + emission, blue + emission
     gloss_red, gloss_green, gloss_blue = 0.0, 0.0, 0.0
     for lamp in range(len(world.lamp_kind)):
-        if shadows >> (lamp % SHADOW_BITS) & 1 and world.lamp_shadows[lamp]:
+        if world.lamp_shadows[lamp] and shadows >> lamp & 1:
             continue
         way, strength = towards(world, thing, lamp, p)
         facing = dot(normal, way)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from vid2ev.scenes.rays.compiler import law
-from vid2ev.scenes.rays.layout import BEHIND, BOX, MESH, NOTHING, PART, PLANE, POINT, SHADOW_BITS, SPHERE, THING
+from vid2ev.scenes.rays.layout import BEHIND, BOX, MESH, NOTHING, PART, PLANE, POINT, SPHERE, THING
 from vid2ev.scenes.rays.shapes import meet_box, meet_cylinder, meet_plane, meet_sphere
 from vid2ev.scenes.rays.triangles import meet_mesh
 
@@ -90,7 +90,7 @@ def shadows_at(world, x, y, t, normal, stack):
             if facing > 0.0:
                 start = px + clear * normal[0], py + clear * normal[1], pz + clear * normal[2]
                 if hidden(world, start, (wx, wy, wz), limit, stack):
-                    bits |= 1 << (lamp % SHADOW_BITS)
+                    bits |= 1 << lamp
     return bits
 
 
