@@ -274,6 +274,8 @@ def test_frames_are_under_wide_events(filmed: Filmed) -> None:
     assert picture("a.png")[700, 640].tolist() == [40, 40, 40]
     assert (picture("a.png")[700, 100] == DARK).all()  # a frame that is narrower stands in the middle
     assert render("davis.aedat4", "-o", "b.png", "--no-frames", "--no-stamp")["size"] == [1280, 480]
+    # (frames that are not shown have their times all the same)
+    assert render("davis.aedat4", "-o", "c.png", "--by", "source", "--no-frames")["slices"] == 5
 
 
 # ------------------------------------------------------------------------------------------------------ what does not

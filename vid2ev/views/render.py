@@ -9,7 +9,7 @@ DIR         a folder with the pictures of a film, and slices.csv
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -76,12 +76,12 @@ def render(
     slicing, kind = _slicing(by, rate, speed), _kind(view)
     file = open_events(of_only_camera(events))
     zero_us = beginning_us(file)
-    recording = _recording(file, zero_us, start_s, stop_s, frames)
+    recording = _recording(file, zero_us, start_s, stop_s, bool(frames))
     if isinstance(slicing, Source):
         recording = with_frame_times(recording)
     if made_as == "png" and by is None and (start_s, stop_s) != (None, None):
         slicing = Duration(Fraction(max(1, recording.duration_us)))
-    shown = recording.frames() if recording.frames else None
+    shown = recording.frames() if recording.frames and frames is not False else None
     fine = not isinstance(slicing, Source) and not (isinstance(slicing, Duration) and slicing.us >= 1000)
     limit = size - size % 2 if made_as == "mp4" else size  # (films have even sides)
     canvas = Canvas(kind, recording.size, limit, shown, stamp=stamp, zero_us=zero_us, digits=6 if fine else 3)
@@ -148,10 +148,8 @@ def _kind(view: str) -> Kind:
     return parse_representation(VIEWS[name] + colon + rest)
 
 
-def _recording(
-    file: EventFile, zero_us: int, start_s: float | None, stop_s: float | None, frames: bool | None
-) -> Recording:
-    """The window of a file, with its frames if they are to be shown."""
+def _recording(file: EventFile, zero_us: int, start_s: float | None, stop_s: float | None, frames: bool) -> Recording:
+    """The window of a file, which has to have `frames` if so."""
     if start_s is not None and stop_s is not None and stop_s <= start_s:
         raise UsageError(f"--stop {stop_s:g} is not after --start {start_s:g}; choose a later one")
     if frames and not file.has_frames:
@@ -160,7 +158,7 @@ def _recording(
     recording = window(file, zero_us if start_us is None else start_us, stop_us, as_seen=True)
     if not recording.count and (start_s, stop_s) != (None, None):
         raise UsageError(f"{file.path}: no events from {start_s or 0:g} s to {_end(stop_s)}; choose another window")
-    return replace(recording, frames=None) if frames is False else recording
+    return recording
 
 
 def _end(stop_s: float | None) -> str:
