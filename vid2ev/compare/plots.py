@@ -10,7 +10,7 @@ import numpy as np
 from vid2ev.compare.comparison import Comparison
 from vid2ev.recording.disk import whole_file, writing
 
-BARS = 101  # of the distribution of timing errors; odd, so that one of them is of the pairs without error
+BARS = 101  # of the distribution of timing errors, at most
 
 
 def plot(comparison: Comparison, picture: Path) -> None:
@@ -20,7 +20,7 @@ def plot(comparison: Comparison, picture: Path) -> None:
     figure = Figure(figsize=(14, 9), layout="constrained")
     panels = figure.subplot_mosaic([["map", "timing"], ["time", "time"]], height_ratios=[2, 1])
     _draw_map(figure, panels["map"], comparison)
-    _draw_timing(panels["timing"], comparison)
+    draw_timing(panels["timing"], comparison)
     _draw_time(panels["time"], comparison)
     save(figure, picture)
 
@@ -41,7 +41,8 @@ def _draw_map(figure: Any, axes: Any, comparison: Comparison) -> None:
     axes.set_title("events per pixel", loc="left")
 
 
-def _draw_timing(axes: Any, comparison: Comparison) -> None:
+def draw_timing(axes: Any, comparison: Comparison) -> None:
+    """Draw how many pairs have which error of time."""
     window_us, errors = comparison.window_us, comparison.timing_errors
     axes.set_title("timing error of the pairs", loc="left")
     axes.set_xlabel("A after the reference [us]")
@@ -50,8 +51,14 @@ def _draw_timing(axes: Any, comparison: Comparison) -> None:
         return
     error_us = np.arange(1 - window_us, window_us)
     reach_us = max(int(np.abs(error_us[errors > 0]).max()), BARS // 2)
-    edges = np.linspace(-reach_us - 0.5, reach_us + 0.5, BARS + 1)
-    axes.hist(error_us, edges, weights=errors, color="#444444", log=True)
+    axes.hist(error_us, _edges_us(reach_us), weights=errors, color="#444444", log=True)
+
+
+def _edges_us(reach_us: int) -> np.ndarray:
+    """Edges of bars up to an error at least: each has as many whole microseconds, and one has 0 in its middle."""
+    width_us = -(-(2 * reach_us + 1) // BARS) // 2 * 2 + 1
+    beside = -(-(reach_us - width_us // 2) // width_us)
+    return width_us * (np.arange(-beside, beside + 2) - 0.5)
 
 
 def _draw_time(axes: Any, comparison: Comparison) -> None:
