@@ -58,6 +58,13 @@ def test_a_budget_that_nothing_meets_says_how_near_one_can_come(budget: str, sai
     assert said in refusal(LADDER, Budget.parse(budget))
 
 
+def test_how_near_one_can_come_is_said_of_what_may_be_recommended() -> None:
+    faster = replace(row(0.2, 0.5, lsb=3.0), rung=Rung("frames of an instant", "frames"))
+    budget = Budget.parse("time=0.5x")  # (which says nothing of frames: that is no way to meet it)
+    assert recommended([faster, *LADDER], budget) is None
+    assert "come to time=1x;" in refusal([faster, *LADDER], budget)
+
+
 def test_what_cannot_be_measured_is_within_no_limit() -> None:
     asked = Budget.parse("lsb=100")
     assert recommended(LADDER, asked) is None

@@ -96,8 +96,7 @@ def figure(row: Row, name: str) -> float:
 
 def recommended(rows: Sequence[Row], budget: Budget) -> Row | None:
     """The setting to take, of those that may be recommended; None where none is within the budget."""
-    seen = any(name == "lsb" for name, _ in budget.limits)
-    within = [row for row in rows if row.rung.offered and budget.holds(row) and (seen or _is_seen(row))]
+    within = [row for row in _able(rows, budget) if budget.holds(row)]
     slowest = math.inf if budget.only_time() else AS_FAST * min((row.time for row in within), default=0.0)
     as_fast = [row for row in within if row.time <= slowest]
     return min(as_fast, key=lambda row: (_error(row), row.time), default=None)
@@ -105,8 +104,8 @@ def recommended(rows: Sequence[Row], budget: Budget) -> Row | None:
 
 def refusal(rows: Sequence[Row], budget: Budget) -> str:
     """Why nothing is within a budget, and how near one can come, as a sentence."""
-    offered = [row for row in rows if row.rung.offered]
-    best = [(name, min(figure(row, name) for row in offered)) for name, _ in budget.limits]
+    able = _able(rows, budget)
+    best = [(name, min(figure(row, name) for row in able)) for name, _ in budget.limits]
     unmeasured = [name for name, least in best if math.isinf(least)]
     if unmeasured:
         return f"budget '{budget.text}': {unmeasured[0]} cannot be measured here; leave it out"
@@ -129,6 +128,12 @@ def ahead(rows: Iterable[T], time: Callable[[T], float], error: Callable[[T], fl
         if not kept or error(row) < error(kept[-1]):
             kept.append(row)
     return kept
+
+
+def _able(rows: Sequence[Row], budget: Budget) -> list[Row]:
+    """The settings that may be recommended for a budget: what changes frames alone only where it limits their error."""
+    frames = any(name == "lsb" for name, _ in budget.limits)
+    return [row for row in rows if row.rung.offered and (frames or _is_seen(row))]
 
 
 def _is_seen(row: Row) -> bool:
