@@ -100,6 +100,14 @@ def test_frames_are_gray_where_nothing_happens_and_clipped_where_much_does() -> 
     assert (frame.take() == 0.5).all()  # the next slice begins anew
 
 
+@pytest.mark.parametrize("full_scale", [2**31 - 2, 10**15 - 1])
+def test_frames_may_have_any_full_scale_that_can_be_asked_for(full_scale: int) -> None:
+    frame = parse_representation(f"frame:{full_scale}")(SIZE)
+    at = np.zeros(4, np.uint16)
+    frame.add(Events(np.arange(4), at, at, np.ones(4, np.uint8)), 0, 4)
+    assert (frame.take() == 0.5).all()  # four events are nothing there, of counts that have 32 bits
+
+
 def test_frames_do_not_depend_on_how_events_come() -> None:
     # 5 ON and then 3 OFF make 2 in one packet or in two; clipped in between they would not.
     p = np.array([1] * 5 + [0] * 3, np.uint8)

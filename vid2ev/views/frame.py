@@ -36,7 +36,7 @@ class Frame:
 
     def take(self, stop_us: int = 0) -> np.ndarray:
         """The frame of the events since the last call."""
-        net = np.clip(self._net, -self.full_scale, self.full_scale)
+        net = np.clip(self._net.astype(np.int64), -self.full_scale, self.full_scale)  # (a scale may be beyond int32)
         self._net[:] = 0
         return ((net + self.full_scale) / (2 * self.full_scale)).astype(np.float32)
 
