@@ -19,6 +19,8 @@ from vid2ev.commands.convert import convert
 from vid2ev.commands.gui import gui
 from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.event_file import Recording
+from vid2ev.formats.hdf5 import write_events
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.light import duration_s
@@ -26,10 +28,12 @@ from vid2ev.gui.loading import loaded, loaded_from
 from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
+from vid2ev.gui.tasks import gathered
 from vid2ev.gui.why import why_not
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.seen.recipe import Recipe
+from vid2ev.stream.events import Events
 from vid2ev.tracks.outputs import Outputs
 
 SMALL = "scene:spinning-shapes,size=32x24,duration_s=0.02"
@@ -351,3 +355,13 @@ def test_pages_of_others_are_not_served(host: str, origin: str, status: int) -> 
 
 def test_a_page_for_the_network_is_served_under_any_name() -> None:
     assert not any(is_loopback(host) for host in ("0.0.0.0", "192.168.0.2", "evil.example", "127.0.0.1.evil.example"))
+
+
+def test_a_recording_of_the_page_is_compared_by_its_own_folder(tmp_path: Path) -> None:
+    events = Events(np.array([0, 700, 900]), *(np.zeros(3, kind) for kind in (np.uint16, np.uint16, np.uint8)))
+    for camera in ("dvs", "cis"):  # (what a conversion leaves, as far as it is looked at)
+        (tmp_path / camera).mkdir()
+        (tmp_path / camera / "manifest.json").write_text("{}")
+    write_events(tmp_path / "dvs" / "events.h5", Recording((4, 3), 0, 900, 3, lambda: iter([events])))
+    found = [gathered(lambda *_: None, str(folder)) for folder in (tmp_path, tmp_path / "dvs")]
+    assert found[0].as_dict() == found[1].as_dict() and found[0].shortest_us == 200

@@ -11,7 +11,7 @@ from vid2ev.gui.preview import VIEWS, Answer
 from vid2ev.gui.session import Session
 from vid2ev.gui.theme import say
 
-WINDOWS_MS = {"5 ms": 0.005, "10 ms": 0.01, "30 ms": 0.03, "100 ms": 0.1}
+WINDOWS_S = {"5 ms": 0.005, "10 ms": 0.01, "30 ms": 0.03, "100 ms": 0.1}
 STEP_S = 0.001  # of the line of time
 WIDEST_PX = 720  # is a picture on the page
 
@@ -28,9 +28,9 @@ class Pictures:
                 "dense flat no-caps"
             ).mark("view")
             ui.space()
-            ui.toggle(
-                [*WINDOWS_MS], value="30 ms", on_change=lambda e: session.look(length_s=WINDOWS_MS[e.value])
-            ).props('dense flat no-caps title="how long events are gathered; longer where an exposure takes longer"')
+            ui.toggle([*WINDOWS_S], value="30 ms", on_change=lambda e: session.look(length_s=WINDOWS_S[e.value])).props(
+                'dense flat no-caps title="how long events are gathered; longer where an exposure takes longer"'
+            )
         self._grid = ui.element("div").classes("v-pictures mt-3")
         with ui.element("div").classes("v-line mt-2").style("flex-wrap: nowrap"):
             self._play = ui.button(on_click=self._played).props("flat round dense").mark("play")

@@ -70,11 +70,11 @@ def costed(tell: Tell, setup: Setup, repeats: int = 1, duration_s: float | None 
 
 
 def gathered(tell: Tell, path: str) -> Any:
-    """The statistics of a recording or an event file."""
+    """The statistics of an event file, or of a recording that has one event camera."""
     from vid2ev.compare.statistics import Gathering
-    from vid2ev.formats import open_events, survey
+    from vid2ev.formats import of_only_camera, open_events, survey
 
-    recording = survey(open_events(path))
+    recording = survey(open_events(of_only_camera(path)))
     gathering, seen = Gathering(recording.size), 0
     for events in recording.blocks():
         gathering.add(events)
