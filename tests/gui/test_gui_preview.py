@@ -273,6 +273,15 @@ def test_half_of_the_intervals_are_below_what_is_said_with_two_digits() -> None:
     assert said(np.arange(9)) == "1.4" and said(np.zeros(1, np.int64)) == said(10**10 * np.arange(4)) == "–"
 
 
+@pytest.mark.parametrize("gap_us", [3, 9_999_999, 20_000_000, 3_000_000_000])
+def test_no_interval_is_beyond_the_axis(gap_us: int) -> None:
+    none = np.zeros(5, np.uint16)
+    found = statistics_of([Events(gap_us * np.arange(5), none, none, none.astype(np.uint8))], (1, 1))
+    drawn = interval_chart({"it": found})
+    (there,) = (at for at, share in drawn["series"][0]["data"] if share > 0)
+    assert there <= gap_us < drawn["xAxis"]["max"] and drawn["xAxis"]["max"] >= 1e7
+
+
 @pytest.mark.parametrize(
     "options",
     [{"start": 0.5, "stop": 0.6}, {"slowdown": 4.0, "start": 0.3}, {"crop": "32x24+10+8"}, {"fps": 50.0, "start": 0.5}],

@@ -11,6 +11,7 @@ from vid2ev.gui.theme import ACCENT, MUTED, OFF, ON
 from vid2ev.sensors.course import Course
 
 LEAST = 1e-4  # less than this distance is drawn as this
+LONG_US = 10**7  # an interval, to which the axis goes whatever there is
 TEXT = {"color": MUTED, "fontSize": 11}
 FAINT = {"lineStyle": {"color": "#8a92a033"}}
 
@@ -111,9 +112,10 @@ def cost_chart(found: dict[str, Any]) -> dict[str, Any]:
 
 def interval_chart(named: dict[str, Statistics]) -> dict[str, Any]:
     """The shares of the intervals between events of a pixel, for each of some recordings."""
-    series = []
+    series, most_us = [], LONG_US
     for (name, found), colour in zip(named.items(), (ACCENT, ON), strict=False):
         counts = found.intervals.sum(axis=0).astype(float)
+        most_us = max(most_us, int(EDGES_US[1:][counts > 0].max(initial=0)))
         share = counts / max(counts.sum(), 1.0)
         data = _pairs(np.maximum(EDGES_US[:-1], 1), share)
         series.append({"type": "line", "name": name, "data": data, "step": "end", "showSymbol": False, "color": colour,
@@ -122,7 +124,7 @@ def interval_chart(named: dict[str, Statistics]) -> dict[str, Any]:
         "grid": {"left": 64, "right": 16, "top": 28, "bottom": 44},
         "legend": {"top": 0, "right": 0, "textStyle": TEXT, "icon": "roundRect", "itemWidth": 14, "itemHeight": 8},
         "tooltip": {"trigger": "axis"},
-        "xAxis": _axis("interval between two events of a pixel [us]", type="log", min=1, max=1e7),
+        "xAxis": _axis("interval between two events of a pixel [us]", type="log", min=1, max=most_us),
         "yAxis": _axis("share", True),
         "series": series,
     }
