@@ -319,7 +319,7 @@ def draw_time(axes: Any, lamp: dict[str, Any]) -> None:
 
 
 def draw_classes(panels: Any, lamp: dict[str, Any]) -> None:
-    middle = (LEVELS[1:] + np.minimum(LEVELS[:-1], 1)) / 2
+    middle = (LEVELS[1:] + LEVELS[:-1]) / 2
     titles = ("toy: OFF events per pixel against light", "toy: half of the OFF events by [ms]")
     for panel, k, title in zip(panels, (0, 1), titles, strict=True):
         for name, rows in lamp["classes"].items():
