@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
-from vid2ev.scenes.instants import Instants
+from vid2ev.scenes.instants import MARGIN, Instants, speed_px_s
 from vid2ev.scenes.world import World
 
 SMALL = ["camera.size=[96, 72]", "duration_s=0.25", "min_fps=1"]
@@ -88,6 +88,21 @@ def test_small_things_between_the_pixels_of_the_grid_count(tmp_path: Path) -> No
     )
     instants = Instants(World.of(file))
     assert (len(instants) - 1) / 0.1 == pytest.approx(1.15 * 500 / 0.5, rel=0.03)
+
+
+def test_small_things_count_where_a_lens_has_them(tmp_path: Path) -> None:
+    # (at 47 degrees from the axis: 94 px from the middle through this lens, and beyond the picture without it)
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        '[scene]\nambient = 1\n[camera]\nsize = [200, 150]\nfov_deg = 100\nmodel = "equidistant"\n'
+        'distortion = [0, 0, 0, 0]\n[[objects]]\nname = "dot"\nkind = "sphere"\nsize_m = 0.02\n'
+        'trajectory = { kind = "straight", position_m = [1.08, 0, 1], velocity_m_s = [0, 2, 0] }\n'
+    )
+    world = World.of(path)
+    # down through an equidistant lens, across the radius: pixels = focal * angle * (velocity / distance from the axis)
+    focal = 100 / np.radians(50)
+    expected = focal * np.arctan(1.08) * 2 / 1.08
+    assert speed_px_s(world, 0) == pytest.approx(MARGIN * expected, rel=0.05)
 
 
 def test_rates_that_cannot_be_meant_are_refused() -> None:

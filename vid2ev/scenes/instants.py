@@ -29,6 +29,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.scene import LightSource, Object
@@ -157,9 +158,9 @@ def _shift(before: Thing, after: Thing, from_world: list[Pose], intrinsics: Intr
     places = [(view @ thing.pose).apply(corners) for view, thing in zip(from_world, (before, after), strict=True)]
     if min(place[:, 2].min() for place in places) < NEAREST_M:
         return 0.0
-    pixels = [place[:, :2] / place[:, 2:] * intrinsics.focal_px + intrinsics.centre_px for place in places]
+    pixels = [pixels_of(place, intrinsics) for place in places]
     inside = np.all((pixels[0] > -20) & (pixels[0] < np.array(intrinsics.size) + 20), axis=1)
-    return float(np.linalg.norm(pixels[1] - pixels[0], axis=1)[inside].max(initial=0.0))
+    return float(np.nanmax(np.linalg.norm(pixels[1] - pixels[0], axis=1)[inside], initial=0.0))
 
 
 def _corners(thing: Thing) -> np.ndarray:
