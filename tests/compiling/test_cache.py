@@ -48,14 +48,17 @@ def test_a_kernel_is_compiled_again_where_any_of_its_files_has_changed(
     assert loaded(tmp_path / "kernel.py") == (0, 1)
 
 
-@pytest.mark.parametrize("decorator", ["compiler import compiled", "cache import cached"])
+@pytest.mark.parametrize(
+    "decorator",
+    ["compiling.compiler import compiled", "compiling.cache import cached", "scenes.rays.compiler import walk"],
+)
 def test_a_number_of_a_file_beside_it_is_that_of_now(
     tmp_path: Path, decorator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     name = decorator.split()[-1]
     (tmp_path / "kernel.py").write_text(
-        f"from vid2ev.compiling.{decorator}\nfrom factor_of_a_test import FACTOR\n\n@{name}\ndef twice(x):\n"
+        f"from vid2ev.{decorator}\nfrom factor_of_a_test import FACTOR\n\n@{name}\ndef twice(x):\n"
         "    return FACTOR * x\n"
     )
     for factor in (2, 42, 21):

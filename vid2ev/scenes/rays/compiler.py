@@ -11,6 +11,7 @@ from typing import Any
 
 from numba import njit
 
+from vid2ev.compiling.cache import of_this_version
 from vid2ev.compiling.compiler import OPTIONS, KernelCompiler, of_plain_types
 
 UNCOUNTED: dict[str, Any] = OPTIONS | {"_nrt": False, "pipeline_class": KernelCompiler}
@@ -24,4 +25,4 @@ def law(function: Callable) -> Any:
 
 def walk(function: Callable) -> Any:
     """What Python calls: compiled and cached; it may make no arrays."""
-    return of_plain_types(njit(**UNCOUNTED | {"cache": True})(function))
+    return of_this_version(of_plain_types(njit(**UNCOUNTED | {"cache": True})(function)))
