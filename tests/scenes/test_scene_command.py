@@ -22,7 +22,10 @@ from vid2ev.recording.flow_files import read_flow
 from vid2ev.rig.camera import Camera, Rig, Source
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.scenes import folder as folder_module
+from vid2ev.scenes.camera_folder import Contents
+from vid2ev.scenes.folder import write_scene
 from vid2ev.scenes.scene_file import read_scene, scene_names
+from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.seen.recipe import Recipe
 from vid2ev.sources import open_source
@@ -90,6 +93,27 @@ def test_a_scene_is_written_with_its_truth() -> None:
         assert np.allclose(row[1:4], pose.translation_m, atol=1e-9)
         assert np.allclose(Rotation.from_quat(row[4:]).as_matrix(), pose.rotation, atol=1e-8)
     assert json.loads((out / "intrinsics.json").read_text())["size"] == [48, 36]
+
+
+def test_instants_suit_the_finest_camera_of_a_rig(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(
+        '[[camera]]\nname = "coarse"\nkind = "dvs"\n'
+        '[[camera]]\nname = "fine"\nkind = "cis"\nsize = [96, 72]\nfocal_px = [72, 72]\n'
+    )
+    (tmp_path / "scene.toml").write_text(
+        '[scene]\nduration_s = 0.1\nmin_fps = 1\nambient = 1\nrig = "rig.toml"\n'
+        "[camera]\nsize = [32, 24]\nfocal_px = [24, 24]\n"
+        '[[objects]]\nname = "ball"\nkind = "sphere"\n'
+        'trajectory = { kind = "straight", position_m = [0, 0, 3], velocity_m_s = [1, 0, 0] }\n'
+    )
+    source = SceneSource(World.of(tmp_path / "scene.toml"))
+    write_scene(tmp_path / "out", source, Contents(truth=("flow",), preview=False))
+    farthest = {}
+    for name in ("coarse", "fine"):
+        flows = [read_flow(file) for file in sorted((tmp_path / "out" / name / "flow").iterdir())]
+        farthest[name] = max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows)
+    assert 0.3 < farthest["fine"] <= 0.5  # (`max_shift_px`)
+    assert farthest["coarse"] == pytest.approx(farthest["fine"] / 3, rel=0.1)
 
 
 def test_every_camera_of_a_rig_has_its_folder() -> None:

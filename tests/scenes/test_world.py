@@ -208,3 +208,9 @@ def test_lamps_move_and_objects_glow(tmp_path: Path) -> None:
     assert np.allclose(bulb.light[bulb.thing == 1].max(axis=0), [50, 25, 25], rtol=0.1)
     at_centre = world.render(500_000_000).light[10, 16, 0]
     assert 0.5 < at_centre <= 1.0  # (the wall is half a metre away, which is its reach)
+
+
+def test_the_gain_of_an_environment_is_none_of_a_background(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("[scene]\nbackground = 0.2\nenvironment_gain = 3\n[camera]\nsize = [4, 4]\n")
+    np.testing.assert_allclose(World.of(path).render(0).light, 0.2, rtol=1e-6)

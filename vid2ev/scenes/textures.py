@@ -5,7 +5,8 @@
     noise     clouds: the spectrum of light falls as frequency**-roughness; from the darkest, colours[0], to colours[1]
     sky       for environments: colours[0] below, colours[1] at the horizon, colours[2] above
 
-All of them can be repeated without a seam, but for photographs and `sky` up and down.  Colours are linear.
+All of them can be repeated without a seam, but for photographs, a `checker` with an odd count, and `sky` up and down.
+Colours are linear.
 
 Source: clouds of a power-law spectrum, R. F. Voss, "Random fractal forgeries", 1985.
 """

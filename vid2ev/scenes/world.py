@@ -78,7 +78,7 @@ class World:
             things=[self._thing(*look, t_s) for look in self._looks],
             lamps=[Lamp("ambient", setting.ambient), *(_lamp(light, lamps_s) for light in self.scene.lights)],
             environment=self._environment,
-            environment_gain=setting.environment_gain,
+            environment_gain=1.0 if setting.environment is None else setting.environment_gain,
             environment_pose=Pose.of(setting.environment_rotation_deg),
         )
 
