@@ -14,7 +14,7 @@ from vid2ev.bounds.chances import at_least, at_most, surely
 from vid2ev.bounds.distance import added, delayed, off_by, together, unlike
 from vid2ev.bounds.scene import Scene
 from vid2ev.errors import UsageError
-from vid2ev.physics.omission import light_events
+from vid2ev.physics.omission import light_events, noise_events
 from vid2ev.physics.peaks import taken
 from vid2ev.physics.shading import shading_map
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
@@ -338,6 +338,18 @@ def test_where_nothing_moves_events_of_the_leak_are_later_or_missing_all_the_sam
     said = EFFECTS[effect].omission(scene_of(spec, (64, 48), frames), spec)
     left = sent(without(spec, effect, said), (64, 48), frames)
     assert 0 < distance(sent(spec, (64, 48), frames), left, (64, 48)) <= said.distance
+
+
+@pytest.mark.parametrize("readout", [{}, {"refractory_us": 5000}, {"refractory_us": 300, "frame_rate_hz": 200.0}])
+@pytest.mark.parametrize("noise", [
+    {"shot_rate_hz": 3e3}, {"hot_probability": 0.3, "hot_rate_hz": 2e4}, {"hot_probability": 0.3, "hot_rate_hz": 9.0},
+])  # fmt: skip
+def test_noise_is_sent_as_often_as_is_said_also_where_pixels_are_blind(noise: dict, readout: dict) -> None:
+    spec, size = clean(**({"refractory_us": 0.0} | noise | readout)), (64, 48)
+    frames = [Frame(np.full((48, 64), 0.25, np.float32), k * 10_000_000) for k in range(31)]
+    least, most = noise_events(scene_of(spec, size, frames), spec)
+    many = len(sent(spec, size, frames))
+    assert 0 < least <= many <= most and least > 0.5 * many
 
 
 def flashing(contrast_nat: float, dt_ns: int, frames: int, size: tuple[int, int] = (32, 24)) -> list[Frame]:

@@ -3,8 +3,9 @@
     hot    ON events, Poisson, hot_rate_hz [Hz], whatever the light    P(hot) = hot_probability
     cold   no events                                            P(cold) = cold_probability (1 - P(hot))
 
-A hot pixel sends ON events as a Poisson process of `hot_rate_hz`, whatever the light; a cold pixel sends none.  Which
-pixels are bad is drawn once per camera and seed.
+A hot pixel makes ON events as a Poisson process of `hot_rate_hz`, whatever the light; of these it sends those that are
+not within the refractory period R of the last, hot_rate_hz / (1 + hot_rate_hz R): 909 of 1000 Hz by default.  A cold
+pixel sends none.  Which pixels are bad is drawn once per camera and seed.
 
 What leaving them out changes: hot pixels send as many events more, and those of light come from other levels; the
 events of cold pixels come back.
@@ -32,7 +33,7 @@ class BadPixels(BaseModel, frozen=True, extra="forbid"):
     """Parameters of the bad pixels."""
 
     hot_probability: float = Field(0.0, ge=0, le=1, description="share of pixels that fire all the time")
-    hot_rate_hz: float = Field(1000.0, ge=0, le=1e5, description="event rate of a hot pixel [Hz]")
+    hot_rate_hz: float = Field(1000.0, ge=0, le=1e5, description="event rate of a hot pixel that is never blind [Hz]")
     cold_probability: float = Field(0.0, ge=0, le=1, description="share of the other pixels that never fire")
 
 

@@ -181,16 +181,21 @@ def _rounded(scene: Scene, spec: Any) -> float:
 
 def noise_events(scene: Scene, spec: Any) -> tuple[float, float]:
     """How many events shot noise and hot pixels send at least and at most, each in 999 of 1000 cases, and with them
-    leak and noise of the photoreceptor at most; light is to an octave."""
+    leak and noise of the photoreceptor at most; light is to an octave.
+
+    A pixel that is blind for a time R after an event, or sends one in each event frame of R, sends events of a rate r
+    no more rarely than r / (1 + r R): from one to the next it waits R, and then for as long as it did before.
+    """
     octaves = np.exp2(np.arange(len(scene.brightness) + 1) - 20.0)
     shares = 1.0 - (1.0 - spec.shot_light_factor) * np.minimum(octaves, 1.0)
     pixels = scene.brightness / max(float(scene.brightness.sum()), 1.0) * scene.pixels
-    least, most = (
-        spec.shot_rate_hz * float(np.dot(pixels, each)) * scene.seconds for each in (shares[1:], shares[:-1])
-    )
+    blind_s = 1e-6 * spec.refractory_us + (1.0 / spec.frame_rate_hz if spec.frame_rate_hz > 0 else 0.0)
+    least_hz, most_hz = spec.shot_rate_hz * shares[1:], spec.shot_rate_hz * shares[:-1]
+    least_hz /= 1.0 + least_hz * blind_s
+    least, most = (float(np.dot(pixels, rate_hz)) * scene.seconds for rate_hz in (least_hz, most_hz))
     hot, hot_s = spec.hot_probability * scene.pixels, spec.hot_rate_hz * scene.seconds
-    others = _unforced(scene, spec)
-    return at_least(least) + at_least(at_least(hot) * hot_s), at_most(most) + at_most(at_most(hot) * hot_s) + others
+    hot_least = at_least(at_least(hot) * hot_s / (1.0 + spec.hot_rate_hz * blind_s))
+    return at_least(least) + hot_least, at_most(most) + at_most(at_most(hot) * hot_s) + _unforced(scene, spec)
 
 
 def _unforced(scene: Scene, spec: Any) -> float:

@@ -68,7 +68,8 @@ def omission(scene: Scene, spec: Any) -> Omission:
     together = cost / swallowed if swallowed else 1.0
     swallowed = min(swallowed, total * most_too_soon(scene, spec.refractory_us * 1e-6, spec))
     gone, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
-    both = crossings(scene, spec) + light_events(scene, spec) + 2.0 * noise_events(scene, spec)[0] - noisy
+    without = spec.model_copy(update={"refractory_us": 0.0})
+    both = crossings(scene, spec) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy
     rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
     dense = 1.0 + 2.0 * DISTANCE_TAU_S * rate_hz * min(rate_hz * spec.refractory_us * 1e-6, 1.0)
     said = omitted(scene, spec, math.inf, figure, why)
