@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+import tracemalloc
 from typing import Any
 
 import numpy as np
 import pytest
 from against.clips import clean
 
+from vid2ev import load_sensor
 from vid2ev.bounds.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.errors import UsageError
 from vid2ev.plan.measure import Measure
@@ -274,3 +277,23 @@ def test_a_clip_with_subframes_has_the_events_of_its_sensor() -> None:
     size, frames = clip("edge")
     spec = clean(filter="after", random_phase=True)
     assert len(sent(spec, size, frames)) == pytest.approx(scene_of(spec, size, frames).events, rel=0.01)
+
+
+def test_memory_is_what_is_said() -> None:
+    said = re.search(r"Memory is (\d+) bytes.*shading (\d+) more.*signal (\d+)", Measure.__doc__ or "", re.DOTALL)
+    assert said is not None
+    plain, shaded, jumping = map(int, said.groups())
+    size = 1280, 720
+
+    def bytes_a_pixel(*changes: str) -> float:
+        spec = load_sensor("paper", changes)
+        tracemalloc.start()
+        measure = Measure(spec, size)
+        taken, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return taken / (measure.size[0] * measure.size[1])
+
+    bare = bytes_a_pixel()
+    assert bare == pytest.approx(plain, abs=1)  # (a thread's scratch is half a byte)
+    assert bytes_a_pixel("shading=[-0.3]") - bare == pytest.approx(shaded, abs=1)
+    assert bytes_a_pixel("refractory=track") - bare == pytest.approx(jumping, abs=1)

@@ -31,9 +31,10 @@ LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 53 bytes a pixel, for a
-    shading 33 more, for memories that jump to the signal 12.  What frames say of what is still (`Frame.still`) is taken
-    for granted where it is about the last one.  `threads` change nothing but the time it takes.
+    The light that is measured is that behind the sensor's lens shading.  Memory is 65 bytes a pixel, for a
+    shading 38 more, for memories that jump to the signal 4, and that of the last frame.  What frames say of what is
+    still (`Frame.still`) is taken for granted where it is about the last one.  `threads` change nothing but the time it
+    takes.
     """
 
     def __init__(self, spec: DvsSpec, size: tuple[int, int], threads: int = 1):
