@@ -130,8 +130,19 @@ def test_a_dry_run_says_all_and_does_nothing() -> None:
     refused(2, "threshold_onn", "convert", CLIP, "--dry-run", "--set", "threshold_onn=1")
 
 
-@pytest.mark.parametrize("more", [[], ["--frames", "--cis-out", "png"], ["--format", "csv", "--frames-out", "npz"]])
+@pytest.mark.parametrize(
+    "more",
+    [
+        [],
+        ["--frames", "--cis-out", "png"],
+        ["--format", "csv", "--frames-out", "npz"],
+        ["--rig", "two.toml"],
+    ],
+)
 def test_a_dry_run_names_the_files_that_are_made(more: list[str]) -> None:
+    Path("mine.toml").write_text("[dvs]\nthreshold_on = 0.3\n")
+    cameras = ('name = "one"\nkind = "dvs"\nsensor = "mine.toml"\n', 'name = "two"\nkind = "dvs"\nsensor = "paper"\n')
+    Path("two.toml").write_text("".join(f"[[camera]]\n{camera}" for camera in cameras))
     arguments = ["convert", CLIP, "-o", "out", "--truth", "poses", *QUICK, *more]
     line = next(line for line in vid2ev(*arguments, "--dry-run").stdout.splitlines() if line.startswith("output"))
     assert vid2ev(*arguments, "-q").exit_code == 0

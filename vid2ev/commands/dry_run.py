@@ -21,6 +21,7 @@ def planned(
     from vid2ev.seen.recipe import Recipe
     from vid2ev.sensors.devices import device_for
     from vid2ev.terminal import lines
+    from vid2ev.tracks import recorder
     from vid2ev.tracks.outputs import Outputs
 
     device = options.pop("device")
@@ -37,7 +38,7 @@ def planned(
     described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
     truth = ["truth"] * (recipe.truth is not None)
     files = [f"{mount.within}{name}" for mount in recipe.mounts for name in [*outputs.names(mount.kind), *truth]]
-    files += [] if recipe.alone else ["rig.toml", "manifest.json"]
+    files += [] if recipe.alone else [*recorder.rig_files(recipe), "manifest.json"]
     facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
     facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
     text = lines([*facts, *([("threads", str(threads))] if threads else [])])

@@ -229,6 +229,6 @@ FORMAT = Format(
     recognises=lambda head, path: head.startswith(b"#!AER-DAT4."),
     open=Aedat4Events,
     write=write_events,
-    largest=(1 << 15, 1 << 15),
+    largest=((1 << 15) - 1, (1 << 15) - 1),  # (as the frames beside events, whose sides are int16)
     keeps=frozenset({"frames", "size", "start"}),
 )

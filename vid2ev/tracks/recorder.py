@@ -31,6 +31,8 @@ from vid2ev.tracks.parts import Made
 from vid2ev.tracks.truth import TruthTrack, truth_files
 from vid2ev.untrusted import json_of
 
+RIG = "rig.toml"
+
 
 def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     """The files that a folder is to be made with."""
@@ -38,6 +40,17 @@ def growing(recipe: Recipe, outputs: Outputs) -> list[str]:
     truth = [mount.within for mount in recipe.mounts if recipe.truth]
     files = [name for within in events for name in dvs_files(within, recipe.labels, outputs)]
     return files + [name for within in truth for name in truth_files(within)]
+
+
+def rig_files(recipe: Recipe) -> list[str]:
+    """The files that say where several cameras stand, and what those sensors are that are no presets."""
+    return [RIG, *_sensor_files(recipe).values()]
+
+
+def _sensor_files(recipe: Recipe) -> dict[str, str]:
+    """The files of the latter, by the name of the camera."""
+    cameras = [view.camera for view in recipe.rig.viewpoints]
+    return {each.name: f"rig.{each.name}.toml" for each in cameras if each.sensor is not None and is_file(each.sensor)}
 
 
 @dataclass
@@ -201,16 +214,15 @@ class Recorder:
     def _write_rig(self, whole: Path) -> None:
         """The rig file, and files of those sensors that are no presets, as they were."""
         rig, cameras = self.recipe.rig.settled(framing_of(self.recipe.source)), []
+        files = _sensor_files(self.recipe)
         for camera, mount in zip(rig.cameras, self.recipe.mounts, strict=True):
-            if camera.sensor is not None and is_file(camera.sensor):
-                title = f"{Path(camera.sensor).stem}, as {camera.name} had it"
-                text = sensor_file_text(mount.kind, mount.sensor.spec, title)
-                name = f"rig.{camera.name}.toml"
-                write_text(whole / name, text, overwrite=True)
+            if name := files.get(camera.name):
+                title = f"{Path(str(camera.sensor)).stem}, as {camera.name} had it"
+                write_text(whole / name, sensor_file_text(mount.kind, mount.sensor.spec, title), overwrite=True)
                 camera = camera.model_copy(update={"sensor": name})
             cameras.append(camera)
         rig = rig.model_copy(update={"cameras": tuple(cameras)})
-        write_text(whole / "rig.toml", rig_text(rig), overwrite=True)
+        write_text(whole / RIG, rig_text(rig), overwrite=True)
 
     def span_us(self, number: int) -> tuple[int, int]:
         """Start and length of a camera's recording on its own clock: from the first frame to the last, or to the last
