@@ -144,6 +144,13 @@ def jpeg(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     return path
 
 
+def filled_jpeg(path: Path, pixels: np.ndarray, held: bytes) -> Path:
+    """With bytes FF before a mark, of which there may be any number (T.81, B.1.1.2)."""
+    whole = jpeg(path, pixels, held).read_bytes()
+    path.write_bytes(whole[:2] + 3 * b"\xff" + whole[2:])
+    return path
+
+
 def tiff(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     """Grey, little endian, without compression."""
     height, width = pixels.shape[:2]
@@ -155,14 +162,14 @@ def tiff(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     return path
 
 
-@pytest.mark.parametrize("write", [jpeg, tiff])
+@pytest.mark.parametrize("write", [jpeg, filled_jpeg, tiff])
 @pytest.mark.parametrize("text", ["desc", "mluc"])
 @pytest.mark.parametrize(("name", "said"), [("Display P3", True), ("sRGB IEC61966-2.1", False), ("c2", False)])
 def test_a_profile_that_is_not_read_is_named(
     tmp_path: Path, write: Callable[..., Path], text: str, name: str, said: bool
 ) -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (40, 40, 3), np.uint8)
-    write(tmp_path / f"one.{write.__name__}", pixels, profile(name, text))
+    write(tmp_path / f"one.{write.__name__.removeprefix('filled_')}", pixels, profile(name, text))
     warnings = open_source(tmp_path, fps=10).warnings
     assert len(warnings) == said and ("its ICC profile 'Display P3' is not read" in "".join(warnings)) == said
 

@@ -1,7 +1,7 @@
 """The name of the ICC profile that a JPEG or a TIFF holds; no more of it is read, and that is said.
 
 Sources: ICC.1:2022, sections 7.2 and 7.3 (header, table of tags), 10.13 (texts) and B.3, B.4 (where it is in TIFF and
-JPEG); ICC.1:2001-04, 6.5.17 (texts before 2010).
+JPEG); ICC.1:2001-04, 6.5.17 (texts before 2010); ITU-T T.81, B.1.1 (marks of a JPEG).
 """
 
 from __future__ import annotations
@@ -44,6 +44,9 @@ def jpeg_parts(file: BinaryIO) -> Iterator[tuple[int, int]]:
         mark = file.read(4)
         if len(mark) < 4 or mark[0] != 0xFF or mark[1] in (0xD9, 0xDA):  # (pixels follow)
             return
+        if mark[1] == 0xFF:  # (before a mark there may be as many of these as one likes)
+            end += 1
+            continue
         end += 2 + int.from_bytes(mark[2:])
         yield mark[1], end
 
