@@ -268,6 +268,20 @@ def test_words_of_evt3_go_on_in_the_next_packet(tmp_path: Path, kind: str) -> No
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_what_words_of_evt3_hold_beside_events_is_said(tmp_path: Path, kind: str) -> None:
+    words = np.array([0x0003, 0x2004, 0x8001, 0x6002, 0x2004, 0x2AFF, 0xA001, 0xE000, 0xF000], "<u2")
+    found = open_events(packet_bag(tmp_path, kind, "evt3", [(0, words[:2].tobytes()), (0, words[2:].tobytes())]))
+    for _ in range(2):  # (but once, however often it is read)
+        assert [len(events) for events in found.events()] == [1]
+        assert found.warnings == [
+            "1 events before the first time word are left out",
+            "1 events outside of the 640x480 sensor are left out",
+            "1 external triggers are left out",
+            "1 words of other kinds are left out",
+        ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_message_that_is_stamped_after_its_first_event_begins_with_that(tmp_path: Path, kind: str) -> None:
     types = types_of(kind)
     time, header, event, array = (

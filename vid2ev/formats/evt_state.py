@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
+
 
 class State(IntEnum):
     """Where the stream is."""
@@ -24,3 +26,10 @@ class Left(IntEnum):
     OUTSIDE = 1
     TRIGGERS = 2
     OTHERS = 3
+
+
+def said_of(left: np.ndarray, outside: str) -> list[tuple[int, str]]:
+    """How many of what are left out, of all kinds; `outside` names events that are no pixel's."""
+    early, others = "events before the first time word are", "words of other kinds are"
+    whats = (early, f"{outside} are", "external triggers are", others)
+    return [(int(left[kind]), what) for kind, what in zip(Left, whats, strict=True)]

@@ -110,7 +110,7 @@ class RawEvents(Sequential):
         return {"version": self._header.version, "header": self._header.fields}
 
     def _decoded(self) -> Iterator[Events]:
-        from vid2ev.formats.evt_state import Left, State
+        from vid2ev.formats.evt_state import Left, State, said_of
 
         state, left = np.full(len(State), -1, np.int64), np.zeros(len(Left), np.int64)
         with reading(self.path) as file:
@@ -118,10 +118,8 @@ class RawEvents(Sequential):
             words = (piece.astype(piece.dtype.newbyteorder("="), copy=False) for piece in pieces(file, self._dtype))
             decode = partial(self._decoder(), state, left, self.start_us)
             yield from decoded(words, decode, self.size or UNKNOWN_SIZE)
-        self._leave_out(int(left[Left.EARLY]), "events before the first time word are")
-        self._leave_out(int(left[Left.OUTSIDE]), f"{self._outside} are")
-        self._leave_out(int(left[Left.TRIGGERS]), "external triggers are")
-        self._leave_out(int(left[Left.OTHERS]), "words of other kinds are")
+        for count, what in said_of(left, self._outside):
+            self._leave_out(count, what)
         cut = (self.path.stat().st_size - self._header.length) % self._dtype.itemsize
         self._leave_out(cut, "bytes at the end, where the file is cut within a word, are")
 

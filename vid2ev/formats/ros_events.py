@@ -26,9 +26,10 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError, read_as
 from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, within
-from vid2ev.formats.evt_state import Left, State
+from vid2ev.formats.evt_state import Left, State, said_of
 from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
 from vid2ev.formats.rosbag import Topic
+from vid2ev.formats.sequential import leave_out, outside_of
 from vid2ev.stream.events import Events
 
 EVENTS_TOPIC, IMAGES_TOPIC = "/dvs/events", "/dvs/image_raw"
@@ -121,6 +122,8 @@ class RosEvents:
                     yield words.events(message)
                 else:
                     yield _unpacked(message, self.path)
+            for count, what in said_of(words.left, outside_of(self.size)):
+                leave_out(self.warnings, count, what)
 
 
 def _nearest(images: list[Topic], events: Topic) -> Topic | None:

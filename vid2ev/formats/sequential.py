@@ -48,9 +48,7 @@ class Sequential:
 
     def _leave_out(self, count: int, what: str) -> None:
         """Warn that something is not among the events; once, however often the file is read."""
-        text = f"{count} {what} left out"
-        if count and text not in self.warnings:
-            self.warnings.append(text)
+        leave_out(self.warnings, count, what)
 
     def _inside(self, events: Events) -> tuple[Events, int]:
         """The events within the sensor, and the number of the others."""
@@ -62,7 +60,19 @@ class Sequential:
 
     @property
     def _outside(self) -> str:
-        return f"events outside of the {self.size[0]}x{self.size[1]} sensor" if self.size else "events of no pixel"
+        return outside_of(self.size)
+
+
+def leave_out(warnings: list[str], count: int, what: str) -> None:
+    """Warn that something is not among the events, but once."""
+    text = f"{count} {what} left out"
+    if count and text not in warnings:
+        warnings.append(text)
+
+
+def outside_of(size: tuple[int, int] | None) -> str:
+    """Events that are of no pixel of a sensor."""
+    return f"events outside of the {size[0]}x{size[1]} sensor" if size else "events of no pixel"
 
 
 class Unwrapped:
