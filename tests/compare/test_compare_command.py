@@ -239,3 +239,23 @@ def test_rates_are_over_the_time_compared() -> None:
     path = write(moved(isolated(20, size=SIZE), 80 * 10**6), "a.h5")
     found = compare(path, path, "--statistics")["statistics"]
     assert found["rate_hz"] == pytest.approx(20 / 100 / (SIZE[0] * SIZE[1]))
+
+
+@pytest.mark.parametrize("late_s", [0, 80])
+def test_where_no_file_says_when_it_begins_the_first_event_does(late_s: int) -> None:
+    """A camera's clock may have begun long before it recorded; what a recording is like does not depend on that."""
+    events = moved(isolated(20, size=SIZE), late_s * 10**6)
+    for name in ("a.txt", "b.txt"):
+        reformat(write(events, "said.h5"), name, "rpg")
+    found = compare("a.txt", "b.txt", "--statistics")
+    seconds = (int(events.t[-1]) - int(events.t[0])) / 1e6
+    assert found["statistics"]["rate_hz"] == pytest.approx(20 / seconds / (SIZE[0] * SIZE[1]))
+    assert found["events"] == 20
+
+
+def test_before_the_first_event_of_a_file_another_may_say_that_there_was_none() -> None:
+    """So it counts as time in which both were there."""
+    events = moved(isolated(20, size=SIZE), 80 * 10**6)
+    reformat(write(events, "said.h5"), "a.txt", "rpg")
+    found = compare("a.txt", "said.h5", "--statistics")
+    assert found["statistics"]["rate_hz"] == pytest.approx(20 / 100 / (SIZE[0] * SIZE[1]))

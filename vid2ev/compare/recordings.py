@@ -85,6 +85,12 @@ class _Side:
         start_us = self.recording.start_us + self.shift_us
         return start_us, start_us + self.recording.duration_us
 
+    @property
+    def first_us(self) -> int:
+        """The time of its first event; without any, when it begins."""
+        first = next(self.recording.blocks(), None)
+        return (self.recording.start_us if first is None else int(first.t[0])) + self.shift_us
+
     def blocks(self, span_us: tuple[int, int]) -> Iterator[Events]:
         """The events with span_us[0] <= t <= span_us[1]."""
         for events in self.recording.blocks():
@@ -119,7 +125,7 @@ def compare_recordings(
     if align == "start":
         begins_us, other_us = _beginnings((one, other), files)
         other = replace(other, shift_us=begins_us - other_us)
-    span_us = _common(one, other, window_us)
+    span_us = _common(one, other, files, window_us)
     tally = Tally(size, span_us, window_us=window_us)
     sides = one, other
     bands = _bands(sides, size, limit)
@@ -146,10 +152,7 @@ def _beginnings(sides: tuple[_Side, _Side], files: tuple[EventFile, EventFile]) 
     said = all(
         file.says_start and file.start_us == side.recording.start_us for side, file in zip(sides, files, strict=True)
     )
-    firsts = [None if said else next(side.recording.blocks(), None) for side in sides]
-    return [
-        side.recording.start_us if first is None else int(first.t[0]) for side, first in zip(sides, firsts, strict=True)
-    ]
+    return [side.recording.start_us if said else side.first_us for side in sides]
 
 
 class _Progress:
@@ -184,9 +187,11 @@ def _size(
     return size
 
 
-def _common(one: _Side, other: _Side, window_us: int) -> tuple[int, int]:
-    """The first and last instant that both have; a recording without events has any."""
-    ends = [side.ends_us for side in (one, other) if side.recording.count] or [one.ends_us]
+def _common(one: _Side, other: _Side, files: tuple[EventFile, EventFile], window_us: int) -> tuple[int, int]:
+    """The first and last instant that both have; a recording without events has any.  Where no file says when it
+    begins, that is not when its clock was 0, which may be long before a camera recorded: the first event is."""
+    sides = [(side, file) for side, file in zip((one, other), files, strict=True) if side.recording.count]
+    ends = [side.ends_us for side, _ in sides] or [one.ends_us]
     starts, stops = zip(*ends, strict=True)
     start_us = min(starts) if max(starts) - min(starts) < window_us else max(starts)
     stop_us = max(stops) if max(stops) - min(stops) < window_us else min(stops)
@@ -196,6 +201,8 @@ def _common(one: _Side, other: _Side, window_us: int) -> tuple[int, int]:
             for path, (a, b) in zip((one.path, other.path), ends, strict=True)
         ]
         raise UsageError(f"{' and '.join(spans)} have no time in common; --align start lays one beginning on the other")
+    if sides and not any(file.says_start for _, file in sides):
+        start_us = max(start_us, min(side.first_us for side, _ in sides))
     return start_us, stop_us
 
 
