@@ -319,6 +319,8 @@ def test_what_cannot_be_meant_is_one_sentence() -> None:
         "colour",
         *QUICK,
     )
+    twice = "truth 'depth:exr': depth is to be png as well; give one format of it"  # one of them would be left out
+    refused(2, twice, "room", "--truth", "depth:png,depth:exr", *QUICK)
     refused(2, "size 'big': expected WIDTHxHEIGHT", "room", "--size", "big")
     refused(2, "no 'lamb' (did you mean lamp?)", "room", "--set", "lights.lamb.reach_m=3")
     Path("taken").mkdir()

@@ -61,7 +61,9 @@ class Contents:
             if name not in TRUTH or kind not in ("", *TRUTH[name]):
                 known = ", ".join(f"{one}:{'|'.join(kinds)}" for one, kinds in TRUTH.items())
                 raise UsageError(f"truth '{text}': expected some of {known}")
-            self.formats[name] = kind or TRUTH[name][0]
+            kind = kind or TRUTH[name][0]
+            if self.formats.setdefault(name, kind) != kind:
+                raise UsageError(f"truth '{text}': {name} is to be {self.formats[name]} as well; give one format of it")
 
     def describe(self) -> str:
         """On a line."""
