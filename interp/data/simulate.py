@@ -30,7 +30,7 @@ BRIGHTEST = 65504.0  # of float16
 
 
 def simulated(shot: Shot, cameras: Cameras, settings: ClipSettings) -> Clip:
-    """The clip that cameras make of a shot; events count from the first key frame on."""
+    """The clip that cameras make of a shot; events count from the first key frame on, for what dead time hid, too."""
     light, gain = Light(cameras, settings), np.float32(1.0)
     pictures = shot.pictures(cameras.steps, cameras.first, cameras.last)
     for j, (frame, luminance) in enumerate(pictures, cameras.first):
@@ -52,7 +52,7 @@ class Light:
     def add(self, j: int, frame: np.ndarray, luminance: np.ndarray) -> None:
         """The light at step j of the gap."""
         events = self._dvs.step(luminance, self._cameras.t_ns(j))
-        if 0 < j <= self._cameras.steps:
+        if j <= self._cameras.steps:  # (those before the gap tell what the first ones in it hid: `counts_of`)
             self._events.append(events)
         self._frames.add(j, frame)
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,7 +21,9 @@ from interp.data.sensor_ranges import SENSORS, SensorRanges, frame_sensor
 from interp.data.settings import PRESETS, ClipSettings
 from interp.data.shot import SAME, Beside
 from interp.data.simulate import Light, simulated
-from vid2ev import DvsSpec, load_cis, load_sensor
+from interp.representation.dead_time import DeadTime
+from interp.representation.event_counts import count_events
+from vid2ev import Dvs, DvsSpec, Events, load_cis, load_sensor
 from vid2ev.stream.frames import LUMINANCE
 
 pytestmark = pytest.mark.long
@@ -260,3 +263,20 @@ def test_what_dead_time_hid_is_missed_by_less(monkeypatch: pytest.MonkeyPatch) -
         if before > 0.01:
             left.append(missed / before)
     assert len(left) >= 5 and np.exp(np.log(left).mean()) < 0.9 and max(left) < 1.3
+
+
+def test_what_the_first_events_of_a_gap_hid_is_told_by_those_before_it() -> None:
+    """As where recordings are cut: counts of a clip are those of one stream that begins before its first key frame."""
+    blind = IDEAL.model_copy(update={"refractory_us": 500.0})
+    camera, begin, end = Dvs(blind, SMALL.size, 0), GAP_US, 2 * GAP_US
+    sent = [
+        camera.step(luminance, 1000 * GAP_US * (32 + j) // 32)
+        for j, (_, luminance) in enumerate(Drift().pictures(32, -4, 32), -4)
+    ]
+    stream = Events.concatenate([*sent, camera.flush()])
+    counts = partial(
+        count_events, size=SMALL.size, start_us=begin, stop_us=end, dead_time=DeadTime.of(blind.model_dump())
+    )
+    whole, cut = counts(stream).off_on[0].numpy(), counts(stream.select(stream.t > begin)).off_on[0].numpy()
+    assert np.abs(whole.astype(float) - cut).sum() > 10  # (so that it matters here)
+    np.testing.assert_array_equal(seen(Drift(), blind).off_on, whole.astype(np.float16))
