@@ -13,7 +13,7 @@ frozen until they come back.  The distance of two recordings is van Rossum's, ti
     distance = 2 sum D / (n_a + n_b),    D = 1/tau integral (H N)^2 dt,    H a high-pass of gain <= 1
 
 A stretch of N = 1 of length d costs 1 - exp(-d/tau) <= min(1, d/tau), those of one sign at most the sum, and those of
-both signs at most 1 to 2 times the sum: 1 where they are rare (`bounds.py`).  With n events that are pushed for the
+both signs at most 1 to 2 times the sum: 1 where they are rare (`distance.py`).  With n events that are pushed for the
 time A and turn C times, and signals that differ by e,
 
     distance <= (1 + min(1, 2 e/theta)) (e A / tau + e C) / (n theta)
