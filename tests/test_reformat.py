@@ -106,6 +106,14 @@ def test_times_since_1970_are_no_recording_of_half_a_century(recording: Path) ->
     assert columns(recording)[0] and reformat("epoch.csv", "epoch.raw")["bytes"] < 10_000
 
 
+def test_a_part_from_the_beginning_has_events_that_came_late_there(tmp_path: Path) -> None:
+    begin_us = 1_700_000_000_000_000
+    lines = [f"{begin_us + after},{after},1,1" for after in (5, 3, 8, 9, 20)]
+    (tmp_path / "late.csv").write_text("\n".join(["t,x,y,p", *lines, ""]))
+    reformat(tmp_path / "late.csv", tmp_path / "part.npz", stop_s=12e-6)
+    assert Events.concatenate(read_events(tmp_path / "part.npz")).x.tolist() == [3, 5, 8, 9]
+
+
 def test_json_and_a_summary(recording: Path) -> None:
     found = json.loads(run(str(recording), "one.npz", "--json").stdout)
     assert found["events"] == 5000 and found["files"] == ["one.npz"]

@@ -18,9 +18,10 @@ LONG_US = 1_000_000  # a silence that says that a file counts from another insta
 def beginning_us(file: EventFile) -> int:
     """Where a recording begins: where its file counts from, but with the first event if that comes a second later.
 
-    Files of cameras often count from when the camera was switched on, or do not say from when.
+    Files of cameras often count from when the camera was switched on, or do not say from when.  Some events come late:
+    the first is the earliest of the first million.
     """
-    first = next((int(events.t[0]) for events in file.events(block=1) if len(events)), file.start_us)
+    first = next((int(events.t.min()) for events in file.events() if len(events)), file.start_us)
     return first if first - file.start_us > LONG_US else min(first, file.start_us)
 
 
