@@ -128,6 +128,20 @@ def test_kalibrs_documentation_is_read_as_it_means_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(second.pose.translation_m, (0.11, 0, 0), atol=2e-3)
 
 
+def test_kalibrs_topics_say_name_and_kind_however_deep_they_are(tmp_path: Path) -> None:
+    for topic, name, kind in (
+        ("/dvs/events", "dvs", "dvs"),
+        ("/davis/left/events", "left", "dvs"),
+        ("/davis/left/image_raw", "left", "cis"),
+        ("/robot/head/flir/image_raw", "flir", "cis"),
+        ("/davis/left/image_mono", "cam0", "dvs"),  # (nothing that is known)
+    ):
+        text = KALIBR.replace("rostopic: /cam0/image_raw", f"rostopic: {topic}")
+        (tmp_path / "camchain.yaml").write_text(text)
+        first = read_calibration(tmp_path / "camchain.yaml").rig.cameras[0]
+        assert (first.name, first.kind) == (name, kind)
+
+
 def test_kalibrs_imu_places_cameras_as_well(tmp_path: Path) -> None:
     write_calibration(tmp_path / "chain.yaml", pair(), "kalibr")
     chain = yaml.safe_load((tmp_path / "chain.yaml").read_text())

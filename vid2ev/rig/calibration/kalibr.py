@@ -8,7 +8,7 @@
       T_cn_cnm1: [4 x 4]                      points of the camera before it to this one, m; not in cam0
       T_cam_imu: [4 x 4]                      points of the IMU to this camera; read where T_cn_cnm1 is not there
       timeshift_cam_imu: 0.0                  t_imu = t_cam + shift, s; the IMU's clock is the rig's
-      rostopic: /NAME/events                  or /NAME/image_raw, of a frame camera
+      rostopic: /NAME/events                  or /NAME/image_raw, of a frame camera; /ROOM/NAME/events as well
       resolution: [width, height]
 
 Source: Kalibr's wiki, "Yaml formats" and "Supported models".
@@ -38,7 +38,7 @@ from vid2ev.rig.intrinsics import DistortionModel
 from vid2ev.rig.pose import IDENTITY, Pose
 
 MODELS: dict[str, DistortionModel] = {"none": "none", "radtan": "radtan", "equidistant": "equidistant"}
-TOPIC = re.compile(r"/([\w-]+)/(events|image_raw)")
+TOPIC = re.compile(r"(?:/[\w-]+)*/([\w-]+)/(events|image_raw)")
 TOPICS: dict[str, Kind] = {"events": "dvs", "image_raw": "cis"}
 
 
