@@ -368,13 +368,23 @@ def test_a_chain_is_gone_on_with_from_every_checkpoint(clip: str, tmp_path: Path
         assert (tmp_path / "made" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
 
 
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--split", "tiles"], "add --jobs 2 or more, or --scheduler"),
+        (["--split", "tiles:2", "--jobs", "1"], "add --jobs 2 or more, or --scheduler"),
+        (["--split", "time"], "expected one of tiles"),
+    ],
+)
+def test_a_split_that_cannot_be_is_refused(options: list[str], sentence: str) -> None:
+    result = CliRunner().invoke(main, ["convert", "synthetic:moving-edge", *options])
+    assert result.exit_code == 2 and sentence in result.stderr
+
+
 @pytest.mark.slow
 def test_the_command_splits_among_its_workers(clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     options = [clip, "--fps", "50", "--upsample", "none", "--no-preview"]
-    for wrong, sentence in (("tiles", "add --jobs or --scheduler"), ("time", "expected one of tiles")):
-        result = CliRunner().invoke(main, ["convert", *options, "--split", wrong])
-        assert result.exit_code == 2 and sentence in result.stderr
     assert CliRunner().invoke(main, ["convert", *options, "-o", "whole"]).exit_code == 0
     for split in ("tiles", "cuts:2", "chain:0.0001"):
         result = CliRunner().invoke(main, ["convert", *options, "-o", split, "--jobs", "2", "--split", split, "--json"])

@@ -35,7 +35,7 @@ def split_of(text: str | None, workers: Workers) -> Split | None:
     if kind not in KINDS:
         raise UsageError(f"--split {text}: expected one of {', '.join(KINDS)}")
     if workers.alone:
-        raise UsageError(f"--split {text} needs workers to split among; add --jobs or --scheduler")
+        raise UsageError(f"--split {text} needs workers to split among; add --jobs 2 or more, or --scheduler")
     if kind == "chain":
         return Split(kind, _minutes(said, text) if colon else LINK_MIN)
     if colon and not (said.isdecimal() and 0 < len(said) < 7 and int(said)):
