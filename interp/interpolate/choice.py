@@ -66,9 +66,10 @@ def choice(
 
 
 def choice_of_one(name: str | None, network: str | Path | None, where: str, running: Running = PLAIN) -> Choice:
-    """The method for a single frame.  Raises UsageError for one that takes two, and for a way to run networks."""
-    asked = name or network
-    if asked is not None and name not in WAYS:
+    """The method for a single frame.  Raises UsageError for one that takes two, networks among them, and for a way to
+    run these."""
+    asked = network or name
+    if network or (name and name not in WAYS):
         raise UsageError(f"method '{asked}' takes two frames, and {where} is a single one; choose {' or '.join(WAYS)}")
     if running != PLAIN:
         raise UsageError(f"{where} is a single frame, which no network takes: leave out --precision and --compile")

@@ -86,7 +86,6 @@ class OfEventFile:
         self._cursor, self._path = EventCursor(path, look_back_us(self.dead_time)), path
         if not self._cursor.file.has_frames:
             raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")
-        self._part: tuple[int, int] | None = None
         times, first = list[int](), None
         for picture in self._cursor.file.frames():
             first = picture if first is None else first

@@ -413,6 +413,8 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
     assert read_codes(tmp_path / "out" / "000003.png").shape == SIZE[::-1]
     with pytest.raises(UsageError, match="takes two frames"):
         interpolate(source, tmp_path / "flow", method="flow", options=options)
+    with pytest.raises(UsageError, match="'any' takes two frames"):
+        interpolate(source, tmp_path / "flow", method="deblur", network="any", options=options)
     assert not (tmp_path / "flow").exists()
 
 
