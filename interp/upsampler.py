@@ -69,8 +69,10 @@ class NetUpsampling:
         gap = Gap(before, after, None, round((b.t_ns - a.t_ns) / 1000))
         height, width = a.light.shape[:2]
         made = self._method.images(gap, shares, tiling_of(self._method, (width, height)))
+        first, last = (self._upload.light(frame.light) for frame in (a, b))
+        endless = first.isposinf() & last.isposinf()  # (of which a sensor sees the greatest light there is)
         for t_ns, image in zip(times_ns, (image for images in made for image in images), strict=True):
-            light: Any = _light(image, a.light.ndim)
+            light: Any = _light(image, a.light.ndim).masked_fill(endless, torch.inf)
             yield Frame(light if self._stays else light.numpy(), t_ns, original=False)
         yield self._upload.frame(b) if self._stays else b
 

@@ -52,6 +52,15 @@ def test_frames_come_in_even_steps_and_the_last_is_the_frame_itself(weights: Pat
         assert np.abs(frame.light - (a.light + share * (b.light - a.light))).mean() < 0.05
 
 
+@pytest.mark.parametrize("upload", [None, Upload("cpu")])
+def test_infinite_light_that_stays_is_infinite_between_frames(weights: Path, upload: Upload | None) -> None:
+    a, b = two_frames(True)
+    for frame in (a, b):
+        frame.light[3:6, 4:9] = np.inf
+    for frame in make_upsampler(f"net:{weights}", 4, upload=upload).between(a, b):
+        assert np.array_equal(np.isposinf(np.asarray(frame.light)), np.isposinf(a.light))
+
+
 @pytest.mark.parametrize("colours", [False, True])
 def test_on_a_device_light_stays_there_and_is_the_same(weights: Path, colours: bool) -> None:
     a, b = two_frames(colours)
