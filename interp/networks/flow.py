@@ -23,7 +23,8 @@ class FlowNetworkSpec(FrameFedSpec):
         default=5,
         ge=2,
         le=7,
-        description="of 5: 10,992,292 parameters and 261 kMAC/px; of 4: 2.73 M and 201; it sees 2^levels px",
+        description="of 5: 10,992,292 parameters and 261 kMAC/px; of 4: 2.73 M and 201; it sees some 150 px"
+        " around each, of 4 70",
     )
     bins: int = Field(
         default=0, ge=0, le=64, description="of events as input, 0 for none: 288 parameters and 0.288 kMAC/px each"

@@ -48,7 +48,7 @@ class HdrSpec(NetworkSpec):
     colours: Literal[1, 3] = Field(
         default=3,
         description="channels of a frame; a network of 3 takes grey frames, too, and one of 1 the planes of coloured"
-        " ones as frames of their own. 1 saves 4 % of the cost for grey frames",
+        " ones as frames of their own. 1 saves 5 % of the cost for grey frames, with frames in path B 7 %",
     )
     second: Literal["events", "frames"] = Field(
         default="events",

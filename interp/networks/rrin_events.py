@@ -12,7 +12,7 @@ The defaults are the paper's network; the depths of its UNets are inferred from 
 that learn on two cores in minutes; the register has them as `rrin_events_light`, and for frames alone as `rrin_light`:
 
     first_flow   the optical flow of DIS in place of U1, which takes days to learn as much
-    coarse       U1 to U3 at half the resolution, U4 on squares of 2 x 2 pixels: a quarter of the cost
+    coarse       U1 to U3 at half the resolution, U4 on squares of 2 x 2 pixels: a third of the cost
     candidate    what events and key frames give in closed form (`candidates/ramps.py`) as a third picture: from it
                  on, not from nothing
     gate         no residue where nothing happens, so that what stands still stays untouched

@@ -38,8 +38,8 @@ class RrinEventsGuidedSpec(FrameFedSpec):
 
     depths: tuple[Depth, Depth, Depth] = Field(
         default=(4, 4, 4),
-        description="levels of U2 to U4: of 4 2.73 M parameters and 50 kMAC/px each, of 3 0.67 M and 36; U4 four times"
-        " the parameters",
+        description="levels of U2 to U4: of 4 2.7 M parameters each, of 3 0.7 M; U2 and U3 51 and 36 kMAC/px,"
+        " U4 151 and 91",
     )
     bins: int = Field(
         default=5,

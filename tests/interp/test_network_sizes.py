@@ -86,6 +86,8 @@ OPTIONS: list[tuple[str, dict[str, Any], dict[str, Any], str, float, float, str]
     ("e2vid", {}, {"bins": 6}, "bins", 800, 0.8, "800 parameters and 0.8"),
     ("firenet", {}, {"bins": 6}, "bins", 144, 0.144, "144 parameters and 0.144"),
     ("hdr", {}, {"bins": 6}, "bins", 1568, 1.568, "1,568 parameters and 1.568"),
+    ("rrin_events_guided", {"depths": (4, 4, 3)}, {}, "depths", 2_065_408, 59.904, "U4 151 and 91"),
+    ("rrin_events_guided", {"depths": (3, 4, 4)}, {}, "depths", 2_065_408, 14.976, "U2 and U3 51 and 36"),
 ]  # fmt: skip
 
 
@@ -97,6 +99,30 @@ def test_options_cost_what_they_say(
     assert with_it.parameters - without.parameters == parameters
     assert with_it.once + with_it.each - without.once - without.each == pytest.approx(kmac, abs=0.06)
     assert said in (type(spec_of(name)).model_fields[field].description or "")
+
+
+@pytest.mark.parametrize(("size", "unets", "channels"), [("small", 4, 2), ("tiny", 16, 4)])
+def test_channels_into_a_network_cost_half_where_all_of_it_costs_a_quarter(
+    size: str, unets: int, channels: int
+) -> None:
+    paper, less = (work_of(make("flow", each)).parameters for each in ("paper", size))
+    assert paper / less == pytest.approx(unets, rel=0.02)
+    paper, less = (
+        work_of(make("flow", each, bins=1)).parameters - work_of(make("flow", each)).parameters
+        for each in ("paper", size)
+    )
+    assert paper == channels * less
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "saved"),
+    [("superslomo", {}, 0.028), ("rrin", {}, 0.008), ("hdr", {}, 0.047), ("hdr", {"second": "frames"}, 0.07)],
+)
+def test_one_colour_saves_what_is_said(name: str, options: dict, saved: float) -> None:
+    three, one = (work_of(make(name, "paper", colours=colours, **options)) for colours in (3, 1))
+    assert 1 - (one.once + one.each) / (three.once + three.each) == pytest.approx(saved, abs=5e-4)
+    said = type(spec_of(name)).model_fields["colours"].description or ""
+    assert ("5 % of the cost for grey frames, with frames in path B 7 %" if name == "hdr" else "1 to 3 %") in said
 
 
 @pytest.mark.parametrize("name", names())
