@@ -40,7 +40,7 @@ class Pool:
     """Clips of settings and a seed in a folder.
 
     begin   clips that there are before the first sample
-    most    clips in the window; each of 128x128 pixels takes 1.6 MB
+    most    clips in the window; each of 128x128 pixels takes 2.6 MB
     fresh   clips that join it with each sample
     device  what clips are made on; one that is needed and not there yet is made on the CPU
     Raises UsageError for a window that cannot be.

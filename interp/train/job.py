@@ -35,7 +35,7 @@ class Window(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     begin: int = Field(256, ge=1, description="clips that there are before the first sample")
-    most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 1.6 MB of disk")
+    most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 2.6 MB of disk")
     fresh: float = Field(0.02, ge=0, description="clips that join with each sample")
 
 

@@ -21,6 +21,7 @@ from interp.data.samples import Samples, SampleSettings
 from interp.data.sensor_ranges import SENSORS
 from interp.data.sequences import Sequences
 from interp.data.settings import ClipSettings
+from interp.train.job import Window
 from vid2ev.errors import DataError, UsageError
 
 pytestmark = pytest.mark.long
@@ -191,6 +192,13 @@ def test_windows_that_cannot_be_are_refused(tmp_path: Path, window: dict[str, fl
 def test_samples_that_do_not_fit_are_refused(tmp_path: Path, wrong: dict[str, int]) -> None:
     with pytest.raises(UsageError):
         Samples(pool(tmp_path), SampleSettings(**({"size": 24} | wrong)), 5)
+
+
+def test_the_window_says_what_disk_a_clip_takes(tmp_path: Path) -> None:
+    """Of default settings: what a window of so many fills is to be known before hours of training."""
+    write_clip(tmp_path / "0.npy", made(ClipSettings(scenes=0.0), 0, 0))
+    said = f"{(tmp_path / '0.npy').stat().st_size / 1e6:.1f} MB"
+    assert said in str(Window.model_fields["most"].description) and said in str(Pool.__doc__)
 
 
 def test_samples_have_what_they_say(tmp_path: Path) -> None:
