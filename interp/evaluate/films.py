@@ -13,11 +13,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from interp.data.layouts.sequence import NO_LATER
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.simulated import Seen, Simulated
@@ -52,7 +54,7 @@ class Told:
     @property
     def rate_hz(self) -> float:
         """Frames a second."""
-        return 1e6 * (self.frames - 1) / (self.last_us - self.first_us) if self.frames > 1 else 0.0
+        return 1e6 * (self.frames - 1) / (self.last_us - self.first_us) if self.last_us > self.first_us else 0.0
 
 
 class Film:
@@ -98,7 +100,7 @@ class Film:
         return count
 
     def groups(self) -> Iterator[Group]:
-        """See `interp.evaluate.group.Footage`; groups across a cut are counted."""
+        """See `interp.evaluate.group.Footage`; those across a cut, or of no time, are counted."""
         told = self._told = Told()
         part, known, number = list[Seen](), Events.empty(), 0
         back_us = look_back_us(DeadTime.of(self._simulated.spec.model_dump()))
@@ -114,8 +116,8 @@ class Film:
                     if len(part) <= self.multiple:
                         continue
                     events = Events.concatenate([known, *(each.events for each in part[1:])])
-                    if any(each.shot for each in part[1:]):
-                        told.not_scored[CUT] = told.not_scored.get(CUT, 0) + 1
+                    if reason := _unfit(part):
+                        told.not_scored[reason] = told.not_scored.get(reason, 0) + 1
                     else:
                         yield self._group(number, part, events)
                         told.groups += 1
@@ -162,6 +164,14 @@ def _identity(video: str, about: Mapping[str, Any]) -> dict[str, Any]:
     if path.exists():
         return {"video": path.name, **identity(path, copies=True, deep=True)}
     return {"video": video, "sha256": hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()}
+
+
+def _unfit(part: list[Seen]) -> str:
+    """Why the frames of a gap cannot be scored; empty if they can."""
+    if any(each.shot for each in part[1:]):
+        return CUT
+    # (more than a million a second have the same microsecond, and a gap of no length has no time in between)
+    return NO_LATER if any(b.t_us <= a.t_us for a, b in pairwise(part)) else ""
 
 
 def _after(events: Events, t_us: int) -> Events:

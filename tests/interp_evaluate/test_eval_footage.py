@@ -644,3 +644,12 @@ def test_data_sets_of_all_kinds_have_names_that_differ(tmp_path: Path) -> None:
     assert films.sets == {"films": ["a", "b"]}
     with pytest.raises(UsageError, match="no such file"):
         footage_of([str(tmp_path / "nothing")], Protocol(), Simulated.of("clean"))
+
+
+def test_films_of_more_frames_a_second_than_microseconds_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    """A gap of no time has none in between; as of recordings whose times do not increase."""
+    fast = Simulated.of("clean", fps=4_000_000)
+    scene = "scene:flicker,size=64x48,scene.duration_s=0.000004"
+    with pytest.raises(DataError, match=r"no frame could be scored: .* x gaps: times of the frames do not increase"):
+        evaluate([scene], tmp_path / "of", baselines=["linear"], protocol=Protocol(1, 1), simulated=fast)
+    assert not (tmp_path / "of" / "rows.csv").exists()

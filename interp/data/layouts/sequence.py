@@ -14,6 +14,7 @@ from vid2ev import Events
 if TYPE_CHECKING:
     from interp.representation.carried import Look
 
+NO_LATER = "times of the frames do not increase"
 EVEN = 0.25  # of a step, that a frame may be off its place; where one is lost, some are off by 0.4 or more
 
 
@@ -108,7 +109,7 @@ def windows(sequence: Sequence, multiple: int, every: int = 1, begin: int = 0, e
     for k in range(begin, len(times) - multiple, every):
         part = times[k : k + multiple + 1]
         if (np.diff(part) <= 0).any():
-            reason = "times of the frames do not increase"
+            reason = NO_LATER
         elif even and not _are_even(part):
             reason = "the frames are not even in time, as where some are lost"
         elif part[-1] > end:
