@@ -31,6 +31,7 @@ from vid2ev.recording.manifest import identity
 MAT = b"MATLAB 5.0 MAT-file"
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 COLUMNS = 4
+SHORTEST_US = 100  # of exposures whose times have fractions: what is shorter is in seconds
 
 
 class OfStill:
@@ -136,8 +137,12 @@ def table_of(path: Path) -> Events:
         raise DataError(
             f"{path} holds {', '.join(found) or 'nothing'}; expected a table 'events', N x 4, of t, x, y, p"
         )
+    if not np.isfinite(table).all():
+        raise DataError(f"{path}: events with values that are no numbers; expected t, x, y, p, all of them known")
     table = table[np.argsort(table[:, 0], kind="stable")]
     t, x, y, p = table.T
     if len(table) and (min(x.min(), y.min()) < 0 or max(x.max(), y.max()) > np.iinfo(np.uint16).max):
         raise DataError(f"{path}: events at columns or rows below 0 or above 65535; expected t, x, y, p in this order")
+    if len(t) > 1 and t[-1] - t[0] < SHORTEST_US and (t % 1).any():  # (whole microseconds may be as short)
+        raise DataError(f"{path}: events from {t[0]:g} to {t[-1]:g}; expected times in us: multiply seconds by 1e6")
     return Events(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8))
