@@ -33,7 +33,7 @@ class Recipe(BaseModel):
     batch: int = Field(8, ge=1, le=65536, description="samples per step, of all processes together")
     rate: float = Field(1.5e-3, gt=0, description="highest learning rate")
     warm_up: int = Field(200, ge=0, description="steps until it is reached")
-    rate_end: float = Field(0.01, ge=0, le=1, description="rate of the last step, as a share of the highest")
+    rate_end: float = Field(0.01, ge=0, le=1, description="rate reached after the last step, as a share of the highest")
     betas: tuple[Share, Share] = Field((0.9, 0.99), description="of AdamW: means over 10 and 100 steps")
     weight_decay: float = Field(1e-4, ge=0, description="of AdamW")
     clip: float = Field(1.0, gt=0, description="longest gradient")

@@ -21,7 +21,7 @@ class Schedule:
     """Rates in relation to the highest.
 
     warm_up   steps until it is reached
-    end       at the last step
+    end       after the last step
     steps     how many there are; None while that is not known
     level     the step from which the rate goes down
     """
