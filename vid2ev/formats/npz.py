@@ -19,6 +19,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -69,22 +70,20 @@ class NpzEvents(Sequential):
             count = min(len(array) for array in files.values())
             if any(len(array) != count for array in files.values()):
                 raise DataError(f"{self.path} is damaged: its arrays t, x, y, p differ in length; get another copy")
-            outside, scale = 0, self._scale()
-            step = _at_a_time(files.values())
+            outside, step = 0, _at_a_time(files.values())
             for at in range(0, count, step):
                 parts = {key: array.read(min(step, count - at)) for key, array in files.items()}
                 column = {name: _take(parts[id(array)], key) for name, (array, key) in columns.items()}
-                events, left = self._inside(self._events(column, scale))
+                events, left = self._inside(self._events(column))
                 outside += left
                 yield events
         self._leave_out(outside, f"{self._outside} are")
 
+    @cached_property
     def _scale(self) -> int:
-        """Microseconds in the unit of time, of all times: the first ones may be whole seconds."""
+        """Microseconds in the unit of times that are no integers, of all of them: the first may be whole seconds."""
         with self._opened() as arrays:
             array, key = (_columns(arrays) or {})["t"]
-            if (array.dtype[key] if isinstance(key, str) else array.dtype).kind != "f":
-                return 1
             step = _at_a_time([array])
             for at in range(0, len(array), step):
                 t = _take(array.read(min(step, len(array) - at)), key)
@@ -94,10 +93,10 @@ class NpzEvents(Sequential):
                     return 1_000_000
         return 1
 
-    def _events(self, column: dict[str, np.ndarray], scale: int) -> Events:
+    def _events(self, column: dict[str, np.ndarray]) -> Events:
         t = column["t"]
         if t.dtype.kind == "f":
-            t = np.rint(t.astype(np.float64) * scale)
+            t = np.rint(t.astype(np.float64) * self._scale)
             if not np.all(np.abs(t) < 1 << 62):
                 raise DataError(f"{self.path} has times that are no number of microseconds; get another copy")
         label = column["label"].astype(np.uint8) if self.labelled else None

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.rig.camera import ResolvedRig
 from vid2ev.scenes.instants import rate_hz
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.world import World
@@ -128,8 +127,3 @@ def coarse_first(count: int) -> list[int]:
         seen |= dict.fromkeys(range(0, count, step))
         step //= 2
     return [*seen]
-
-
-def finer_than(world: World, rig: ResolvedRig) -> float:
-    """How much finer the pixels of the finest camera are than those of the reference camera, 1 or more."""
-    return max(1.0, *(view.intrinsics.focal_px[0] / world.intrinsics.focal_px[0] for view in rig.viewpoints))

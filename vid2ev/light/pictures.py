@@ -96,8 +96,9 @@ def with_bits(transfer: str) -> tuple[str, int | None]:
     name, colon, said = str(transfer).rpartition(":")
     if not colon or not said.endswith(UNIT):
         return transfer, None
+    number = said.removesuffix(UNIT)
     try:
-        return name, bits_of(int(number) if (number := said.removesuffix(UNIT)).isdecimal() else number)
+        return name, bits_of(int(number) if number.isdecimal() else number)
     except ValueError:
         raise UsageError(f"transfer '{transfer}': expected 1 to {MOST} bits, such as linear:10{UNIT}") from None
 

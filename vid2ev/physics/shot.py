@@ -3,9 +3,9 @@
     rate(light) = shot_rate_hz (1 - (1 - f) light)   for light up to 1,   f = shot_light_factor = 0.25
 
 ON and OFF together, half each; each resets the memory to the signal, and is sent if the pixel is not in its refractory
-period.  They are a Poisson process: candidates come at
-`shot_rate_hz` in each aligned block of 2048 pixels and each cell of a fixed 1 ms clock, and each is kept with the
-probability that the light at its instant asks for, so neither frames nor tiles change anything.
+period.  They are a Poisson process: candidates come at `shot_rate_hz` in each aligned block of 2048 pixels and each
+cell of a fixed 1 ms clock, and each is kept with the probability that the light at its instant asks for, so neither
+frames nor tiles change anything.
 
 What leaving it out changes: at most shot_rate_hz share(least light) events per pixel and second come or go, and the
 events after one of them in its pixel come from other levels.

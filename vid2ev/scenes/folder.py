@@ -41,8 +41,7 @@ def write_scene(
     Raises UsageError where the folder is taken, DataError where it cannot be written.
     """
     world = source.world
-    finer = (view.intrinsics.focal_px[0] / world.intrinsics.focal_px[0] for view in world.viewpoints)
-    source.watched_by(max(finer, default=1.0))
+    source.watched_by(view.intrinsics for view in world.viewpoints)
     said = f"# vid2ev {version('vid2ev')}: {how}; {contents.describe()}"
     tables, files = with_own_files(world.scene.tables())
     text = f"{said}\n\n{toml_text(tables)}"

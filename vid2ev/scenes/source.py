@@ -7,7 +7,7 @@ scene file.  Besides the keys of scene files there are `seed` and `size`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.rig.intrinsics import Intrinsics, finer_than
 from vid2ev.scenes.instants import Instants, rate_of
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.scene_file import plain_size, read_scene
@@ -68,8 +69,9 @@ class SceneSource:
         """When it is rendered."""
         return Instants(self.world, self._fps, self._finer)
 
-    def watched_by(self, finer: float) -> None:
-        """Let the instants suit cameras whose pixels are so much finer than those of the reference camera."""
+    def watched_by(self, cameras: Iterable[Intrinsics]) -> None:
+        """Let the instants suit cameras whose pixels may be finer than those of the reference camera."""
+        finer = finer_than(self.world.intrinsics, cameras)
         if finer > 1:
             self._finer = finer
             vars(self).pop("instants", None)
