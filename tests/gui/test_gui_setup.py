@@ -311,6 +311,18 @@ def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pyte
     assert isinstance(refused, UsageError) and "give another --port, or 0" in str(refused)
 
 
+def test_addresses_of_version_6_are_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("nicegui", reason="the extra gui is not installed")
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("this machine has no addresses of version 6")
+    served: list[tuple[str, int]] = []
+    monkeypatch.setattr("vid2ev.gui.page.serve", lambda setup, host, port, show: served.append((host, port)))
+    said = CliRunner().invoke(gui, [SMALL, "--host", "::1", "--port", "0", "--no-browser"])
+    assert said.exit_code == 0 and served[0][0] == "::1" and f"http://[::1]:{served[0][1]}  (" in said.output
+
+
 def test_what_lacks_an_option_is_served_and_what_cannot_be_read_is_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

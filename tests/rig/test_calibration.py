@@ -377,6 +377,15 @@ def test_what_opencvs_files_leave_open_is_told_by_their_numbers(tmp_path: Path) 
     assert (
         read(fisheye_model=0).distortion_model == "radtan" and read(fisheye_model=1).distortion_model == "equidistant"
     )
+    turn, shift = cv2.Rodrigues(np.array([0.0, 0.1, 0.0]))[0], np.array([[-0.06], [0], [0]])
+    pair = {"M1": matrix, "D1": four, "M2": matrix, "D2": four, "R": turn, "T": shift, "size": np.array([640, 480])}
+    for said, model in (
+        ({}, "radtan"),
+        ({"fisheye_model": 1}, "equidistant"),
+        ({"distortion_model": "fisheye"}, "equidistant"),
+    ):
+        found = read_calibration(opencv_file(tmp_path / "pair.yml", **pair, **said)).rig.cameras
+        assert [camera.distortion_model for camera in found] == [model] * 2
     assert read(distortion_coefficients=0 * four).distortion_model == "none"
     with pytest.raises(DataError, match="not a camera matrix of fx, 0, cx"):
         read(camera_matrix=matrix + np.eye(3, k=1) * [0, 0.5, 0])

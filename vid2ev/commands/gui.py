@@ -30,12 +30,13 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     if find_spec("nicegui") is None:
         raise UsageError("the page needs nicegui, which is not installed: pip install 'vid2ev[gui]'")
     from vid2ev.gui.light import duration_s
-    from vid2ev.gui.page import free_port, serve
+    from vid2ev.gui.page import address, free_port, serve
     from vid2ev.gui.setup import setup_of
 
     setup = setup_of(source, rig)
     with suppress(UsageError):  # (options that are entered on the page may put that right, such as times of images)
         duration_s(setup)  # (what cannot be read is refused at once)
     port = free_port(host, port)
-    click.echo(f"http://{'localhost' if host in ('127.0.0.1', '0.0.0.0') else host}:{port}  (Ctrl-C ends it)")
+    shown = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::") else host
+    click.echo(f"http://{address(shown, port)}  (Ctrl-C ends it)")
     serve(setup, host, port, browser)

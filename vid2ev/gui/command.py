@@ -23,7 +23,6 @@ from vid2ev.sensors.presets import sensor_file_text
 from vid2ev.toml_text import toml_text
 
 RIG, SCENE = "rig.toml", "scene.toml"
-FLAGS = {"seed", "depth", "start", "stop", "size", "crop", "slowdown", "fps", "transfer", "motion", "upsample"}
 
 
 @dataclass(frozen=True)

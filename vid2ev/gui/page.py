@@ -89,7 +89,15 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
 def free_port(host: str, port: int) -> int:
     """The port, or for 0 one that is free.  Raises UsageError for one that is taken, and for a host that is not."""
     try:
-        with socket.create_server((host, port)) as taken:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.create_server((host, port), family=family) as taken:
             return taken.getsockname()[1]
     except OSError as error:
-        raise UsageError(f"{host}:{port} cannot be served ({error.strerror}); give another --port, or 0") from error
+        raise UsageError(
+            f"{address(host, port)} cannot be served ({error.strerror}); give another --port, or 0"
+        ) from error
+
+
+def address(host: str, port: int) -> str:
+    """Where it is served, as a browser wants it: addresses of version 6 in brackets."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

@@ -3,7 +3,7 @@
     image_width, image_height, camera_matrix,       one camera; without distortion_model the number of coefficients
     distortion_coefficients, [distortion_model]     says which it is (4, 5, 8: radtan), or fisheye_model: 1
 
-    M1, D1, M2, D2, R, T, image_width, ...          two; X_2 = R X_1 + T
+    M1, D1, M2, D2, R, T, image_width, ...          two; X_2 = R X_1 + T; what says the model of distortion is for both
 
     unit: m                                         any number, as vid2ev writes them; with one or two cameras the keys
     cameras: [{camera_name, kind, image_width, ...  above are there as well
@@ -116,12 +116,13 @@ def _entry(node: Node, index: int) -> Calibrated:
 def _pair(tree: Node) -> list[Calibrated]:
     """A stereo pair; what two files of OpenCV's sample hold must stand in one."""
     second = Pose(tree["R"].rotation(), tree["T"].matrix(3, 1)[:, 0])
+    model = _model(tree)
     lenses = [
         _intrinsics(
             tree.first_of(*(key.format(number) for key in MATRICES)),
             tree.first_of(*(key.format(number) for key in COEFFICIENTS)),
             _size(tree),
-            None,
+            model,
         )
         for number in (1, 2)
     ]
@@ -130,12 +131,14 @@ def _pair(tree: Node) -> list[Calibrated]:
 
 def _single(node: Node) -> Intrinsics:
     coefficients = node.first_of("distortion_coefficients", "dist_coeffs", "distCoeffs")
-    model: DistortionModel | None = None
+    return _intrinsics(node.first_of("camera_matrix", "cameraMatrix", "K"), coefficients, _size(node), _model(node))
+
+
+def _model(node: Node) -> DistortionModel | None:
+    """What the coefficients are of, where the file says it."""
     if "distortion_model" in node:
-        model = model_named(node["distortion_model"], MODELS)
-    elif "fisheye_model" in node and node["fisheye_model"].number():
-        model = "equidistant"
-    return _intrinsics(node.first_of("camera_matrix", "cameraMatrix", "K"), coefficients, _size(node), model)
+        return model_named(node["distortion_model"], MODELS)
+    return "equidistant" if "fisheye_model" in node and node["fisheye_model"].number() else None
 
 
 def _size(node: Node) -> tuple[int, int]:
