@@ -95,7 +95,9 @@ class OfSequence:
             k for k in rising if (start_us is None or times[k] >= start_us) and (stop_us is None or times[k] <= stop_us)
         ]
         if not found:
-            start = f"from {options.start_s or 0:g} s" + (f" to {options.stop_s:g} s" if options.stop_s else " on")
+            start = f"from {options.start_s or 0:g} s" + (
+                " on" if options.stop_s is None else f" to {options.stop_s:g} s"
+            )
             last_s = 1e-6 * (int(times[rising[-1]]) - int(times[rising[0]]))
             raise UsageError(f"{self.folder}: no frame {start}; expected a part of its {last_s:.6g} s")
         return found

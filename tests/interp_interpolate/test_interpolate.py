@@ -245,6 +245,7 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
         (["b", "--hdr-network", "events.safetensors"], 2, "network hdr"),
         (["b", "--start", "9"], 2, "expected a part of its"),
+        (["b", "--start", "9", "--stop", "0"], 2, "from 9 s to 0 s; expected a part of its"),
         (["bad"], 1, "without times|pictures and"),
     ],
 )
