@@ -125,7 +125,6 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         paths = places(found, output or Path(), lambda source: _default(source, options))
 
     def one(source: str, path: Path) -> dict[str, Any]:
-        path.parent.mkdir(parents=True, exist_ok=True)
         return _one(source, path, quiet, taken, options)
 
     shared = partial(_shared, paths, workers, quiet, taken, options)
@@ -171,7 +170,6 @@ def _on_worker(tell: Tell, video: str, directory: Path, taken: Options, options:
     def report(done: int, total: int | None) -> None:
         tell(share_of(done, total))
 
-    directory.parent.mkdir(parents=True, exist_ok=True)
     return make(video, directory, options=taken, report=report, **options)
 
 

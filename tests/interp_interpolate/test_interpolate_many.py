@@ -53,6 +53,13 @@ def test_many_are_made_in_turn_or_shared_out_to_the_same_bytes() -> None:
     assert result.exit_code == 0 and "2 of 2 done" in result.output and "5 frames" in result.output
 
 
+def test_where_none_can_be_made_nothing_appears() -> None:
+    for workers in ((), ("--jobs", "2", "--retries", "0")):
+        result = run("recordings/r0", "recordings/r1", "--crop", "8x8", "-o", "out/deep", "-q", *workers)
+        assert result.exit_code == 2 and "leave --crop out" in result.output
+        assert not Path("out").exists()
+
+
 def test_a_film_is_of_one_source() -> None:
     for sources in (["films"], ["films/f0", "films/f1"]):
         result = run(*sources, "-o", "film.mp4")
