@@ -28,6 +28,7 @@ from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import scene_of
 from vid2ev.sources import open_source
 
 QUICK = ["--size", "48x36", "--duration", "0.05", "--fps", "100", "--no-preview"]
@@ -114,6 +115,26 @@ def test_instants_suit_the_finest_camera_of_a_rig(tmp_path: Path) -> None:
         farthest[name] = max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows)
     assert 0.3 < farthest["fine"] <= 0.5  # (`max_shift_px`)
     assert farthest["coarse"] == pytest.approx(farthest["fine"] / 3, rel=0.1)
+
+
+def test_instants_suit_cameras_of_a_rig_that_look_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(
+        '[[camera]]\nname = "back"\nkind = "dvs"\nsize = [32, 24]\nfocal_px = [24, 24]\nrotation_deg = [0, 180, 0]\n'
+    )
+    (tmp_path / "scene.toml").write_text(
+        '[scene]\nduration_s = 0.1\nmin_fps = 1\nambient = 1\nrig = "rig.toml"\n'
+        "[camera]\nsize = [32, 24]\nfocal_px = [24, 24]\n"
+        '[[objects]]\nname = "ball"\nkind = "sphere"\n'
+        'trajectory = { kind = "straight", position_m = [0, 0, -3], velocity_m_s = [4, 0, 0] }\n'
+    )
+    source = SceneSource(World.of(tmp_path / "scene.toml"))
+    assert len(source.instants) <= 2  # (of the reference camera, before which nothing moves)
+    write_scene(tmp_path / "out", source, Contents(truth=("flow",), preview=False))
+    flows = [read_flow(file) for file in sorted((tmp_path / "out" / "back" / "flow").iterdir())]
+    assert 0.3 < max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows) <= 0.5
+    alone = SceneSource(source.world)
+    recipe = Recipe.of(str(tmp_path / "scene.toml"))
+    assert len(scene_of(recipe.source).instants) == len(source.instants) > len(alone.instants)
 
 
 def test_every_camera_of_a_rig_has_its_folder() -> None:

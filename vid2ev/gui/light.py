@@ -25,7 +25,7 @@ from vid2ev.gui.scene_light import Film, grid_hz, ticks_of
 from vid2ev.gui.scene_part import ScenePart, scene_part
 from vid2ev.gui.setup import Setup
 from vid2ev.rig.camera import ResolvedRig, Rig
-from vid2ev.rig.intrinsics import finer_than
+from vid2ev.scenes.instants import others
 from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.world import World
 from vid2ev.seen.instants import Instant, instants
@@ -106,8 +106,8 @@ class LightTable:
         shown = lens.scaled_to(smaller(lens.size, side)) if part.framing else world.intrinsics
         rig = _smaller_rig(whole, shown, side)
         begin_s, end_s = _span_s(part, start_s, length_s)
-        finer = finer_than(world.intrinsics, (view.intrinsics for view in rig.viewpoints))
-        asked = self._film.rate_hz(world, begin_s, end_s, finer)
+        eyes = others(world, ((view.intrinsics, view.pose) for view in rig.viewpoints))
+        asked = self._film.rate_hz(world, begin_s, end_s, eyes)
         fps = min(grid_hz(asked, end_s - begin_s), part.fps or math.inf)
         mounts = mounts_of(rig, sensors, _seed(setup), alone=False)
         notes = _notes(mounts, _sizes(whole))

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.scenes.instants import rate_hz
+from vid2ev.scenes.instants import Eye, rate_hz
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.world import World
 from vid2ev.seen.instants import Instant
@@ -42,17 +42,18 @@ class Film:
         self._kept: dict[Any, np.ndarray] = {}
         self._rates: dict[Any, float] = {}
 
-    def rate_hz(self, world: World, begin_s: float, end_s: float, finer: float) -> float:
-        """How often motion and light ask for a picture from `begin_s` to `end_s` [1/s]."""
+    def rate_hz(self, world: World, begin_s: float, end_s: float, eyes: Sequence[Eye] = ()) -> float:
+        """How often motion and light ask for a picture from `begin_s` to `end_s` [1/s], as cameras see them."""
         self._turn_to(world)
+        seen = tuple(map(_key, eyes))
         knots = range(math.floor(begin_s / KNOT_S), math.ceil(end_s / KNOT_S) + 1)
         every = max(1, len(knots) // 4)
         for knot in knots[::every]:
-            if (knot, finer) not in self._rates:
+            if (knot, seen) not in self._rates:
                 self._check()
                 t_ns = min(round(1e9 * knot * KNOT_S), world.duration_ns)
-                self._rates[knot, finer] = rate_hz(world, t_ns, finer)
-        return max(self._rates[knot, finer] for knot in knots[::every])
+                self._rates[knot, seen] = rate_hz(world, t_ns, eyes)
+        return max(self._rates[knot, seen] for knot in knots[::every])
 
     def parts(
         self, world: World, mounts: Sequence[Mount], ticks: Sequence[int], fps: float, slower: float = 1.0
@@ -70,7 +71,7 @@ class Film:
         yield tuple(seen[each] for each in sorted(seen))
 
     def _instant(self, world: World, mounts: Sequence[Mount], t_ns: int, slower: float) -> Instant:
-        views = [(mount.intrinsics, *(part.tobytes() for part in vars(mount.pose).values())) for mount in mounts]
+        views = [_key(mount.view) for mount in mounts]
         coloured = {view for view, mount in zip(views, mounts, strict=True) if mount.sensor.colour}
         lights = [
             self._light(world, mount, (view, view in coloured, t_ns)) for view, mount in zip(views, mounts, strict=True)
@@ -95,6 +96,11 @@ class Film:
             self._world = world
             for known in (self._reels, self._kept, self._rates):
                 known.clear()
+
+
+def _key(eye: Eye) -> tuple[Any, ...]:
+    lens, pose = eye
+    return lens, pose.rotation.tobytes(), pose.translation_m.tobytes()
 
 
 def grid_hz(asked_hz: float, length_s: float) -> int:

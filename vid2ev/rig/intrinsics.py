@@ -12,7 +12,6 @@ Sources: the models of OpenCV 4.x, "Camera calibration and 3D reconstruction" an
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -125,8 +124,3 @@ class Framing(NamedTuple):
         left, up = (-corner * by for corner, by in zip(self.corner, finer, strict=True))
         wide, high = (side * by for side, by in zip(self.whole, finer, strict=True))
         return Framing(self.size, (left, up), (wide, high), self.whole).lens_of_part(lens)
-
-
-def finer_than(reference: Intrinsics, cameras: Iterable[Intrinsics]) -> float:
-    """How much finer the pixels of the finest camera are than those of a reference camera, 1 or more."""
-    return max([1.0, *(camera.focal_px[0] / reference.focal_px[0] for camera in cameras)])

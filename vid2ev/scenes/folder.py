@@ -41,7 +41,7 @@ def write_scene(
     Raises UsageError where the folder is taken, DataError where it cannot be written.
     """
     world = source.world
-    source.watched_by(view.intrinsics for view in world.viewpoints)
+    source.watched_by((view.intrinsics, view.pose) for view in world.viewpoints)
     said = f"# vid2ev {version('vid2ev')}: {how}; {contents.describe()}"
     tables, files = with_own_files(world.scene.tables())
     text = f"{said}\n\n{toml_text(tables)}"

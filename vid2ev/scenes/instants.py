@@ -2,8 +2,8 @@
 
 The rate at t is the greatest of
 
-    fastest thing seen [px/s] / max_shift_px            motion
-    d ln light / dt by the lamps / max_light_step       lamps that move, and highlights with them
+    fastest thing that any camera sees [px/s] / max_shift_px        motion
+    d ln light / dt by the lamps / max_light_step                   lamps that move, and highlights with them
     samples_per_period * frequency of every flicker
     min_fps
 
@@ -14,14 +14,15 @@ their rates R holds, and instant k of N + 1 is where
 
     integral of R dt = k (integral over all of the scene) / N,    N rounded up,
 
-so that the first instant is the beginning, the last one the end.  All this is a function of the scene alone; any
-instant is found without those before it.
+so that the first instant is the beginning, the last one the end.  All this is a function of the scene and of the
+cameras that see it, the reference camera and those of a rig; any instant is found without those before it.
 """
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import product
 
@@ -30,7 +31,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixels_of
-from vid2ev.rig.pose import Pose
+from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.scene import LightSource, Object
 from vid2ev.scenes.snapshot import Thing
@@ -48,6 +49,9 @@ CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 AXES = np.concatenate([np.eye(3), -np.eye(3)]) / 2
 ROUND = np.concatenate([AXES, CORNERS / math.sqrt(3)])  # on a sphere
 RIM = np.array([(math.cos(a) / 2, math.sin(a) / 2, z) for a in np.arange(8) * math.pi / 4 for z in (-0.5, 0.5)])
+
+Eye = tuple[Intrinsics, Pose]  # a camera, and where it is in the coordinates of the reference camera
+
 OUTERMOST = {"plane": CORNERS * (1, 1, 0), "box": CORNERS, "sphere": ROUND, "cylinder": RIM}
 NEAREST_M = 0.05
 
@@ -55,16 +59,16 @@ NEAREST_M = 0.05
 class Instants:
     """The instants of a world [ns]; with `fps` at k / fps, otherwise as motion and light ask for.
 
-    finer   how much finer the pixels of the finest camera are than those of the reference camera, 1 or more
+    eyes    cameras of a rig, whose motion counts beside that of the reference camera (`others`)
     """
 
-    def __init__(self, world: World, fps: float | Fraction | None = None, finer: float = 1.0):
+    def __init__(self, world: World, fps: float | Fraction | None = None, eyes: Sequence[Eye] = ()):
         self._end_ns = world.duration_ns
         self._fps = None if fps is None else rate_of(fps)
         if self._fps is not None:
             self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
             return
-        knots, rates = _rates(world, finer)
+        knots, rates = _rates(world, eyes)
         self.slowest_hz, self.fastest_hz = float(rates.min()), float(rates.max())
         spans = 1e-9 * np.diff(knots) * np.maximum(rates[1:], rates[:-1])
         self._knots, self._steps = knots, np.concatenate([[0.0], np.cumsum(spans)])
@@ -87,70 +91,91 @@ class Instants:
         return bisect_left(range(self.count), t_ns, key=self.__getitem__)
 
 
-def _rates(world: World, finer: float) -> tuple[np.ndarray, np.ndarray]:
+def _reference(world: World) -> Eye:
+    return world.intrinsics, IDENTITY
+
+
+def others(world: World, eyes: Iterable[Eye]) -> tuple[Eye, ...]:
+    """The cameras whose pictures are those of no camera before them, nor of the reference camera."""
+    found = [_reference(world)]
+    for lens, pose in eyes:
+        if not any(lens == other and _is_at(pose, there) for other, there in found):
+            found.append((lens, pose))
+    return tuple(found[1:])
+
+
+def _is_at(pose: Pose, other: Pose) -> bool:
+    return all(map(np.array_equal, vars(pose).values(), vars(other).values()))
+
+
+def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
     """The knots [ns], and the rates at them."""
     parts = max(1, math.ceil(world.duration_ns / COARSEST_NS))
     coming = [round(world.duration_ns * k / parts) for k in range(parts, -1, -1)]  # (the earliest last)
-    known = {t_ns: rate_hz(world, t_ns, finer) for t_ns in coming}
+    known = {t_ns: rate_hz(world, t_ns, eyes) for t_ns in coming}
     knots = [coming.pop()]
     while coming:
         low, high = sorted((known[knots[-1]], known[coming[-1]]))
         middle = (knots[-1] + coming[-1]) // 2
         if high > STEADY * low and middle - knots[-1] >= FINEST_NS:
-            known[middle] = rate_hz(world, middle, finer)
+            known[middle] = rate_hz(world, middle, eyes)
             coming.append(middle)
         else:
             knots.append(coming.pop())
     return np.array(knots, np.float64), np.array([known[t_ns] for t_ns in knots])
 
 
-def rate_hz(world: World, t_ns: int, finer: float = 1.0) -> float:
+def rate_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
     """Instants per second that motion and light ask for at an instant."""
-    setting = world.scene.scene
+    setting, watching = world.scene.scene, [_reference(world), *eyes]
     lit: list[LightSource | Object] = [*world.scene.lights, *world.scene.objects]
     asked = [
         setting.min_fps,
         *(setting.samples_per_period * thing.flicker.frequency_hz for thing in lit if thing.flicker),
-        finer * speed_px_s(world, t_ns) / setting.max_shift_px,
+        max(speed_px_s(world, t_ns, eye) for eye in watching) / setting.max_shift_px,
     ]
     if any(light.flicker or not is_still(light) for light in world.scene.lights):
-        asked.append(light_rate(world, t_ns) / setting.max_light_step)
+        asked.append(max(light_rate(world, t_ns, eye) for eye in watching) / setting.max_light_step)
     return min(max(asked), setting.max_fps)
 
 
-def speed_px_s(world: World, t_ns: int) -> float:
-    """The fastest that anything moves in the picture of the reference camera [px/s]."""
-    coarse = _coarse(world.intrinsics)
-    scale = world.intrinsics.size[0] / coarse.size[0]
-    shift, _ = world.flow(t_ns, t_ns + STEP_NS, _seen(world, t_ns, coarse), coarse)
+def speed_px_s(world: World, t_ns: int, eye: Eye | None = None) -> float:
+    """The fastest that anything moves in the picture of a camera, the reference camera by default [px/s]."""
+    lens, pose = eye or _reference(world)
+    coarse = _coarse(lens)
+    scale = lens.size[0] / coarse.size[0]
+    shift, _ = world.flow(t_ns, t_ns + STEP_NS, _seen(world, t_ns, coarse, pose), coarse, pose)
     lengths = np.hypot(shift[..., 0], shift[..., 1])
     on_grid = scale * float(np.nanmax(lengths, initial=0.0))
-    return MARGIN * max(on_grid, _fastest_corner(world, t_ns)) / (1e-9 * STEP_NS)
+    return MARGIN * max(on_grid, _fastest_corner(world, t_ns, lens, pose)) / (1e-9 * STEP_NS)
 
 
-def light_rate(world: World, t_ns: int) -> float:
-    """How fast lamps change the light of what is seen, everything else standing still [nat/s].
+def light_rate(world: World, t_ns: int, eye: Eye | None = None) -> float:
+    """How fast lamps change the light of what a camera sees, everything else standing still [nat/s].
 
     The fastest few pixels do not count: at the edge of a shadow light changes as fast as one looks closely.
     """
-    coarse = _coarse(world.intrinsics)
+    lens, pose = eye or _reference(world)
+    coarse = _coarse(lens)
     # (with smooth edges, so that shadows that move change the light of the pixels at their edge)
-    pictures = [_seen(world, t_ns, coarse, lamps_ns, SMOOTH) for lamps_ns in (t_ns, t_ns + STEP_NS)]
+    pictures = [_seen(world, t_ns, coarse, pose, lamps_ns, SMOOTH) for lamps_ns in (t_ns, t_ns + STEP_NS)]
     before, after = (picture.light.max(axis=-1) for picture in pictures)
     change = np.abs(np.log((after + DARK) / (before + DARK)))
     return MARGIN * float(np.quantile(change, 1 - FEW)) / (1e-9 * STEP_NS)
 
 
-def _seen(world: World, t_ns: int, intrinsics: Intrinsics, lamps_ns: int | None = None, samples: int = 1) -> Picture:
+def _seen(
+    world: World, t_ns: int, lens: Intrinsics, pose: Pose, lamps_ns: int | None = None, samples: int = 1
+) -> Picture:
     snapshot = world.snapshot(t_ns, lamps_ns)
-    return render(snapshot, intrinsics, world.camera_pose(t_ns), samples=samples, threads=world.threads)
+    return render(snapshot, lens, world.camera_pose(t_ns) @ pose, samples=samples, threads=world.threads)
 
 
-def _fastest_corner(world: World, t_ns: int) -> float:
+def _fastest_corner(world: World, t_ns: int, lens: Intrinsics, pose: Pose) -> float:
     """How far the corner of any thing in view moves within the step [px]."""
-    from_world = [world.camera_pose(t).inverse() for t in (t_ns, t_ns + STEP_NS)]
+    from_world = [(world.camera_pose(t) @ pose).inverse() for t in (t_ns, t_ns + STEP_NS)]
     pairs = zip(world.snapshot(t_ns).things, world.snapshot(t_ns + STEP_NS).things, strict=True)
-    return max((_shift(before, after, from_world, world.intrinsics) for before, after in pairs), default=0.0)
+    return max((_shift(before, after, from_world, lens) for before, after in pairs), default=0.0)
 
 
 def _shift(before: Thing, after: Thing, from_world: list[Pose], intrinsics: Intrinsics) -> float:

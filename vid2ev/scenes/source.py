@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.rig.intrinsics import Intrinsics, finer_than
-from vid2ev.scenes.instants import Instants, rate_of
+from vid2ev.scenes.instants import Eye, Instants, others, rate_of
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.scene_file import plain_size, read_scene
 from vid2ev.scenes.world import World
@@ -61,19 +60,18 @@ class SceneSource:
         self.world, self.name, self.seed, self.colour = world, name, seed, colour
         self.size = world.intrinsics.size
         self._fps = None if fps is None else rate_of(fps)
-        self._finer = 1.0
+        self._eyes: tuple[Eye, ...] = ()
         self.memory: Any = None
 
     @cached_property
     def instants(self) -> Instants:
         """When it is rendered."""
-        return Instants(self.world, self._fps, self._finer)
+        return Instants(self.world, self._fps, self._eyes)
 
-    def watched_by(self, cameras: Iterable[Intrinsics]) -> None:
-        """Let the instants suit cameras whose pixels may be finer than those of the reference camera."""
-        finer = finer_than(self.world.intrinsics, cameras)
-        if finer > 1:
-            self._finer = finer
+    def watched_by(self, cameras: Iterable[Eye]) -> None:
+        """Let the instants suit cameras that see other things than the reference camera, or the same more finely."""
+        if eyes := others(self.world, cameras):
+            self._eyes = eyes
             vars(self).pop("instants", None)
 
     @property

@@ -123,7 +123,7 @@ class Recipe:
         resolved = asked.around(taken_by(source)).resolved(source.size, lens_of(source), framing_of(source))
         mounts = mounts_of(resolved, sensors, seed, alone)
         if scene:
-            scene.watched_by(mount.intrinsics for mount in mounts)
+            scene.watched_by(mount.view for mount in mounts)
         wanted = Wanted(names_in(truth), truth_rate_hz) if truth else None
         depth = None if depth is None else str(depth)
         recipe = cls(str(video), source, resolved, mounts, depth, truth=wanted, **rest)
