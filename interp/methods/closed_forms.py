@@ -118,4 +118,4 @@ def _frames(gap: Gap) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def _some(gap: Gap, times: torch.Tensor) -> tuple[torch.Tensor, ...]:
-    return times.split(max(1, AT_ONCE_PX // gap.frame_0[0].numel()))
+    return times.split(max(1, AT_ONCE_PX // gap.frame_0[0].numel())) if len(times) else ()

@@ -50,7 +50,7 @@ class Method(Protocol):
 
     def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """Images [n, C, H, W], codes, not clipped, at times [N] in order, 0 ... 1 from the first frame to the second:
-        so many at a time that memory does not grow with N, until all are taken.
+        so many at a time that memory does not grow with N, until all are taken; none of no times.
         Gaps of a sequence come in their order if the method is `sequential`, those without a time, too.  What takes
         much memory is done tile by tile, if there are tiles.  Raises UsageError without events that it needs."""
 

@@ -44,6 +44,8 @@ class OfFrames(Together):
     def images(self, gap: Gap, times: torch.Tensor, tiling: Tiling | None = None) -> Iterator[torch.Tensor]:
         """See `interp.methods.gap.Method`."""
         _check(self, gap)
+        if not len(times):
+            return iter(())
         gap = gap if self.needs_events else replace(gap, events=None)
         if tiling is not None and len(tiling) > 1:
             # (motion to targets is large)
@@ -135,7 +137,7 @@ def _at_once(gap: Gap) -> int:
 
 def _evenly(times: torch.Tensor, some: int) -> tuple[torch.Tensor, ...]:
     """Groups of at most so many, about as large as each other."""
-    return times.tensor_split(-(-len(times) // some)) if len(times) else ()
+    return times.tensor_split(-(-len(times) // some))
 
 
 def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:

@@ -13,6 +13,7 @@ from torch.nn import functional as F
 from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
 from interp.methods.of_networks import of_weights
+from interp.methods.tiling import parse_tiling
 from interp.networks import make, spec_of
 from interp.representation.event_counts import EventCounts
 from interp.weights import save
@@ -35,6 +36,17 @@ def test_between_two_frames_that_are_alike_all_give_that_frame() -> None:
         made = made_by(method, frame, frame)
         # Through light and its log and back in float32: a hundredth of a code of 8 bits.
         torch.testing.assert_close(made, frame.expand(len(TIMES), -1, -1, -1), atol=0.01 / 255, rtol=0, msg=method)
+
+
+@pytest.mark.parametrize("method", [*METHODS, "rrin", "rrin_events_guided", "timelens", "firenet"])
+def test_of_no_times_there_are_no_images(tmp_path: Path, method: str) -> None:
+    """As of a gap that holds no instant, but whose events are asked for by what comes after."""
+    if method not in METHODS:
+        save(tmp_path / "a.safetensors", method, make(method))
+    opened = open_method(method if method in METHODS else str(tmp_path / "a.safetensors"))
+    gap = Gap(*torch.rand(2, 3, 48, 96), EventCounts.none(1, (48, 96), steps=8), 33_333)
+    for tiling in (None, parse_tiling("64x64", (96, 48), 32)):
+        assert not [*opened.begin().images(gap, torch.zeros(0), tiling)]
 
 
 def test_nearest_and_linear_are_what_they_are_called() -> None:
