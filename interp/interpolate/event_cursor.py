@@ -41,10 +41,10 @@ class EventCursor:
         if self._from_us is None or start_us < self._from_us:
             self._blocks, self._held = self._recording.blocks(), Events.empty()
         read = [self._held]
-        while not len(read[-1]) or read[-1].t[-1] <= stop_us:
-            if (following := next(self._blocks, None)) is None:
-                break
-            read.append(following)
+        seen_us = self._held.t[-1] if len(self._held) else start_us
+        while seen_us <= stop_us and (following := next(self._blocks, None)) is not None:
+            if len(following) and (seen_us := following.t[-1]) > start_us:  # (what lies before may be hours)
+                read.append(following)
         events = Events.concatenate(read)
         self._from_us = stop_us - self._back_us
         self._held = events.select(events.t > self._from_us)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import weakref
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -131,6 +132,30 @@ def test_a_cursor_holds_no_more_than_a_block(tmp_path: Path, monkeypatch: pytest
     for k in range(10):
         cursor.between(1000 * k, 1000 * (k + 1))
     assert sum(taken) <= 100 * (20_000 * 10_000 // (3 * STEP_US) // 100 + 2)
+
+
+@pytest.mark.parametrize("first_us", [0, 1000])
+def test_what_lies_before_a_stretch_is_let_go_as_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first_us: int
+) -> None:
+    """Of a part that begins late, or after a cut, over which nobody asks for events."""
+    path = written(tmp_path / "a.npz", drawn(20_000))
+    cursor, late_us = EventCursor(path), 3 * STEP_US - 1000
+    wanted, held = read_events(path, block=10**6), list[weakref.ref[np.ndarray]]()
+
+    def blocks() -> Any:
+        for part in read_events(path, block=100):
+            times = part.t.copy()
+            yield Events(times, part.x, part.y, part.p)
+            held.append(weakref.ref(times))
+            del times
+            assert sum(each() is not None for each in held) <= 3
+
+    monkeypatch.setattr(cursor, "_recording", type("R", (), {"blocks": staticmethod(blocks)}))
+    cursor.between(0, first_us)
+    found, all_of_them = cursor.between(late_us, 3 * STEP_US - 900), Events.concatenate(wanted)
+    inside = (all_of_them.t > late_us) & (all_of_them.t <= 3 * STEP_US - 900)
+    same(found, all_of_them.select(inside))
 
 
 def test_events_in_a_file_of_their_own_are_those_of_a_recording(tmp_path: Path) -> None:
