@@ -161,9 +161,9 @@ def part(gap: Gap, tile: Tile) -> Gap:
 
 def _parts(length: int, side: int, multiple: int) -> tuple[tuple[int, int], ...]:
     """Where tiles of about a side begin and end on an axis."""
-    if length <= side:
-        return ((0, length),)
     overlap = _up(min(OVERLAP, side // 4), multiple)
+    if length <= max(side, overlap):
+        return ((0, length),)
     count = ceil((length - overlap) / max(side - overlap, multiple))
     step = _up(ceil((length - overlap) / count), multiple)
     starts = range(0, length - overlap, step)

@@ -36,8 +36,8 @@ def gap(event_size: tuple[int, int] = SIZE) -> Gap:
     return Gap(frames[0], frames[1], EventCounts(counts, torch.tensor([[0.15, 0.2]])), 33_333)
 
 
-@pytest.mark.parametrize("multiple", [2, 16, 32])
-@pytest.mark.parametrize("size", [(272, 208), (1920, 1080), (641, 97), (65, 300)])
+@pytest.mark.parametrize("multiple", [2, 16, 32, 128])
+@pytest.mark.parametrize("size", [(272, 208), (1920, 1080), (641, 97), (65, 300), (128, 129)])
 @pytest.mark.parametrize("tile", ["64x64", "128x96", "auto", "none"])
 def test_tiles_cover_all_and_their_weights_add_up(size: tuple[int, int], tile: str, multiple: int) -> None:
     tiling = parse_tiling(tile, size, multiple)
