@@ -19,6 +19,7 @@ from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
+from vid2ev.sources.edit import Edit
 
 
 class OfSource:
@@ -97,8 +98,12 @@ class OfSource:
         return codes
 
     def _mean_rate(self) -> Fraction:
-        gaps, span_s = self.gaps_expected, self._source.duration_expected_s
-        return rate_of(Fraction(gaps / span_s)) if gaps and span_s else Fraction(30)
+        """Of the whole: where a part begins and ends, there need not be a frame."""
+        whole = self._source
+        while isinstance(whole, Edit):
+            whole = whole.source
+        count, span_s = whole.frames_expected, whole.duration_expected_s
+        return rate_of(Fraction((count - 1) / span_s)) if count and count > 1 and span_s else Fraction(30)
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """None."""

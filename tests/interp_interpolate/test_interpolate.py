@@ -339,6 +339,16 @@ def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tm
     assert interpolate(recording(tmp_path / "r", moving(3), step_us=hour_us), tmp_path / "rec")["frames"] == 17
 
 
+@pytest.mark.parametrize("part", [(None, None), (None, 0.22), (0.07, None), (0.03, 0.13), (None, 0.01)])
+def test_a_film_of_a_part_plays_in_real_time_wherever_that_begins_and_ends(
+    tmp_path: Path, part: tuple[float | None, float | None]
+) -> None:
+    source = images(tmp_path / "in", moving(6), step_us=50_000)
+    options = Options(start_s=part[0], stop_s=part[1], crop="64x32+0+0")
+    told = interpolate(source, tmp_path / "a.mp4", multiple=2, method="linear", options=options)
+    assert Fraction(told["film_rate"]) == 2 * 20
+
+
 @pytest.mark.parametrize(
     "asked",
     [{"multiple": "2.718281828459"}, {"multiple": "1e-400"}, {"fps": "959.123456789"}, {"fps": "1e-9"},
