@@ -55,7 +55,7 @@ class OfStill:
         self.size = pixels.shape[1], pixels.shape[0]
         self.channels, self.bits = (1 if pixels.ndim == 2 else 3), (8 if pixels.dtype == np.uint8 else 16)
         transfer = tagged or "srgb" if options.transfer == "auto" else options.transfer
-        reader = PictureReader(transfer, "rgb")
+        self._transfer, reader = transfer, PictureReader(transfer, "rgb")
         said = reader.remarks_on(pixels)
         light = torch.from_numpy(reader.light(pixels, primaries))[..., : self.channels]
         self._codes = to_codes(light, "srgb").numpy()
@@ -87,6 +87,7 @@ class OfStill:
     def describe(self, besides: Collection[Path] = ()) -> dict[str, Any]:
         """What both files are."""
         about = {"kind": "single frame", "path": str(self._picture), "size": list(self.size)}
+        about["transfer"] = self._transfer
         known = {"contrast": list(self.contrast), "dead_time": stated(self.dead_time)}
         events = {"path": str(self._path), "identity": identity(self._path, besides=besides)} | known
         return about | {"identity": identity(self._picture), "events": events}

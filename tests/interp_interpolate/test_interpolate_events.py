@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import weakref
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -436,6 +437,8 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
     assert told["interpolation"] == {"method": "deblur"} and told["frames"] == 6
     assert any("single frame" in remark for remark in told["remarks"])
     assert read_codes(tmp_path / "out" / "000003.png").shape == SIZE[::-1]
+    with pytest.raises(UsageError, match="transfer = srgb, not linear"):
+        interpolate(source, tmp_path / "out", multiple=6, options=replace(options, transfer="linear"), resume=True)
     with pytest.raises(UsageError, match="takes two frames"):
         interpolate(source, tmp_path / "flow", method="flow", options=options)
     with pytest.raises(UsageError, match="'any' takes two frames"):
