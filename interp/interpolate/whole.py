@@ -206,8 +206,7 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
     with shelf.remembering():
         for name, keeper in keepers.items():
             keeper.remember(_of(name, memory))
-    gaps, done = take.gaps_expected, shelf.count
-    total = None if gaps is None else ready.grid.count(gaps, round(10**6 * gaps / take.rate))
+    done, total = shelf.count, _expected(take, ready.grid)
     if report:
         report(done, total)
     for stretch in ready.stretches(zero_us, len(shelf.done)):
@@ -226,6 +225,15 @@ def _fill(shelf: Shelf, ready: Ready, pictures: Pictures, report: Report | None)
             memory = {}  # (from here on it is what this run has made)
     if not shelf.count:
         raise DataError(f"{take.name} holds no frame; give another part of it")
+
+
+def _expected(take: Take, grid: Grid) -> int | None:
+    """How many frames there should be; None if there is no telling."""
+    if (gaps := take.gaps_expected) is None:
+        return None
+    span_us = round(10**6 * gaps / take.rate)
+    left_out = len(grid.at(gaps, span_us, 0)) if isinstance(take, OfStill) else 0  # (the end of an exposure)
+    return grid.count(gaps, span_us) - left_out
 
 
 def _of(name: str, memory: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -433,11 +433,21 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
         source, options = tmp_path / ("a.mat" if kind == "mat" else "a.png"), Options()
     else:
         source, options = tmp_path / "a.png", Options(events=written(tmp_path / "e.npz", events))
-    told = interpolate(source, tmp_path / "out", multiple=6, options=options)
+    heard: list[tuple[int, int | None]] = []
+    for grid in ({"multiple": "2.5"}, {"fps": 500}, {"fps": 491}, {"multiple": 6}):
+        told = interpolate(
+            source,
+            tmp_path / "out",
+            **grid,
+            options=options,
+            overwrite=True,
+            report=lambda *so_far: heard.append(so_far),
+        )
+        assert heard[-1] == (told["frames"], told["frames"])
     assert told["interpolation"] == {"method": "deblur"} and told["frames"] == 6
     assert any("single frame" in remark for remark in told["remarks"])
     assert read_codes(tmp_path / "out" / "000003.png").shape == SIZE[::-1]
-    with pytest.raises(UsageError, match="transfer = srgb, not linear"):
+    with pytest.raises(UsageError, match='transfer = "srgb", not "linear"'):
         interpolate(source, tmp_path / "out", multiple=6, options=replace(options, transfer="linear"), resume=True)
     with pytest.raises(UsageError, match="takes two frames"):
         interpolate(source, tmp_path / "flow", method="flow", options=options)
