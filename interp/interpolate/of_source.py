@@ -21,6 +21,8 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 from vid2ev.sources.edit import Edit
 
+BRIGHTEST = 65504.0  # what infinite light is taken for: the most that 16-bit floats hold, of which EXR mostly are
+
 
 class OfSource:
     """Frames of whatever `vid2ev.open_source` opens."""
@@ -89,7 +91,7 @@ class OfSource:
 
     def _codes(self, light: np.ndarray) -> np.ndarray:
         """Of light [H, W, 3], [H, W, channels]."""
-        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0))
+        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0, posinf=BRIGHTEST))
         codes = to_codes(seen if self.channels == 3 else seen[..., :1], "srgb").numpy()
         if self._top:
             codes *= self._top

@@ -339,6 +339,27 @@ def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tm
     assert interpolate(recording(tmp_path / "r", moving(3), step_us=hour_us), tmp_path / "rec")["frames"] == 17
 
 
+@pytest.mark.parametrize("given", [{"method": "linear"}, {"method": "flow"}, {"network": "rrin_light-tiny"}])
+def test_a_lamp_of_infinite_light_is_as_bright_as_one_of_the_most_that_half_floats_hold(
+    tmp_path: Path, given: dict[str, Any]
+) -> None:
+    pytest.importorskip("OpenEXR")
+    from vid2ev.scenes.picture_writing import writer_of
+
+    made = []
+    for lamp in (np.inf, 65504.0):
+        folder = tmp_path / str(lamp)
+        folder.mkdir()
+        for k, frame in enumerate(moving(2)):
+            light = frame.astype(np.float32) / 255
+            light[10:20, 10:20] = lamp
+            writer_of("exr")[0](light, folder / f"{k}.exr")
+        (folder / "timestamps.txt").write_text("# us\n0\n40000\n")
+        made.append([frame.codes for frame in frames(folder, multiple=2, **given)])
+    np.testing.assert_array_equal(made[0], made[1])
+    assert min(float(frame[14, 14].min()) for frame in made[0]) > 50
+
+
 @pytest.mark.parametrize("part", [(None, None), (None, 0.22), (0.07, None), (0.03, 0.13), (None, 0.01)])
 def test_a_film_of_a_part_plays_in_real_time_wherever_that_begins_and_ends(
     tmp_path: Path, part: tuple[float | None, float | None]

@@ -177,3 +177,9 @@ def test_float_pictures_are_light_as_they_stand() -> None:
     colour = PictureReader("linear").light(np.array([[[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]], np.float32))
     np.testing.assert_allclose(colour[0], BT709_WEIGHTS, rtol=1e-6)
     assert PictureReader("gamma:2").light(np.full((1, 1), 0.5))[0, 0] == pytest.approx(0.25)
+
+
+def test_infinite_light_stays_so_in_its_own_channels() -> None:
+    for channels in ([np.inf, 1.0, 0.5], [np.inf] * 3, [0.5, -1.0, np.inf]):
+        picture = np.full((2, 3, 3), channels, np.float32)
+        np.testing.assert_array_equal(PictureReader("linear", "rgb").light(picture), picture)

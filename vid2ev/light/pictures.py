@@ -16,6 +16,7 @@ from vid2ev.stream.frames import Colour
 TYPES = "uint8, uint16 or floating point"
 UNIT = "bit"  # of `linear:10bit`
 MOST = 16  # bits of codes
+IDENTITY = np.eye(3)
 SENSORS = 12  # bits of sensors whose codes are stored as they are, at the most; 10 of many
 
 
@@ -84,6 +85,8 @@ class PictureReader:
         with np.errstate(over="ignore", invalid="ignore"):  # (infinite light is counted, too)
             if light.ndim == 2:
                 return self._grey(np.array(light, np.float32, order="C"))
+            if self.colour == "rgb" and np.array_equal(to_bt709, IDENTITY):  # (infinite x 0 would be no number)
+                return np.array(light, np.float32, order="C")
             mix = np.asarray(weights if self.colour == "luminance" else to_bt709.T, light.dtype)
             return np.array(light @ mix, np.float32, order="C")
 
