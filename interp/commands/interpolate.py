@@ -55,7 +55,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
     help="Begin at the first frame from this second on; of recordings after the first frame.",
 )
 @click.option("--stop", type=Finite(), metavar="S", help="End at the last frame up to there.")
-@click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture.")
+@click.option("--crop", metavar="WxH+X+Y", help="Part of a video's picture, and of events of as many pixels.")
 @click.option("--size", metavar="W|WxH|WxH!", help="Pixels to bring a video to.")
 @click.option("--transfer", default="auto", show_default=True, metavar="CURVE", help="Of a video's codes.")
 @click.option("--source-fps", metavar="RATE", help="Of images without times.")

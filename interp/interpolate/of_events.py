@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,14 +17,36 @@ from interp.representation.dead_time import look_back_us, stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
+from vid2ev.sources.framing import framing_of
 
 MOMENT = 4  # of a gap, before the first event and after the last: there need not be one at every instant
+
+
+class Part(NamedTuple):
+    """A part of a sensor [px]: from left and top up to, not including, right and bottom."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.right - self.left, self.bottom - self.top
+
+    def of(self, events: Events) -> Events:
+        """The events in it, from its own corner on."""
+        across = (self.left <= events.x) & (events.x < self.right)
+        found = events.select(across & (self.top <= events.y) & (events.y < self.bottom))
+        return Events(found.t, found.x - np.uint16(self.left), found.y - np.uint16(self.top), found.p)
 
 
 class FramesBesideEvents(OfSource):
     """A video or a folder of images, and the events of a file; both on one clock.
 
-    Of events of another resolution nobody says where they belong: that is found (`interp.candidates.registered`).
+    Events of as many pixels as the frames have before `--crop` and `--size` are cropped with these.  Of events of
+    another resolution nobody says where they belong: that is found (`interp.candidates.registered`).
     """
 
     def __init__(self, path: str, options: Options, events: Path):
@@ -32,19 +54,22 @@ class FramesBesideEvents(OfSource):
         self.contrast, self.dead_time = options.contrast, options.dead_time()
         self._cursor, self._events_path = EventCursor(events, look_back_us(self.dead_time)), events
         corner, self._guessed = self._cursor.size, self._cursor.file.size is None
-        within = corner[0] <= self.size[0] and corner[1] <= self.size[1]
-        self.event_size: tuple[int, int] = self.size if self._guessed and within else corner
+        guess = next((size for size in (self.size, self._whole) if all(np.less_equal(corner, size))), corner)
+        sent = guess if self._guessed else corner
+        self._cropped = sent != self.size and sent == self._whole != self._part.size
+        self.event_size: tuple[int, int] = self._part.size if self._cropped else sent
         self.apart = self.event_size != self.size
 
     @property
     def remarks(self) -> list[str]:
         """Those of the source, and what events and frames do not say of each other."""
-        across, down = self.event_size
+        across, down = self._whole if self._cropped else self.event_size
         guessed = f"{self._events_path} does not state the size of its sensor, taken for {across}x{down}"
+        cropped = f"{self._events_path} is of as many pixels as whole frames, and is cropped as these are"
         said = [*super().remarks, *(f"{self._events_path}: {text}" for text in self._cursor.file.warnings)]
         if not self._cursor.count:
             return [*said, f"{self._events_path} holds no events"]
-        return [*said, *[guessed] * self._guessed, *self._elsewhere()]
+        return [*said, *[guessed] * self._guessed, *[cropped] * self._cropped, *self._elsewhere()]
 
     def _elsewhere(self) -> Iterator[str]:
         """Whether all events are before the frames, or after them."""
@@ -67,7 +92,23 @@ class FramesBesideEvents(OfSource):
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
-        return _within(self._cursor, start_us, stop_us)
+        events = _within(self._cursor, start_us, stop_us)
+        return events if events is None or not self._cropped else self._part.of(events)
+
+    @property
+    def _whole(self) -> tuple[int, int]:
+        """Width and height of the frames before they are cropped [px]."""
+        framing = framing_of(self._source)
+        return self.size if framing is None else framing.whole
+
+    @property
+    def _part(self) -> Part:
+        framing = framing_of(self._source)
+        if framing is None:
+            return Part(0, 0, *self.size)
+        first = [round(place) for place in framing.corner]
+        after = [round(place + side) for place, side in zip(framing.corner, framing.extent, strict=True)]
+        return Part(*first, *after)
 
 
 class OfEventFile:

@@ -108,6 +108,30 @@ def test_a_sensor_of_unknown_size_is_that_of_the_frames_if_all_events_are_within
     assert take.event_size == (100, 11) and any("taken for 100x11" in text for text in take.remarks)
 
 
+@pytest.mark.parametrize("says_its_size", [True, False])
+def test_events_of_whole_frames_are_cropped_as_these_are(tmp_path: Path, says_its_size: bool) -> None:
+    """What frames and events are that somebody else has cropped."""
+    shown, events = moving(3), drawn()
+    left, top, width, height = 12, 5, 40, 32
+    inside = (events.x >= left) & (events.x < left + width) & (events.y >= top) & (events.y < top + height)
+    part = events.select(inside)
+    part = Events(part.t, part.x - np.uint16(left), part.y - np.uint16(top), part.p)
+    cut = [frame[top : top + height, left : left + width] for frame in shown]
+    made = []
+    for name, pictures, sent, size, crop in (
+        ("whole", shown, events, SIZE, f"{width}x{height}+{left}+{top}"), ("part", cut, part, (width, height), None)
+    ):  # fmt: skip
+        path = tmp_path / f"{name}.npz"
+        columns = {"t": sent.t, "x": sent.x, "y": sent.y, "p": sent.p}
+        np.savez(path, **columns, **({"size": size} if says_its_size else {}))
+        options = Options(events=path, crop=crop, contrast=(0.2, 0.2))
+        take = open_take(images(tmp_path / name, pictures), options)
+        assert take.event_size == (width, height) and not take.apart
+        assert any("cropped" in remark for remark in take.remarks) == bool(crop)
+        made += [[frame.codes for frame in frames(tmp_path / name, multiple=2, method="bridge", options=options)]]
+    np.testing.assert_allclose(*made, atol=1e-6)  # (codes of cropped frames have been light in between)
+
+
 @pytest.mark.parametrize("later_us", [10**9, -(10**9)])
 def test_events_by_another_clock_are_warned_of(tmp_path: Path, later_us: int) -> None:
     frames = images(tmp_path / "frames", moving(), start_us=max(0, -later_us))
