@@ -5,6 +5,8 @@ from the key frame before, with the events since.  So key frames do not depend o
 no sensor took: where a key frame is clipped, these are near the top of its range, and would be believed there.
 Weights for frames alone are told of the frame before processing.  All starts afresh after a cut.
 
+Light above white, of curves that go on there, is no end of a range: it is never made darker than it came.
+
 Large frames are gone through in parts, with all around them that the network sees.  Of a network of one colour each
 plane of frames in colours is a frame of its own, as each is clipped for itself.
 """
@@ -37,14 +39,15 @@ class After:
 
     events     whether there are any
     tile       the parts of large frames: see `interp.methods.tiling.parse_tiling`
+    bright     whether frames may have light above white
     Raises UsageError for weights of another network, and such as need events without them.
     """
 
-    def __init__(self, path: Path, events: bool, device: torch.device | str, tile: str = "auto"):
+    def __init__(self, path: Path, events: bool, device: torch.device | str, tile: str = "auto", bright: bool = False):
         network = load(path).to(device)
         if not isinstance(network, Hdr):
             raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
-        self.network, self.device, self.tile = network, device, tile
+        self.network, self.device, self.tile, self.bright = network, device, tile, bright
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
@@ -95,6 +98,8 @@ class After:
         window = light.new_zeros(1, self.network.spec.bins, *light.shape[1:]) if since is None else since
         second = window.expand(len(frames), -1, -1, -1) if self.needs_events else frames
         made, after = self.network(frames, second, state, residue=self.residue)
+        if self.bright:
+            made = torch.where(frames > 1, torch.maximum(made, frames), made)
         found = to_codes(made.clamp(min=0), "srgb").flatten(0, 1)
         found = found if len(found) == len(light) else found.mean(0, keepdim=True)
         return found.movedim(0, -1).cpu().numpy(), after

@@ -119,7 +119,7 @@ class OfEventFile:
 
     curve = coded = "srgb"
     bits = 8
-    apart = False  # one sensor
+    apart = bright = False  # one sensor
 
     def __init__(self, path: Path, options: Options):
         refuse_edits(path, options)

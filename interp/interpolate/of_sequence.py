@@ -32,6 +32,7 @@ class OfSequence:
 
     curve = coded = "srgb"
     bits = 8
+    bright = False
 
     def __init__(self, folder: Path, options: Options):
         refuse_edits(folder, options)

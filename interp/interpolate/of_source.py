@@ -58,15 +58,16 @@ class OfSource:
         said = str(self._about.get("transfer", "srgb"))
         whole = said == "srgb" and "edits" not in self._about
         self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
-        self.curve, self.coded = "bt709" if said in BRIGHT else said, curve_of(self._about)
+        self.bright = said in BRIGHT
+        self.curve, self.coded = "bt709" if self.bright else said, curve_of(self._about)
         rate = self._about.get("fps") or self._about.get("rate")
         self.rate = Fraction(rate) if rate else self._mean_rate()
 
     @property
     def remarks(self) -> list[str]:
         """Those of the source."""
-        bright = self._about.get("transfer") in BRIGHT
-        clipped = [f"light above white is kept in EXR only: the transfer curve is {self._about['transfer']}"] * bright
+        clipped = [f"light above white is kept in EXR only: the transfer curve is {self._about.get('transfer')}"]
+        clipped *= self.bright
         return [*map(_by_its_name, self._source.warnings), *clipped]
 
     @property

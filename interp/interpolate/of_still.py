@@ -41,7 +41,7 @@ class OfStill:
     """
 
     curve = coded = "srgb"
-    apart = False
+    apart = bright = False
 
     def __init__(self, picture: Path, events: Path, options: Options):
         unfit = {

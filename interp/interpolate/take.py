@@ -46,6 +46,7 @@ class Take(Protocol):
     bits         8 or 16: what holds the codes of its frames as they are
     curve        the transfer curve of a film of it that looks as it does
     coded        that of the codes of its pictures (`interp.own_codes`)
+    bright       whether its frames may have light above white
     rate         frames per second, as the file says, or on average
     gaps_expected  how many gaps there should be; None if there is no telling
     event_size   width and height of the event camera [px]; None without one
@@ -67,6 +68,8 @@ class Take(Protocol):
     def curve(self) -> str: ...
     @property
     def coded(self) -> str: ...
+    @property
+    def bright(self) -> bool: ...
     @property
     def rate(self) -> Fraction: ...
     @property

@@ -181,7 +181,7 @@ def prepared(
     else:
         coarse = take.event_size is not None and footprint_of(take.size, take.event_size) > 1
         chosen = choice(method, network, has_events, str(source), device, coarse, running)
-    after = After(pretrained.path_of(hdr), has_events, device, tile) if hdr else None
+    after = After(pretrained.path_of(hdr), has_events, device, tile, take.bright) if hdr else None
     tiling = tiling_of(chosen.method, take.size, tile)
     needed = after is not None and after.needs_events
     fill = Fill(take, chosen.method.begin(), open_method(FALLBACK), tiling, grid.parts, device, needed)

@@ -360,6 +360,29 @@ def test_a_lamp_of_infinite_light_is_as_bright_as_one_of_the_most_that_half_floa
     assert min(float(frame[14, 14].min()) for frame in made[0]) > 50
 
 
+def test_hdr_makes_no_light_above_white_darker(tmp_path: Path) -> None:
+    pytest.importorskip("OpenEXR")
+    from vid2ev.scenes.picture_writing import writer_of
+
+    light = np.stack([frame.astype(np.float32) / 255 for frame in moving(3)])
+    light[:, 10:20, 10:20], light[1:, 30:40, 10:20] = 30, 3
+    (tmp_path / "in").mkdir()
+    for k, each in enumerate(light):
+        writer_of("exr")[0](each, tmp_path / "in" / f"{k}.exr")
+    (tmp_path / "in" / "timestamps.txt").write_text("# us\n0\n40000\n80000\n")
+    network = make("hdr", second="frames")
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    given: dict[str, Any] = {"multiple": 2, "method": "linear"}
+    made, plain = (
+        np.stack([frame.codes for frame in frames(tmp_path / "in", **given, hdr=hdr)])
+        for hdr in (tmp_path / "hdr.safetensors", None)
+    )
+    above = plain > 1
+    assert above[:, 15, 15].all() and (made[above] >= plain[above] * (1 - 1e-5)).all()
+    assert not np.allclose(made[~above], plain[~above], atol=1e-3)
+
+
 @pytest.mark.parametrize("part", [(None, None), (None, 0.22), (0.07, None), (0.03, 0.13), (None, 0.01)])
 def test_a_film_of_a_part_plays_in_real_time_wherever_that_begins_and_ends(
     tmp_path: Path, part: tuple[float | None, float | None]
