@@ -87,19 +87,21 @@ class Pictures:
             self._write(picture, path)
 
 
-def checked_play(play: Number | None) -> Fraction | None:
-    """Frames per second of a film, if they are asked for.  Raises UsageError."""
+def checked_play(play: Number | None, kind: str) -> Fraction | None:
+    """Frames per second of a film, if they are asked for.  Raises UsageError, also for what is no film."""
     if play is None:
         return None
+    if kind != "mp4":
+        raise UsageError(f"--play {play} is of films, and what is made is a folder of {kind}; leave it out")
     rate = parse_number(play, "--play")
     if not 0 < rate <= 1000:
         raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
     return of_film(rate)
 
 
-def film_rate(take: Take, grid: Grid, play: Number | None) -> Fraction:
+def film_rate(take: Take, grid: Grid, play: Number | None, kind: str) -> Fraction:
     """Frames per second of a film: as asked, or so that it plays in real time.  Raises UsageError."""
-    if asked := checked_play(play):
+    if asked := checked_play(play, kind):
         return asked
     if isinstance(grid, Rate):
         return of_film(grid.rate_hz)

@@ -70,7 +70,7 @@ def interpolate(
                      is best for the source
     hdr        weights (`interp.pretrained.path_of`) of HDR post-processing, which changes all frames, key frames too
     format     mp4, png, or exr (linear light); by default as `output` says
-    play       frames per second at which the film plays, for slow motion; by default in real time
+    play       frames per second at which a film plays, for slow motion; by default in real time
     tile       none, WIDTHxHEIGHT, or auto: large frames in tiles
     cuts       hold: nothing is interpolated across a cut; keep: cuts are not looked for
     device     cpu, cuda or auto
@@ -88,7 +88,7 @@ def interpolate(
     take, grid, fill = ready.take, ready.grid, ready.fill
     if told:
         told(f"{fill.method.name}: {ready.why}")
-    rate = film_rate(take, grid, play)
+    rate = film_rate(take, grid, play, kind)
     pictures = Pictures(kind, take.bits, take.curve if kind == "mp4" else take.coded)
     job = {
         "versions": versions(("torch",)),

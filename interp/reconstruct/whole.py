@@ -97,7 +97,7 @@ def reconstruct(
     made_by, why, about = _choice(network, cutoff_hz, size, sensor, where)
     if told:
         told(f"{made_by.name}: {why}")
-    rate = checked_play(play) or (Fraction(FPS) if isinstance(slicing, Count) else of_film(10**6 / slicing.us))
+    rate = checked_play(play, kind) or (Fraction(FPS) if isinstance(slicing, Count) else of_film(10**6 / slicing.us))
     pictures = Pictures(kind, 8, "srgb")
     job = {
         "versions": versions(("torch",)),

@@ -234,6 +234,7 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["b", "--source-fps", "30"], 2, "leave --source-fps out"),
         (["a", "--tile", "8x8"], 2, "expected none, auto"),
         (["a", "-o", "out.avi"], 2, "cannot be made"),
+        (["a", "-o", "out", "--play", "30"], 2, "is of films"),
         (["a/000000.png"], 2, "give the folder that holds the sequence, or its events with --events"),
         (["a", "-o", "out", "--format", "mp4"], 2, "ends in .mp4"),
         (["a", "-o", "a"], 2, "exists"),

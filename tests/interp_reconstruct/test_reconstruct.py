@@ -356,6 +356,7 @@ def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> Non
         ("stop_s", math.inf, "expected seconds"),
         ("refractory_us", 0.5, "refractory period 0.5 us: expected 1 to 1e"),
         ("refractory_us", math.nan, "refractory period nan us"),
+        ("play", 30, "is of films"),
     ],
 )
 def test_arguments_that_are_none_are_refused_in_a_sentence(
