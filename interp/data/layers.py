@@ -9,7 +9,7 @@ the far.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -36,7 +36,7 @@ SOFT_PX = 1.0  # from where a shape covers all to where it covers nothing
 
 class Layer(NamedTuple):
     """A picture [h, w, 4] and its motion: what the camera looks at in its middle, turn and size at u = 0 ... 1 are
-    start + u way + u (1 - u) bend, each (x, y [px of the picture], turn [rad], log of the size)."""
+    start + u way + u (1 - u) bend, each (x, y [px of the layer, along its sides], turn [rad], log of the size)."""
 
     pixels: np.ndarray
     start: np.ndarray
@@ -111,9 +111,9 @@ class Layers:
         """Where a layer is, as `layer_kernel.lay` takes it."""
         x, y, turn, growth = layer.start + u * layer.way + u * (1 - u) * layer.bend
         shift, step = FOCAL * self.size[0] / layer.distance_m, math.exp(-growth)
-        x, y = x + shift * stand_m[0], y + shift * stand_m[1]
+        beside = step * shift * _turned(stand_m, turn)
         rows, columns = layer.pixels.shape[:2]
-        return columns / 2 + x, rows / 2 + y, step * math.cos(turn), step * math.sin(turn)
+        return columns / 2 + x + beside[0], rows / 2 + y + beside[1], step * math.cos(turn), step * math.sin(turn)
 
 
 def _layer(
@@ -136,7 +136,15 @@ def _layer(
         uniform(draw, (0.5, 3.0)) * sways, uniform(draw, (0.2, 1.0)) * max(size), draw.random(), uniform(draw, (-1, 1))
     )  # fmt: skip
     bend = _way(draw) * uniform(draw, (0, 1.2))
-    return Layer(pixels, start, own + near * camera, bend, waves, distance_m, behind_all)
+    # (what the camera does is along the sides of the picture, to which each layer is turned by another angle)
+    followed = near * np.array([*_turned(camera[:2], start[2]), *camera[2:]])
+    return Layer(pixels, start, own + followed, bend, waves, distance_m, behind_all)
+
+
+def _turned(place: Sequence[float] | np.ndarray, turn: float) -> np.ndarray:
+    """What is (x, y) along the sides of the picture, along those of a layer of a turn, as `layer_kernel` has it."""
+    (x, y), across, down = place, math.cos(turn), math.sin(turn)
+    return np.array([x * across - y * down, x * down + y * across])
 
 
 def _way(draw: np.random.Generator) -> np.ndarray:
