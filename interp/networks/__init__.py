@@ -57,7 +57,7 @@ def names() -> list[str]:
     return list(NETWORKS)
 
 
-def make(name: str, size: str = "tiny", **options: Any) -> nn.Module:
+def make(name: str, /, size: str = "tiny", **options: Any) -> nn.Module:
     """A network with fresh weights, from torch's generator.
 
     size      tiny, small or paper
@@ -68,7 +68,7 @@ def make(name: str, size: str = "tiny", **options: Any) -> nn.Module:
     return getattr(_module(entry), entry.network)(spec_of(name, size, **options))
 
 
-def spec_of(name: str, size: str = "tiny", **options: Any) -> NetworkSpec:
+def spec_of(name: str, /, size: str = "tiny", **options: Any) -> NetworkSpec:
     """The specification of a network; raises as `make` does."""
     entry = _entry(name)
     model = getattr(_module(entry), f"{entry.network}Spec")

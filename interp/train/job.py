@@ -99,6 +99,9 @@ class Job(BaseModel):
         Raises UsageError for what cannot be meant.
         """
         asked = _by_part(settings)
+        if "size" in asked["network"]:
+            said = asked["network"]["size"]
+            raise UsageError(f"setting network.size = {said!r}: it is none of a network's settings; give --size")
         network, size = network_and_size(network, size, starts)
         options = (network_of(starts[WHOLE])[2] if WHOLE in starts else {}) | asked["network"]
         spec_of(network, size, **options)  # (raises for what cannot be)
