@@ -92,7 +92,6 @@ def train(
     at any moment, or carried to another machine, it continues with --resume, on a CPU to the very same weights.
     """
     from interp.data.inputs import trained_with
-    from interp.data.samples import check_fits
     from interp.data.usable import unusable
     from interp.train.machines import Machines, check_installed
     from interp.train.run_folder import with_others
@@ -103,11 +102,13 @@ def train(
     path = Path(output or _usual_name(options, starts))
     job = _taken_up(path, options, starts) if resume else _job(options, starts)
     check_installed()
+    from interp.train.made_of import check_samples
+
     machines = Machines.of(devices, nodes, cpu, job.recipe.processes)  # type: ignore[arg-type]
     if machines.accelerator == "cpu":
         job = job.trained_by(machines.devices)
     machines.check_batch(job.recipe.batch)
-    check_fits(job.clips, job.samples.size)
+    check_samples(job)
     films = job.validation.videos
     notes = [f"not used: {reason}" for reason in unusable(job.clips, films)] + trained_with(job.clips, films)
     for note in notes if machines.first else ():

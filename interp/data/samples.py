@@ -93,11 +93,7 @@ class Samples(Drawn):
 
     def __init__(self, pool: Pool, settings: SampleSettings, length: int, colours: int = 3):
         super().__init__(pool, settings, length, colours)
-        if settings.targets >= min(pool.settings.multiples):
-            raise UsageError(
-                f"{settings.targets} targets of clips with {min(pool.settings.multiples) - 1} frames in between:"
-                " expected no more"
-            )
+        check_targets(pool.settings, settings.targets)
 
     def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
         """Instants, and what was there."""
@@ -117,6 +113,15 @@ def check_fits(clips: ClipSettings, side: int) -> None:
         raise UsageError(
             f"samples of {side} pixels with event cameras coarser by {', '.join(map(str, coarser))}: expected a"
             f" multiple of {math.lcm(*coarser)}; give --set samples.size=N"
+        )
+
+
+def check_targets(clips: ClipSettings, targets: int) -> None:
+    """Raise UsageError unless there are so many frames between the key frames of all clips."""
+    if targets >= min(clips.multiples):
+        raise UsageError(
+            f"{targets} targets of clips with {min(clips.multiples) - 1} frames in between: expected no more; give"
+            " --set samples.targets=N"
         )
 
 

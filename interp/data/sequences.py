@@ -14,6 +14,7 @@ from interp.data.clip import Clip
 from interp.data.pool import Pool
 from interp.data.samples import Drawn, SampleSettings
 from interp.data.sensor_ranges import WHITE, frame_sensor
+from interp.data.settings import ClipSettings
 from interp.data.tensors import Sample, as_tensor
 from vid2ev import Cis
 from vid2ev.errors import UsageError
@@ -35,13 +36,18 @@ class Sequences(Drawn):
 
     def __init__(self, pool: Pool, settings: SampleSettings, length: int, colours: int = 3):
         super().__init__(pool, settings, length, colours)
-        if len(set(pool.settings.multiples)) > 1:
-            raise UsageError(f"sequences of clips with multiples {pool.settings.multiples}: expected one, such as 32")
+        check_lengths(pool.settings)
 
     def truth(self, clip: Clip, draw: np.random.Generator) -> Sample:
         """All frames, and what a frame sensor makes of them."""
         clips = clipped(clip.truth, draw) if clip.truth.dtype != np.uint8 else {}
         return {"truth": as_tensor(clip.truth)} | clips
+
+
+def check_lengths(clips: ClipSettings) -> None:
+    """Raise UsageError unless all clips are of one length."""
+    if len(set(clips.multiples)) > 1:
+        raise UsageError(f"sequences of clips with multiples {clips.multiples}: expected one, such as 32")
 
 
 def clipped(light: np.ndarray, draw: np.random.Generator) -> Sample:

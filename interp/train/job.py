@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from interp.data.inputs import inputs_of
 from interp.data.samples import SampleSettings
@@ -37,6 +37,12 @@ class Window(BaseModel):
     begin: int = Field(256, ge=1, description="clips that there are before the first sample")
     most: int = Field(1500, ge=1, description="clips at any time; each of 128x128 pixels takes 2.6 MB of disk")
     fresh: float = Field(0.02, ge=0, description="clips that join with each sample")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Window:
+        if self.begin > self.most:
+            raise ValueError(f"begin {self.begin} and most {self.most}: expected no more in the beginning than at most")
+        return self
 
 
 class Validation(BaseModel):

@@ -15,9 +15,9 @@ from interp.data.chance import chance
 from interp.data.clip import Clip, remove_half_written, sound_clip, write_clip
 from interp.data.inputs import digests_of, known_by
 from interp.data.pool import VERSION, Pool, Report
-from interp.data.samples import Samples
+from interp.data.samples import Samples, check_fits, check_targets
 from interp.data.sensor_ranges import SENSORS
-from interp.data.sequences import Sequences, clipped
+from interp.data.sequences import Sequences, check_lengths, clipped
 from interp.data.settings import ClipSettings
 from interp.data.tensors import as_tensor, tensors
 from interp.data.validation import EACH, validation_clips
@@ -45,6 +45,15 @@ def learner_of(job: Job) -> Learner:
     schedule = Schedule(job.recipe.warm_up, job.recipe.rate_end, job.recipe.steps)
     kinds: dict[str, Any] = dict.fromkeys(EVENT_FED, EventFedLearner) | {"hdr": HdrLearner, "flow": FlowLearner}
     return kinds.get(job.network, FrameFedLearner)(job.network, network, job.recipe, schedule)
+
+
+def check_samples(job: Job) -> None:
+    """Raise UsageError unless the samples of a job can be drawn from its clips."""
+    check_fits(job.clips, job.samples.size)
+    if job.sequences:
+        check_lengths(job.clips)
+    else:
+        check_targets(job.clips, job.samples.targets)
 
 
 def feed_of(

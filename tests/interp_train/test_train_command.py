@@ -159,6 +159,12 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--dry-run", "--set", "clips.size=[100000,128]"], "setting clips.size.0 = 100000 is impossible"),
         (["--dry-run", "--set", "batch=1000000000"], "setting batch = 1000000000 is impossible: it must be less"),
         (["--dry-run", "--set", "samples.size=1000"], "samples of 1000 pixels from clips of 128x128: expected smaller"),
+        (["--dry-run", "--set", "samples.targets=8"], "8 targets of clips with 7 frames in between: expected no more"),
+        (["--dry-run", "--set", "window.most=9"], "settings of window: begin 256 and most 9: expected no more in the"),
+        (
+            ["--dry-run", "--network", "firenet", "--set", "clips.multiples=[8,16]"],
+            "sequences of clips with multiples (8, 16): expected one",
+        ),
         (["--dry-run", "--set", 'clips.scene_names=["rom"]'], "scene 'rom'"),
         (["--dry-run", "--set", 'clips.textures=["cofee"]'], "texture 'cofee' (did you mean coffee?): no picture"),
         (["--dry-run", "--set", 'clips.environments=["sky.hdr"]'], "environment 'sky.hdr': no picture"),
