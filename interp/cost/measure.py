@@ -193,12 +193,16 @@ def _scores(method: OfMethod, groups: Sequence[Group]) -> tuple[float, float | N
 
 
 def _brought_to(group: Group, size: Size, protocol: Protocol, device: str) -> tuple[Gap, torch.Tensor]:
-    """The gap with frames of another size, and each event in the pixels that its own has become; and when to make
-    frames."""
+    """The gap with frames of another size, and of an event camera that is as much finer or coarser than it was beside
+    them: each event is in the pixels that its own has become; and when to make frames."""
+    high, wide = group.keys.shape[1:3]
     keys = as_tensor(np.stack([cv2.resize(key, size, interpolation=cv2.INTER_LINEAR) for key in group.keys]))
-    counts = group.events.off_on.flatten(0, 1).float()
-    counts = F.interpolate(counts, size[::-1]).to(group.events.off_on.dtype)
-    events = replace(group.events, off_on=counts.unflatten(0, group.events.off_on.shape[:2]))
+    counts, (tall, long) = group.events.off_on.flatten(0, 1).float(), group.events.off_on.shape[-2:]
+    counts = F.interpolate(counts, (max(1, round(tall * size[1] / high)), max(1, round(long * size[0] / wide))))
+    off_on = counts.to(group.events.off_on.dtype).unflatten(0, group.events.off_on.shape[:2])
+    across = group.events.footprint
+    across = max(1, round(across * size[0] / wide)) if across > 1 else 1  # (of those that are not laid over frames)
+    events = replace(group.events, off_on=off_on, footprint=across)
     times = torch.from_numpy(protocol.targets(group.times_us)).float()
     return Gap(keys[0].to(device), keys[1].to(device), events.to(device), group.gap_us), times.to(device)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
 
@@ -13,15 +14,17 @@ from click.testing import CliRunner
 from matplotlib.image import imread
 
 from interp.cost import measure
-from interp.cost.measure import rebuilding
+from interp.cost.measure import Size, rebuilding
 from interp.cost.shown import table
-from interp.cost.ways import Anew, Tiled, ways
+from interp.cost.ways import Anew, Tiled, Way, ways
 from interp.evaluate.run import evaluate
 from interp.evaluate.simulated import Simulated
 from interp.methods import METHODS, Gap, open_method
+from interp.methods.gap import Together
 from interp.methods.running import Running, compiles
 from interp.pretrained import HERE
 from interp.representation.event_counts import EventCounts
+from vid2ev import convert
 from vid2ev.commands import main
 from vid2ev.errors import DataError, UsageError
 
@@ -67,6 +70,45 @@ def test_times_are_those_of_the_clock_per_frame(quick: None) -> None:
         for times in row.ms.values():
             assert times == pytest.approx([200.0, 200.0])  # (three frames in 0.6 s)
     assert [done for done, _, _ in asked] == list(range(asked[0][1]))
+
+
+class Watched(Together):
+    """Gives the first frame, and notes what it is given: sizes of frames and events, and the footprint of these."""
+
+    name, needs_events, sequential = "watched", True, False
+
+    def __init__(self) -> None:
+        self.seen = dict[Size, set[tuple[Size, int]]]()
+
+    def begin(self) -> Watched:
+        return self
+
+    def images(self, gap: Gap, times: torch.Tensor, tiling: object = None) -> Iterator[torch.Tensor]:
+        frames, events = (tuple(each.shape[:-3:-1]) for each in (gap.frame_0, gap.events.off_on))
+        self.seen.setdefault(frames, set()).add((events, gap.events.footprint))
+        yield gap.frame_0.expand(len(times), -1, -1, -1)
+
+
+@pytest.mark.parametrize(
+    ("place", "events", "finer", "footprints"),
+    [("", (16, 12), (32, 24), (1, 1)), ("rotation_deg = [0, 0, 1]", (64, 48), (128, 96), (4, 8))],
+)
+def test_what_is_timed_is_what_is_scored_also_of_a_coarse_event_camera(
+    place: str, events: Size, finer: Size, footprints: Size, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And at another size the event camera is as coarse as it was, beside the frames, or laid over them."""
+    (tmp_path / "rig.toml").write_text(
+        f'[[camera]]\nname = "dvs"\nkind = "dvs"\nsensor = "ideal"\nsize = [16, 12]\n{place}\n'
+        '[[camera]]\nname = "cis"\nkind = "cis"\nsensor = "ideal"\nset = { frame_rate_hz = 240 }\n'
+    )
+    convert(SCENE, tmp_path / "made", rig=tmp_path / "rig.toml", fps=240, pictures="png", preview=False, threads=1)
+    method = Watched()
+    monkeypatch.setattr(
+        measure, "ways", lambda *_: [Way("watched", "closed forms", lambda: method, "--method watched")]
+    )
+    rebuilding(str(tmp_path / "made"), gaps=1, sizes=[(128, 96)], repeats=1)
+    own, doubled = footprints
+    assert method.seen == {(64, 48): {(events, own)}, (128, 96): {(finer, doubled)}}
 
 
 def test_what_takes_long_is_timed_once(quick: None) -> None:
