@@ -11,6 +11,7 @@ import pytest
 from footage_made import SIZE, pictures, write_film, write_hsergb, write_predictions
 
 from interp.evaluate.figures import of_evaluation
+from interp.evaluate.figures.four_panels import write_four_panels
 from interp.evaluate.figures.of_evaluation import FILM_PX, film_panels, patch_of
 from interp.evaluate.group import Cameras, Group
 from interp.evaluate.protocol import Protocol
@@ -84,6 +85,16 @@ def test_panels_hold_the_events_since_the_frame_before(monkeypatch: pytest.Monke
     monkeypatch.setattr(of_evaluation, "four_panels", lambda *asked: seen.append(asked[1]))
     film_panels(group, "bridge", list(frames[1:4]))
     assert [int(off_on[1, 3, 5]) for off_on in seen] == [8, 6, 12] and [int(each.sum()) for each in seen] == [8, 6, 12]
+
+
+@pytest.mark.parametrize("size", [(2, 150), (150, 2)])
+def test_films_of_what_a_line_camera_sees_are_read_by_a_player(size: tuple[int, int], tmp_path: Path) -> None:
+    frames = np.zeros((3, *size[::-1], 3), np.uint8)
+    counts = EventCounts.none(1, size[::-1], 32)
+    group = Group(0, 0, frames[[0, 2]], (1,), frames[1:2], np.array([0, 1000, 2000]), counts, Cameras())
+    write_four_panels(tmp_path / "film.mp4", film_panels(group, "linear", [frames[1]]), 10)
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        assert len(list(film.decode(video=0))) == 1
 
 
 @pytest.mark.parametrize("size", [(40, 24), (320, 180), (1, 1)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from interp.evaluate.figures import four_panels, heat_map, moments, worst_patch
-from interp.evaluate.figures.layout import FRAME_PX, GAP_PX
+from interp.evaluate.figures.layout import FRAME_PX, GAP_PX, LONGEST
 from interp.evaluate.figures.lettering import ACCENT, GROUND, INK, STRIP_PX, letters, strip
 from interp.evaluate.figures.png import write_png
 from vid2ev.errors import DataError, UsageError
@@ -158,3 +158,13 @@ def test_letters_stand_on_one_line_and_are_cut_at_the_edge() -> None:
     assert letters(" ").shape[1] == 0 and letters("街").max() > 0
     narrow = strip("a very long name of a method", 20)
     assert narrow.shape == (STRIP_PX, 20, 3) and (narrow[0] == GROUND).all() and narrow.max() <= max(INK)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 300), (300, 1), (2, 200)])
+def test_what_a_line_camera_sees_fits_on_sheets(width: int, height: int) -> None:
+    """A sheet is no larger than so many times what its pictures are meant to be."""
+    true, made = plain(40, height, width), plain(60, height, width)
+    worst = worst_patch.panel(true, made, (0, 0), width=100)
+    sheet = moments.panel({"truth": [true], "linear": [made]}, ["1/2"], (0, 0, 1, 1), height=40)
+    assert worst.shape[0] <= 2 * (STRIP_PX + LONGEST * 100) + GAP_PX
+    assert sheet.shape[1] <= 200 + (LONGEST + 1) * 40 + 2 * GAP_PX

@@ -11,6 +11,7 @@ from vid2ev.errors import UsageError
 
 GAP_PX = 4
 FRAME_PX = 2
+LONGEST = 8  # times the other side, that one is shown: of a line camera's picture it would be millions of pixels
 
 
 def beside(pictures: Sequence[np.ndarray]) -> np.ndarray:
@@ -39,6 +40,12 @@ def resized(picture: np.ndarray, width: int, height: int) -> np.ndarray:
     smaller = width < picture.shape[1] or height < picture.shape[0]
     how = cv2.INTER_AREA if smaller else cv2.INTER_NEAREST
     return cv2.resize(np.ascontiguousarray(picture), (width, height), interpolation=how)
+
+
+def in_proportion(side: int, other: int, other_shown: int) -> int:
+    """How long a side of a picture is shown, whose other side is shown so long; slivers are shown wider than they
+    are."""
+    return min(max(1, round(side * other_shown / other)), LONGEST * other_shown)
 
 
 def framed(picture: np.ndarray, box: tuple[int, int, int, int], width: int, height: int) -> np.ndarray:

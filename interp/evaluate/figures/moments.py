@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from interp.evaluate.figures.layout import GAP_PX, below, beside, check_pictures, cut, framed, resized
+from interp.evaluate.figures.layout import GAP_PX, below, beside, check_pictures, cut, framed, in_proportion, resized
 from interp.evaluate.figures.lettering import GROUND, STRIP_PX, letters, strip, write
 from interp.evaluate.figures.png import write_png
 from vid2ev.errors import UsageError
@@ -58,8 +58,8 @@ def _check(lines: Mapping[str, Sequence[np.ndarray]], moments: Sequence[str]) ->
 def _cell(picture: np.ndarray, patch: tuple[int, int, int, int], height: int) -> np.ndarray:
     """The picture with the patch framed, and the patch beside it, both so high."""
     high, wide = picture.shape[:2]
-    zoomed = resized(cut(picture, patch), max(1, round(patch[2] * height / patch[3])), height)
-    return beside([framed(picture, patch, max(1, round(wide * height / high)), height), zoomed])
+    zoomed = resized(cut(picture, patch), in_proportion(patch[2], patch[3], height), height)
+    return beside([framed(picture, patch, in_proportion(wide, high, height), height), zoomed])
 
 
 def _named(names: Sequence[str], height: int) -> np.ndarray:

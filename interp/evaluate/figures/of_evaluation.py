@@ -19,7 +19,7 @@ from interp.evaluate.figures.four_panels import panel as four_panels
 from interp.evaluate.figures.four_panels import write_four_panels
 from interp.evaluate.figures.heat_map import error_codes, top_of
 from interp.evaluate.figures.heat_map import panel as heat_map
-from interp.evaluate.figures.layout import below, beside, filled, resized, titled
+from interp.evaluate.figures.layout import below, beside, filled, in_proportion, resized, titled
 from interp.evaluate.figures.lettering import strip
 from interp.evaluate.figures.moments import write_moments
 from interp.evaluate.figures.png import write_png
@@ -88,7 +88,7 @@ def film_panels(group: Group, name: str, made: Sequence[np.ndarray]) -> list[np.
     """A picture of four panels for each scored frame of a gap, with the events since the one before."""
     high, wide = group.truth.shape[1:3]
     width = min(max(wide, FILM_PX[0]), FILM_PX[1])
-    size = width, max(1, round(high * width / wide))
+    size = width, in_proportion(high, wide, width)
     steps = group.events.off_on.shape[2]
     shares = (group.times_us[list(group.positions)] - group.times_us[0]) / group.gap_us
     edges = np.rint(np.append(0, shares) * steps).astype(int)
@@ -107,7 +107,7 @@ def error_sheet(truth: np.ndarray, made: Made) -> np.ndarray:
     middle = len(truth) // 2
     high, wide = truth.shape[1:3]
     width = min(max(wide, MAP_PX[0]), MAP_PX[1])
-    size = width, max(1, round(high * width / wide))
+    size = width, in_proportion(high, wide, width)
     errors = {name: error_codes(truth[middle], pictures[middle]) for name, pictures in made.items()}
     top = top_of(np.stack(list(errors.values())))
     maps = {name: heat_map(resized(values, *size), high=top) for name, values in errors.items()}

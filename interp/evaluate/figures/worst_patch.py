@@ -6,7 +6,7 @@ import numpy as np
 
 from interp.evaluate.figures.heat_map import error_codes, top_of
 from interp.evaluate.figures.heat_map import panel as heat_map
-from interp.evaluate.figures.layout import below, beside, cut, framed, resized, titled
+from interp.evaluate.figures.layout import below, beside, cut, framed, in_proportion, resized, titled
 from interp.evaluate.figures.lettering import strip
 from vid2ev.errors import UsageError
 
@@ -37,7 +37,7 @@ def panel(
                 f"SSIM {list(similarity.shape)}: expected a map [{high}, {wide}], as large as the pictures"
             )
         maps.append(("SSIM", similarity, {"low": 1.0, "high": 0.0}))
-    tall, tall_patch = max(1, round(high * width / wide)), max(1, round(box[3] * width / box[2]))
+    tall, tall_patch = in_proportion(high, wide, width), in_proportion(box[3], box[2], width)
     above, patches = [], []
     for name, picture in (("truth", truth), ("rebuilt", rebuilt)):
         above.append(_named(name, framed(picture, box, width, tall)))
