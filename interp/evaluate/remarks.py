@@ -27,7 +27,7 @@ def left_out(summary: Mapping[str, Any]) -> dict[str, int]:
 
 
 def remarks(summary: Mapping[str, Any]) -> list[str]:
-    """Sentences: what cannot be used, what is peculiar about sequences, and frames without any error."""
+    """Sentences: what cannot be used, what is peculiar about sequences, and frames of 100 dB."""
     said: dict[str, list[str]] = {}
     for name, of in summary["sequences"].items():
         of_methods = (f"{method}: {remark}" for method, some in of["of_methods"].items() for remark in some)
@@ -67,4 +67,4 @@ def _decoded_otherwise(summary: Mapping[str, Any]) -> Iterator[str]:
 def _perfect(methods: Mapping[str, Any]) -> Iterator[str]:
     for name, of in methods.items():
         if of["perfect"]:
-            yield f"{name}: {of['perfect']} frames without any error count as 100 dB each"
+            yield f"{name}: {of['perfect']} frames without an error, or hardly any, count as 100 dB each"
