@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vid2ev import Dvs, load_sensor
+from vid2ev import Dvs, convert, load_sensor
 from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import read_manifest
 from vid2ev.scenes.source import SceneSource, parse_request, split_outside
 from vid2ev.scenes.world import World
 from vid2ev.sources import open_source
@@ -65,6 +66,13 @@ def test_instants_between_two_are_those_of_the_frames() -> None:
     assert source.instants_between(instants[1], instants[-2], 1) == instants[2:-1]
     between = [frame.t_ns for frame in source.frames_between(instants[1] - 5, instants[-2] + 5)]
     assert between == instants[1:-1]
+
+
+def test_settings_may_be_longer_than_any_name_of_a_file(tmp_path: Path) -> None:
+    text = f"scene:room,size=32x24,scene.duration_s=0.05{'0' * 250}"
+    assert open_source(text).duration_expected_s == pytest.approx(0.05)
+    convert(text, tmp_path / "made", preview=False, threads=1)
+    assert read_manifest(tmp_path / "made" / "manifest.json")["source"]["path"] == text
 
 
 def test_a_scene_file_is_a_source(tmp_path: Path) -> None:

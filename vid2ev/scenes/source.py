@@ -6,12 +6,12 @@ scene file.  Besides the keys of scene files there are `seed` and `size`.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -149,7 +149,7 @@ def open_scene(text: str, *, fps: float | Fraction | None = None, colour: Colour
     """The source of `NAME,key=value,...` or of a scene file.  Raises UsageError, DataError."""
     request = parse_request(text)
     world = World(read_scene(request.name, request.settings), request.seed)
-    name = f"scene:{text}" if not Path(text).exists() else text
+    name = text if os.path.exists(text) else f"scene:{text}"
     return SceneSource(world, name, seed=request.seed, fps=fps, colour=colour)
 
 
@@ -162,7 +162,7 @@ def rig_of_scene(text: str) -> str | None:
 
 def parse_request(text: str) -> Request:
     """What `NAME,key=value,...` asks for; commas within brackets and quotes belong to a value.  Raises UsageError."""
-    if Path(text).is_file():
+    if os.path.isfile(text):  # (of names that are too long for files, too)
         return Request(text, 0, [])
     name, *parts = split_outside(text)
     seed, settings = 0, []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from functools import partial
@@ -230,7 +231,7 @@ class Recipe:
     def _shared(self) -> dict[str, Any]:
         """What is the same for all cameras."""
         path = Path(self.video)
-        known_by = {"path": path.name, **identity(path)} if path.exists() else {"path": self.video}
+        known_by = {"path": path.name, **identity(path)} if os.path.exists(path) else {"path": self.video}
         upsampling = {"method": self.upsample, "subframes": self.subframes, "max_subframes": self.max_subframes}
         upsampling |= getattr(self.upsampler(), "about", {})
         truth = {"truth": asdict(self.truth)} if self.truth else {}
@@ -268,6 +269,8 @@ def holds_adc_codes(path: Path) -> bool:
 
 def refuse_recordings(path: Path, transfer: str = "auto") -> None:
     """Raise UsageError for what holds events already, and for frames that would be taken for something else."""
+    if is_scene(str(path)):  # (whose settings may be longer than any name of a file)
+        return
     if holds_adc_codes(path) and transfer == "auto":
         raise UsageError(
             f"{path} holds codes of a sensor's ADC, not pictures; --cis-out png makes frames/, which can be converted,"
