@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -161,7 +162,7 @@ class Film:
 def _identity(video: str, about: Mapping[str, Any]) -> dict[str, Any]:
     """What tells a film from another: what is in its files, or of a scene every number of it."""
     path = Path(video)
-    if path.exists():
+    if os.path.exists(path):  # (settings of a scene may be longer than any name of a file)
         return {"video": path.name, **identity(path, copies=True, deep=True)}
     return {"video": video, "sha256": hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()}
 

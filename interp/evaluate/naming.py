@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
+
+LONGEST = 120  # bytes; 255 are what disks take, and names of pictures have more than this in them
 
 
 def plain(name: str) -> str:
-    """A name that can be that of a file."""
-    return re.sub(r"[^\w.=+-]+", "-", name).strip("-.") or "unnamed"
+    """A name that can be that of a file; of a long one the beginning, and what tells it from others."""
+    found = re.sub(r"[^\w.=+-]+", "-", name).strip("-.") or "unnamed"
+    if len(coded := found.encode()) <= LONGEST:
+        return found
+    digest = hashlib.sha256(name.encode()).hexdigest()[:8]
+    return f"{coded[: LONGEST - 9].decode(errors='ignore')}-{digest}"
 
 
 def apart(names: list[str]) -> list[str]:
