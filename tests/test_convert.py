@@ -195,6 +195,24 @@ def test_files_of_events_have_the_frames_of_the_recording_and_no_others(tmp_path
     assert times_us == [50_000, 60_000, 70_000, 80_000]
 
 
+def test_truth_has_no_files_of_instants_that_a_recording_never_came_back_to(tmp_path: Path) -> None:
+    """It is broken off after a checkpoint, taken up from there, and ended by hand before it is as far again."""
+    options = {"depth": "plane:2", "truth": "depth,mask", "preview": False, "upsample": "none", "threads": 1}
+
+    def breaks_off(_: object, done: Any) -> None:
+        if done.frames == 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        convert(CLIP, tmp_path / "out", report=breaks_off, piece=10 << 18, **options)
+    convert(CLIP, tmp_path / "out", resume=True, report=lambda _, done: done.frames == 13, **options)
+    truth = tmp_path / "out" / "truth"
+    count = len((truth / "timestamps.txt").read_text().splitlines())
+    for kind in ("depth", "mask"):
+        numbers = sorted(int(path.stem) for path in (truth / kind).iterdir())
+        assert numbers == list(range(count)) and count > 0
+
+
 def test_event_frames_later_than_the_last_frame_are_kept(tmp_path: Path) -> None:
     clip, overrides = CLIP.replace("64x48", "96x8"), ["frame_rate_hz=6"]  # 167 and 333 ms; light ends at 300
     manifest = convert(clip, tmp_path / "out", "ideal", overrides, upsample="none")

@@ -59,8 +59,12 @@ class TruthTrack:
         """Put all into the folder of the finished recording."""
         target = whole / "truth"
         shutil.rmtree(target, ignore_errors=True)
-        shutil.copytree(self._aside, target) if self._aside.exists() else target.mkdir(parents=True)
         times = self._folder.written(f"{self._mount.within}{TIMES}").read_text(encoding="ascii").split()
+
+        def beyond(_: str, names: list[str]) -> list[str]:  # (of instants that a resumed recording never came to)
+            return [name for name in names if (stem := name.partition(".")[0]).isdecimal() and int(stem) >= len(times)]
+
+        shutil.copytree(self._aside, target, ignore=beyond) if self._aside.exists() else target.mkdir(parents=True)
         (target / "timestamps.txt").write_text("".join(f"{int(t_us)}\n" for t_us in times), encoding="ascii")
         poses = self._folder.written(f"{self._mount.within}{POSES}").read_text(encoding="ascii")
         (target / "poses.txt").write_text(HEADER + poses, encoding="ascii")
