@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from vid2ev import open_source
 from vid2ev.errors import DataError
@@ -144,6 +145,12 @@ def jpeg(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     return path
 
 
+def png_of_pillow(path: Path, pixels: np.ndarray, held: bytes) -> Path:
+    """Pillow calls all profiles the same in their tag."""
+    Image.fromarray(pixels).save(path.with_suffix(".png"), icc_profile=held)
+    return path
+
+
 def filled_jpeg(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     """With bytes FF before a mark, of which there may be any number (T.81, B.1.1.2)."""
     whole = jpeg(path, pixels, held).read_bytes()
@@ -162,7 +169,7 @@ def tiff(path: Path, pixels: np.ndarray, held: bytes) -> Path:
     return path
 
 
-@pytest.mark.parametrize("write", [jpeg, filled_jpeg, tiff])
+@pytest.mark.parametrize("write", [jpeg, filled_jpeg, tiff, png_of_pillow])
 @pytest.mark.parametrize("text", ["desc", "mluc"])
 @pytest.mark.parametrize(("name", "said"), [("Display P3", True), ("sRGB IEC61966-2.1", False), ("c2", False)])
 def test_a_profile_that_is_not_read_is_named(

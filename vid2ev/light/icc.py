@@ -1,4 +1,4 @@
-"""The name of the ICC profile that a JPEG or a TIFF holds; no more of it is read, and that is said.
+"""The name of the ICC profile that a picture holds; no more of it is read, and that is said.
 
 Sources: ICC.1:2022, sections 7.2 and 7.3 (header, table of tags), 10.13 (texts) and B.3, B.4 (where it is in TIFF and
 JPEG); ICC.1:2001-04, 6.5.17 (texts before 2010); ITU-T T.81, B.1.1 (marks of a JPEG).
@@ -22,11 +22,11 @@ REMEDY = "unless --transfer says another curve"
 
 
 def profile_name(path: Path) -> str | None:
-    """The name, empty for a profile without; None where there is no profile.  Raises DataError."""
+    """The name in a JPEG or a TIFF, empty for a profile without; None where there is no profile.  Raises DataError."""
     head = head_of(path)
     with open(path, "rb") as file:
         profile = _of_jpeg(file) if head.startswith(JPEG) else _of_tiff(file) if head.startswith(TIFF) else b""
-    return _name(profile) if profile else None
+    return name_in(profile) if profile else None
 
 
 def remarks_on_profile(path: Path, name: str | None) -> list[str]:
@@ -77,7 +77,8 @@ def _of_tiff(file: BinaryIO) -> bytes:
     return b""
 
 
-def _name(profile: bytes) -> str:
+def name_in(profile: bytes) -> str:
+    """What a profile says that it is, as far as it goes; empty where it does not."""
     for k in range(min(int.from_bytes(profile[128:132]), MANY)):
         entry = profile[132 + 12 * k : 144 + 12 * k]
         if entry[:4] == b"desc":

@@ -1,7 +1,7 @@
 """What a PNG says of its colours: the curve of its codes, and which red, green and blue they are of.
 
     cICP      code points of Rec. ITU-T H.273; before all others
-    iCCP      a profile, of which only the name is read: sRGB
+    iCCP      a profile, of which only the name is read: sRGB (its own; some programs give all of them one in the tag)
     sRGB      sRGB
     gAMA      codes are light ^ g.  1 / 2.2 is what programs write beside sRGB, and taken for that
     cHRM      chromaticities, where none of the first three is there
@@ -11,16 +11,17 @@ Source: PNG (third edition), W3C Recommendation of 2025, sections 4.3 and 11.3.2
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 from vid2ev.errors import UsageError
-from vid2ev.light.icc import REMEDY, remarks_on_profile
+from vid2ev.light.icc import LARGEST, REMEDY, name_in, remarks_on_profile
 from vid2ev.light.primaries import Primaries, primaries_at, primaries_of
 from vid2ev.light.tags import TRANSFERS, UNSPECIFIED
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.untrusted import png_chunks
 
-LARGEST = 64  # bytes of a tag that is read
+SMALL = 64  # bytes of a tag that are read, but for those of a profile
 USUAL_GAMMA = 45455  # hundred thousandths
 
 
@@ -42,7 +43,17 @@ def remarks_on_png(path: Path) -> list[str]:
         unknown = f"{path}: transfer curve {curve} of H.273 is not known; its codes are taken for sRGB, {REMEDY}"
         limited = f"{path}: codes of limited range by its tag cICP are taken for those of full range; write it anew so"
         return [unknown] * (curve not in (*TRANSFERS, UNSPECIFIED)) + [limited] * (not full_range)
-    return remarks_on_profile(path, chunks.get(b"iCCP", b"sRGB").split(b"\0")[0].decode("latin-1"))
+    return remarks_on_profile(path, _profile_name(chunks[b"iCCP"]) if b"iCCP" in chunks else None)
+
+
+def _profile_name(tag: bytes) -> str:
+    """That in the profile, or else that of the tag: between the two are a zero and the way of compression."""
+    name, _, packed = tag.partition(b"\0")
+    try:
+        profile = zlib.decompressobj().decompress(packed[1:], LARGEST)
+    except zlib.error:
+        profile = b""
+    return name_in(profile) or name.decode("latin-1")
 
 
 def _chunks(path: Path) -> dict[bytes, bytes]:
@@ -52,7 +63,7 @@ def _chunks(path: Path) -> dict[bytes, bytes]:
         for kind, length, _ in png_chunks(file):
             if kind == b"IDAT":
                 break
-            found.setdefault(kind, file.read(min(length, LARGEST)))
+            found.setdefault(kind, file.read(min(length, LARGEST if kind == b"iCCP" else SMALL)))
     return found
 
 
