@@ -10,6 +10,7 @@ import pytest
 
 from vid2ev.errors import UsageError
 from vid2ev.scenes.instants import MARGIN, Instants, speed_px_s
+from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 
 SMALL = ["camera.size=[96, 72]", "duration_s=0.25", "min_fps=1"]
@@ -110,3 +111,22 @@ def test_rates_that_cannot_be_meant_are_refused() -> None:
     for fps in (0, -1, float("nan")):
         with pytest.raises(UsageError, match="frames per second"):
             Instants(world, fps)
+
+
+@pytest.mark.parametrize(
+    ("settings", "more", "said"),
+    [
+        ("min_fps = 500\nmax_fps = 500", "", False),
+        ("max_fps = 3200", '[[lights]]\nname = "lamp"\nkind = "ambient"\nflicker = { frequency_hz = 100 }\n', False),
+        ("max_fps = 3199", '[[lights]]\nname = "lamp"\nkind = "ambient"\nflicker = { frequency_hz = 100 }\n', True),
+    ],
+    ids=["least", "just enough", "too few"],
+)
+def test_it_is_said_where_there_are_fewer_instants_than_were_asked_for_and_only_there(
+    tmp_path: Path, settings: str, more: str, said: bool
+) -> None:
+    """Of a flicker 32 a period are asked for, and nothing else calls for any."""
+    file = tmp_path / "scene.toml"
+    steady = "max_light_step = 10\nsamples_per_period = 32"
+    file.write_text(f"[scene]\nduration_s = 0.05\n{steady}\n{settings}\n[camera]\nsize = [16, 12]\n{STILL}{more}")
+    assert bool(SceneSource(World.of(file)).warnings) == said

@@ -69,6 +69,7 @@ class Instants:
             self.count = self._end_ns * self._fps.numerator // (10**9 * self._fps.denominator) + 1
             return
         knots, rates = _rates(world, eyes)
+        self.asked_hz, rates = float(rates.max()), np.minimum(rates, world.scene.scene.max_fps)
         self.slowest_hz, self.fastest_hz = float(rates.min()), float(rates.max())
         spans = 1e-9 * np.diff(knots) * np.maximum(rates[1:], rates[:-1])
         self._knots, self._steps = knots, np.concatenate([[0.0], np.cumsum(spans)])
@@ -109,16 +110,16 @@ def _is_at(pose: Pose, other: Pose) -> bool:
 
 
 def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
-    """The knots [ns], and the rates at them."""
+    """The knots [ns], and the rates that are asked for at them; those above `max_fps` count as alike."""
     parts = max(1, math.ceil(world.duration_ns / COARSEST_NS))
     coming = [round(world.duration_ns * k / parts) for k in range(parts, -1, -1)]  # (the earliest last)
-    known = {t_ns: rate_hz(world, t_ns, eyes) for t_ns in coming}
+    known, most = {t_ns: asked_hz(world, t_ns, eyes) for t_ns in coming}, world.scene.scene.max_fps
     knots = [coming.pop()]
     while coming:
-        low, high = sorted((known[knots[-1]], known[coming[-1]]))
+        low, high = sorted(min(known[t_ns], most) for t_ns in (knots[-1], coming[-1]))
         middle = (knots[-1] + coming[-1]) // 2
         if high > STEADY * low and middle - knots[-1] >= FINEST_NS:
-            known[middle] = rate_hz(world, middle, eyes)
+            known[middle] = asked_hz(world, middle, eyes)
             coming.append(middle)
         else:
             knots.append(coming.pop())
@@ -126,6 +127,11 @@ def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rate_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
+    """Instants per second that there are about an instant: those that are asked for, up to `max_fps`."""
+    return min(asked_hz(world, t_ns, eyes), world.scene.scene.max_fps)
+
+
+def asked_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
     """Instants per second that motion and light ask for at an instant."""
     setting, watching = world.scene.scene, [_reference(world), *eyes]
     lit: list[LightSource | Object] = [*world.scene.lights, *world.scene.objects]
@@ -136,7 +142,7 @@ def rate_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
     ]
     if any(light.flicker or not is_still(light) for light in world.scene.lights):
         asked.append(max(light_rate(world, t_ns, eye) for eye in watching) / setting.max_light_step)
-    return min(max(asked), setting.max_fps)
+    return max(asked)
 
 
 def speed_px_s(world: World, t_ns: int, eye: Eye | None = None) -> float:

@@ -78,7 +78,7 @@ class SceneSource:
     def warnings(self) -> list[str]:
         """Whether it is rendered less often than was asked for."""
         limit = self.world.scene.scene.max_fps
-        if self._fps is not None or self.instants.fastest_hz < limit:
+        if self._fps is not None or self.instants.asked_hz <= limit:
             return []
         return [
             f"{self.name}: more changes between two instants than was asked for, as there are {limit:g} a second at"
