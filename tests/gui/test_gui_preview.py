@@ -12,8 +12,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
+from queue import SimpleQueue
 from types import SimpleNamespace
 from typing import Any
+from weakref import ref
 
 import cv2
 import numpy as np
@@ -30,7 +32,7 @@ from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
-from vid2ev.gui.worker import Refused, Worker, _serve
+from vid2ev.gui.worker import Planner, Refused, Worker, _serve
 from vid2ev.rig.camera import default_rig
 from vid2ev.seen.instants import Instant, events_of
 from vid2ev.seen.recipe import Recipe
@@ -417,6 +419,19 @@ def test_a_refusal_is_told_from_a_plan_that_is_not_there(setup: Setup) -> None:
     session._take(Answer(1, 0.0, (0.0, 0.1), 1.0, (), whole=False))
     assert told == [("no plan", False), ("no such file", True), ("", False)]
     session.close()
+
+
+def test_of_previews_that_wait_for_their_plan_only_the_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vid2ev.gui.worker.plans_of", lambda light, number, check: (light.item(), number))
+    sent: SimpleQueue[Any] = SimpleQueue()
+    planner, lights = Planner(sent.put, lambda: 9), list[Any]()
+    for number in range(10):
+        light: Any = np.full(1, 100 * number)
+        lights.append(ref(light))
+        planner.plan(light, number)
+    assert [light().item() for light in lights if light() is not None] == [900]
+    planner.start()
+    assert sent.get(timeout=60) == (900, 9) and sent.empty()
 
 
 def test_pictures_come_while_a_slider_moves(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:

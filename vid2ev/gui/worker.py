@@ -12,8 +12,9 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection
-from queue import SimpleQueue
+from queue import Empty, Queue
 from threading import Lock, Thread
 from typing import Any, NamedTuple
 
@@ -115,10 +116,12 @@ class Planner(Thread):
     def __init__(self, send: Callable[[Any], None], newest: Callable[[], int]):
         super().__init__(daemon=True)
         self._send, self._newest = send, newest
-        self._coming: SimpleQueue[tuple[Light, int]] = SimpleQueue()
+        self._coming: Queue[tuple[Light, int]] = Queue(maxsize=1)
 
     def plan(self, light: Light, number: int) -> None:
-        """Plan the cameras of this light, unless another preview is asked for."""
+        """Plan the cameras of this light, unless another preview is asked for, in place of what waits."""
+        with suppress(Empty):  # (while time plays there is one after the other: each waiting its turn, and its light)
+            self._coming.get_nowait()
         self._coming.put((light, number))
 
     def run(self) -> None:
