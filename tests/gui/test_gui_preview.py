@@ -160,6 +160,15 @@ def test_maps_of_depth_that_are_written_again_are_another_light(tmp_path: Path) 
     assert first != then
 
 
+def test_a_path_over_a_photograph_that_is_written_again_is_another_light(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "photo.png"), np.tile(np.uint8([30] * 300 + [220] * 300), (200, 1)))
+    path = tmp_path / "path.csv"
+    path.write_text("0,-150,0\n1,-149,0\n")
+    setup = setup_of(str(tmp_path / "photo.png")).with_option("motion", str(path)).with_option("size", "64x48")
+    first, then = levels_of(setup, lambda: path.write_text("0,150,0\n1.5,149,0\n"))
+    assert then > 5 * first and duration_s(setup) == pytest.approx(1.5)
+
+
 MESH = "mtllib m.mtl\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\n"
 MESH = f"{MESH}f 1/1 3/3 2/2\nf 1/1 4/4 3/3\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 

@@ -258,7 +258,7 @@ def _without_sensors(setup: Setup) -> Any:
     depth = re.sub(r"(,\w+=[^,=]*)*$", "", str(setup.options.get("depth", "")))  # (without what its numbers mean)
     return (
         setup.source,
-        _stamp(setup.source) if scene is None else stamp_of_scene(scene),
+        _stamp(setup) if scene is None else stamp_of_scene(scene),
         stamp(depth),
         Rig(source=setup.rig.source, cameras=bare),
         scene,
@@ -277,16 +277,16 @@ def _opening(setup: Setup) -> tuple[str, Stamp, tuple[tuple[str, Any], ...]]:
     known = ("transfer", "fps", "slowdown", "start", "stop", "crop", "size", "motion")
     return (
         setup.source,
-        _stamp(setup.source),
+        _stamp(setup),
         tuple((name, setup.options[name]) for name in known if name in setup.options),
     )
 
 
-def _stamp(source: str) -> Stamp:
-    """That of a video, or of a folder of images, and of the times beside it."""
-    path = Path(source)
+def _stamp(setup: Setup) -> Stamp:
+    """That of a video, or of a folder of images, of the times beside it, and of the path over a photograph."""
+    path = Path(setup.source)
     beside = (f"{path.stem}_timestamps{suffix}" for suffix in (".npy", ".txt"))
-    return stamp(path, *(path.parent / name for name in beside))
+    return stamp(path, *(path.parent / name for name in beside), str(setup.options.get("motion", "")))
 
 
 @lru_cache(maxsize=4)
