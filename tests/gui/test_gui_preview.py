@@ -410,6 +410,38 @@ def test_in_the_middle_of_a_video_a_preview_has_the_events_of_its_conversion(
     assert shown is not None and shown.events == pytest.approx(there, rel=0.1) and there > 500
 
 
+@pytest.mark.parametrize(("start_s", "options"), [(0.25, {}), (2.0, {}), (3.9, {}), (2.0, {"start": 0.1, "stop": 4.1})])
+def test_in_a_gap_between_frames_a_preview_is_of_that(
+    start_s: float, options: dict[str, float], tmp_path: Path
+) -> None:
+    """As of a screen, of which there are frames where something changes."""
+    frames = np.linspace(0.1, 0.9, 20)[:, None, None] * np.ones((20, 12, 16))
+    times = np.concatenate([np.arange(10) / 30, 4 + np.arange(10) / 30])
+    np.savez(tmp_path / "film.npz", frames=frames.astype(np.float32), times_s=times)
+    light = LightTable().light(Setup(str(tmp_path / "film.npz"), default_rig(), options=options), start_s, 0.02)
+    begin_s = options.get("start", 0.0) + start_s
+    assert 1e-9 * light.instants[light.lead].t_ns <= begin_s + 1e-6
+    assert 1e-9 * light.instants[light.lead + 1].t_ns > begin_s and 1e-9 * light.instants[-1].t_ns >= begin_s + 0.02
+
+
+def test_where_a_video_stops_in_a_gap_between_frames_its_last_picture_is_shown(tmp_path: Path) -> None:
+    frames = np.linspace(0.1, 0.9, 20)[:, None, None] * np.ones((20, 12, 16))
+    times = np.concatenate([np.arange(10) / 30, 40 + np.arange(10) / 30])
+    np.savez(tmp_path / "film.npz", frames=frames.astype(np.float32), times_s=times)
+    setup = Setup(str(tmp_path / "film.npz"), default_rig(), options={"stop": 20.0})
+    assert LightTable().light(setup, 15.0, 0.02).instants[-1].t_ns == 300_000_000
+
+
+@pytest.mark.parametrize("options", [{}, {"slowdown": 3.0}])
+def test_a_preview_of_frames_that_count_from_1970_begins_with_the_first(options: dict, tmp_path: Path) -> None:
+    """Whose times have more digits than a number of seconds holds."""
+    times_ns = 1_700_000_000_123_456_768 + np.arange(9) * 33_333_333
+    np.savez(tmp_path / "film.npz", frames=np.full((9, 12, 16), 0.3, np.float32), times_ns=times_ns)
+    light = LightTable().light(Setup(str(tmp_path / "film.npz"), default_rig(), options=options), 0.0, 0.02)
+    first = next(iter(Recipe.of(str(tmp_path / "film.npz"), **options).source.frames()))
+    assert light.lead == 0 and light.instants[0].t_ns == first.t_ns and len(light.instants) > 1
+
+
 def test_sensors_of_a_preview_begin_afresh_after_a_cut(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     shots = [cv2.GaussianBlur(random.uniform(0, 1, (60, 120)), (0, 0), 3) for _ in range(2)]

@@ -42,6 +42,7 @@ from vid2ev.stamps import Stamp, stamp
 SIDE = 346  # px
 LONGEST_S = 0.25
 MARGIN = 1.02
+NEAR_S = 1e-6  # what rounds to the beginning is there
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,19 @@ class LightTable:
             yield Light(recipe, seen, lead, tuple(_sizes(whole)), tuple(notes), len(seen) == len(ticks))
 
     def _of_video(self, setup: Setup, start_s: float, length_s: float, side: int) -> Iterator[Light]:
-        recipe, sizes, begin_s = _part_of_video(setup, start_s, length_s, side)
+        before_s = RUN_IN_S
+        while (found := self._part(setup, start_s, length_s, side, before_s)) is None:
+            before_s *= 4  # (frames are further apart there than elsewhere)
+        yield found
+
+    def _part(self, setup: Setup, start_s: float, length_s: float, side: int, before_s: float) -> Light | None:
+        """That of a video; None where its sensors have to begin earlier, or there is no picture as it begins."""
+        try:
+            recipe, sizes, begin_s = _part_of_video(setup, start_s, length_s, side, before_s)
+        except UsageError:
+            if before_s > start_s:
+                raise
+            return None
         seen = []
         with closing(instants(recipe)) as coming:
             for instant in coming:
@@ -131,8 +144,10 @@ class LightTable:
                 seen.append(instant)
                 if 1e-9 * instant.t_ns >= begin_s + length_s:
                     break
+        if 1e-9 * seen[0].t_ns > begin_s + NEAR_S and before_s <= start_s:
+            return None
         shown, lead = since_cut(seen, _lead(seen, begin_s))
-        yield Light(recipe, tuple(shown), lead, tuple(sizes), tuple(_notes(recipe.mounts, sizes)))
+        return Light(recipe, tuple(shown), lead, tuple(sizes), tuple(_notes(recipe.mounts, sizes)))
 
 
 def duration_s(setup: Setup) -> float | None:
@@ -162,10 +177,10 @@ def _lasting(setup: Setup, length_s: float) -> float:
 
 
 def _part_of_video(
-    setup: Setup, start_s: float, length_s: float, side: int
+    setup: Setup, start_s: float, length_s: float, side: int, before_s: float = RUN_IN_S
 ) -> tuple[Recipe, list[tuple[int, int]], float]:
     """What a part is made by, the sizes of its cameras, and where it begins on the recording's own clock [s]; before it
-    there is what its sensors see first, an interval at least."""
+    there is what its sensors see first, so long or an interval at least."""
     source, options = _opened(setup), dict(setup.options)
     slower = float(options.get("slowdown") or 1)
     interval_s = _interval_s(source)
@@ -176,14 +191,11 @@ def _part_of_video(
     rig = shown.settled(framing and framing._replace(size=(width, height)))
     origin_s = _origin_s(*_opening(setup))
     begin_s = origin_s + min(start_s, max(lasting_s - length_s, 0.0))
-    latest_s = slower * (begin_s + length_s + 1.5 * interval_s)
     shaped = "motion" in options or ("size" in options and not str(options["size"]).endswith("!"))
     own = {"size": options["size"]} if "size" in options else {}
-    options |= {
-        "start": slower * max(begin_s - max(RUN_IN_S, 1.5 * interval_s), origin_s),
-        "stop": min(latest_s, options.get("stop", latest_s)),
-        "size": f"{width}x{height}{'' if shaped else '!'}",
-    }
+    options |= {"size": f"{width}x{height}{'' if shaped else '!'}"}
+    if (since_s := begin_s - max(before_s, 1.5 * interval_s)) > origin_s:
+        options["start"] = slower * since_s
     if source.size == (width, height) and "size" not in setup.options:
         options.pop("size")
     since_ns = round(1e9 * (begin_s - 0.5 * interval_s))
@@ -198,7 +210,7 @@ def _part_of_video(
 
 def _lead(seen: Sequence[Instant], begin_s: float) -> int:
     """The number of the last instant that is not after the beginning."""
-    return max((k for k, instant in enumerate(seen) if 1e-9 * instant.t_ns <= begin_s + 1e-6), default=0)
+    return max((k for k, instant in enumerate(seen) if 1e-9 * instant.t_ns <= begin_s + NEAR_S), default=0)
 
 
 def _notes(mounts: Sequence[Mount], sizes: Sequence[tuple[int, int]]) -> list[str]:
