@@ -119,18 +119,15 @@ def test_bends_are_left_in_memories_that_jump() -> None:
     assert found == pytest.approx(wanted)
 
 
-@pytest.mark.parametrize("share", [0.3, 1.0, 2.0, 17.0])
+@pytest.mark.parametrize("share", [0.31, 1.0, 1.9, 17.0])
 def test_several_levels_between_two_signals_count_squared(share: float) -> None:
     """At a phase that is even there are floor(x) or one more of them: what that adds to x, by the edges of quarters."""
     phases = (np.arange(4096) + 0.5) / 4096
-    for k in (60, 95, 100, 107, 112):
-        felt = np.zeros((2, len(QUARTER_EDGES) - 1))
-        felt[:, k] = 1.0, 7.0
-        levels = share * QUARTER_EDGES[k + 1]
-        if levels < 1e4:
-            exact = np.mean(np.floor(levels + phases) ** 2) / levels - 1.0
-            found = steeper(felt, share)
-            assert (found == 0.0) if levels <= 1 else exact <= found * (1 + 1e-9) <= exact + 0.5
+    for k in np.flatnonzero((share * QUARTER_EDGES > 0.5) & (share * QUARTER_EDGES < 40)):
+        felt, levels = np.zeros((2, len(QUARTER_EDGES) - 1)), share * QUARTER_EDGES[k]
+        felt[:, k - 1] = 1.0, 7.0
+        exact, found = np.mean(np.floor(levels + phases) ** 2) / levels - 1.0, steeper(felt, share)
+        assert found == 0.0 if levels <= 1 else exact - 1e-3 <= found <= min(exact + 0.26, np.floor(levels))
 
 
 def test_events_that_are_late_cost_as_much_of_tau() -> None:
