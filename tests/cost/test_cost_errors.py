@@ -67,6 +67,17 @@ def test_the_reference_has_no_error() -> None:
     for one in (sent(drawn(1)), sent(codes=[np.ones((12, 16), np.uint16)])):
         reference = Reference([replace(one, events=list(one.events))], (0, 100_000))
         assert reference.errors([one]) == reference.errors_of_itself()
+    both = [sent(drawn(1)), sent(codes=[np.ones((12, 16), np.uint16)])]
+    reference = Reference([replace(one, events=list(one.events)) for one in both], (0, 100_000))
+    itself = reference.errors_of_itself()
+    assert reference.errors(both) == itself and (itself.distance, itself.rms_lsb) == (0.0, 0.0)
+
+
+def test_of_events_and_frames_the_events_make_the_headline() -> None:
+    true, made = np.full((12, 16), 7, np.uint16), np.full((12, 16), 9, np.uint16)
+    reference = Reference([sent(drawn(1)), sent(codes=[true])], (0, 100_000))
+    found = reference.errors([sent(drawn(2)), sent(codes=[made])])
+    assert found.rms_lsb == 2.0 and found.headline == found.distance != 2.0
 
 
 def test_a_coarse_pixel_stands_for_those_that_it_covers() -> None:

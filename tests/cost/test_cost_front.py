@@ -36,6 +36,7 @@ LADDER = [row(1, 0.5, 900), row(2, 0.1, 60), row(2.5, 0.2, 70), row(4, 0.01, 20)
         ("vR=0", 9),
         ("us=60", 2),
         ("us=60,vR=0.05", 4),
+        ("time=1x", 1),
         ("time=3x", 2),
         ("time=3", 2),
         ("time=100x", 9),
@@ -76,6 +77,11 @@ def test_what_cannot_be_measured_is_within_no_limit() -> None:
 def test_two_limits_of_a_kind_are_refused() -> None:
     with pytest.raises(UsageError, match="vR is limited twice; expected one limit of each kind"):
         Budget.parse("vR=0.05,us=3,vR=0.4")
+
+
+def test_no_time_is_refused() -> None:
+    with pytest.raises(UsageError, match="'time=0x': no setting takes no time; expected more"):
+        Budget.parse("vR=0.05, time=0x")
 
 
 @pytest.mark.parametrize(
@@ -120,6 +126,13 @@ def test_the_recommended_is_on_the_front(places: Places, limit: float) -> None:
 def test_what_is_as_fast_to_within_noise_is_judged_by_its_error() -> None:
     rows = [row(1.0, 0.03), row(1.04, 0.02), row(1.06, 0.01)]
     assert recommended(rows, Budget.parse("vR=0.05")) is rows[1]
+
+
+def test_the_margin_of_noise_is_in_and_what_has_no_error_is_the_worst() -> None:
+    rows = [row(1.0, 0.03), row(AS_FAST, 0.02)]
+    assert recommended(rows, Budget.parse("vR=0.05")) is rows[1]
+    assert recommended([row(2.0, None), row(3.0, 0.5)], Budget.parse("time=9x")).time == 3.0  # type: ignore[union-attr]
+    assert [each.time for each in front([row(2.0, None), row(3.0, 0.5)])] == [2.0, 3.0]
 
 
 def test_events_say_nothing_of_frames() -> None:
