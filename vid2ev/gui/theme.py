@@ -57,7 +57,6 @@ body, .body--dark, .nicegui-content { background: var(--ground) !important; colo
 .v-error { grid-column: 1 / 5; color: var(--bad); font-size: 12px; padding: 0 0 6px; line-height: 1.35; }
 .v-bad { color: var(--bad); font-size: 12px; } .v-stale { opacity: .35; }
 .v-muted { color: var(--muted); font-size: 12px; } .v-status { min-height: 18px; }
-.v-help { max-width: 320px; font-size: 12px; }
 .v-chips { display: grid; grid-template-columns: 1fr 1fr; gap: 8px; width: 100%; }
 .v-command { font-family: ui-monospace, monospace; font-size: 12.5px; white-space: pre-wrap; overflow-wrap: anywhere;
              background: var(--ground); border: 1px solid var(--line); border-radius: 6px; padding: 10px 12px;
