@@ -11,7 +11,7 @@ import pytest
 
 from vid2ev import DvsSpec
 from vid2ev.commands.convert import convert
-from vid2ev.cost.ladder import Given, Ladder, ladder_of
+from vid2ev.cost.ladder import Given, Ladder, ladder_of, steps_of
 from vid2ev.cost.rung import Rung
 from vid2ev.errors import UsageError
 from vid2ev.seen.recipe import Recipe
@@ -72,6 +72,25 @@ def test_the_reference_is_exact_whatever_the_sensor_says() -> None:
     found = ladder(sensor=DvsSpec(timing="frame"))
     assert found.reference.settings == {"timing": "response"}
     assert "timing" not in ladder(sensor="v2e-clean").reference.settings  # (no filter: a line is the response)
+    no_poles = {"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0, "timing": "linear"}
+    for spec in (DvsSpec(filter="after", timing="linear"), DvsSpec(filter="before", **no_poles)):
+        assert ladder(sensor=spec).reference.settings == {"timing": "response"}
+
+
+def test_lags_of_light_are_carried_in_float64_where_there_are_any() -> None:
+    """Else, and where the sub-frames are as asked for, the reference is the finest that a conversion can be asked for:
+    there is no other."""
+    fixed = {"given": ("subframes",), "subframes": 3}
+    for sensor, lags in (("ideal", False), (DvsSpec(filter="after"), False), (DvsSpec(filter="before"), True)):
+        found = ladder(sensor=sensor, **fixed)
+        assert found.reference.float64 == ladder(sensor=sensor).reference.float64 == lags
+        assert ("finest" in names(found)) == lags and found.reference.offered != lags
+
+
+@pytest.mark.parametrize(("options", "steps"), [({"subframes": 5}, 5), ({"upsample": "none"}, 1)])
+def test_the_interval_with_the_most_steps_counts(options: dict[str, Any], steps: int) -> None:
+    recipe, seen = Recipe.of(CLIP, **options), list[int]()
+    assert steps_of(recipe, lambda: seen.append(1)) == steps and len(seen) == recipe.source.frames_expected
 
 
 @pytest.mark.parametrize("sensor", ["ideal", "v2e-clean"])
@@ -82,6 +101,36 @@ def test_where_logarithms_are_straight_the_reference_has_steps_though_nothing_mo
         assert found.rungs[0].name == "finest" and found.rungs[0].options == {"subframes": finest}
         assert found.reference.options == {"subframes": 2 * finest} and not found.reference.offered
     assert ladder(steps=1).reference.options == {"subframes": 4}
+    assert ladder(sensor=DvsSpec(filter="after"), steps=1).reference.options == {"subframes": 32}
+
+
+@pytest.mark.parametrize(("size", "half"), [("48x32", "24x16!"), ("33x49", "16x24!"), ("31x64", None)])
+def test_half_the_size_is_half_of_each_side_and_no_postage_stamp(size: str, half: str | None) -> None:
+    found = [rung for rung in ladder(video=f"synthetic:sine,size={size}").rungs if rung.group == "size"]
+    assert [(rung.options, rung.coarse, rung.offered) for rung in found] == [({"size": half}, 2, False)] * (
+        half is not None
+    )
+
+
+def test_a_cap_that_no_interval_reaches_is_not_tried() -> None:
+    caps = {steps: sum("at most" in name for name in names(ladder(steps=steps))) for steps in (1, 2, 3, 8, 9, 33)}
+    assert caps == {1: 0, 2: 0, 3: 1, 8: 2, 9: 3, 33: 5} and "linear" in names(ladder(steps=2))
+
+
+def test_ways_that_are_one_are_not_tried_apart(tmp_path: Path) -> None:
+    """Times are on a line anyway where all logarithms are straight; of a rig any camera counts."""
+    ways = {"times on a line", "times of frames", "effects none"}
+    straight, bent = DvsSpec(filter="after", timing="response", mismatch=0.1), DvsSpec(filter="after")
+    straight = straight.model_copy(update={"photoreceptor_tau_us": 0.0, "follower_tau_us": 0.0})
+    assert names(ladder(sensor=straight)) & ways == ways - {"times on a line"}
+    assert names(ladder(sensor=bent)) & ways == ways
+    assert names(ladder(sensor=straight.model_copy(update={"filter": "before"}))) & ways == ways
+    cameras = (("ideal", ""), ("paper", ""), ("paper", 'set = { timing = "frame" }\n'))
+    text = [
+        f'[[camera]]\nname = "{k}"\nkind = "dvs"\nsensor = "{name}"\n{more}' for k, (name, more) in enumerate(cameras)
+    ]
+    (tmp_path / "rig.toml").write_text("".join(text))
+    assert names(ladder(("rig",), rig=tmp_path / "rig.toml")) & ways == ways
 
 
 def test_where_nothing_moves_light_between_the_frames_is_no_question() -> None:
@@ -98,6 +147,7 @@ def test_frame_cameras_have_their_own() -> None:
     found = ladder(frame_camera=True, cis="phone")
     rungs = {rung.name: rung for rung in found.rungs}
     assert rungs["lines together"].settings == {"cis.line_us": 0.0}
+    assert rungs["frames of an instant"].settings == {"cis.exposure_us": 0.0}
     assert rungs["frames without noise"].settings
     assert "half the size" not in rungs
     fixed = ladder(frame_camera=True, cis="phone", overrides=["cis.line_us=10"])
@@ -105,13 +155,13 @@ def test_frame_cameras_have_their_own() -> None:
 
 
 def test_a_plane_stands_for_depth(tmp_path: Path) -> None:
-    depth = np.full((32, 48), 4.0, np.float32)
-    depth[8:20, 10:30] = 2.0
+    depth = np.full((32, 48), 0.4, np.float32)
+    depth[8:20, 10:30], depth[:8], depth[30:] = 0.2, np.inf, 0.0
     np.save(tmp_path / "depth.npy", depth)
     (tmp_path / "rig.toml").write_text('[[camera]]\nname = "a"\nkind = "dvs"\ntranslation_mm = [30, 0, 0]\n')
     found = ladder(("rig", "depth"), rig=tmp_path / "rig.toml", depth=str(tmp_path / "depth.npy"))
     plane = next(rung for rung in found.rungs if rung.group == "views")
-    assert plane.options == {"depth": "plane:4"} and not plane.offered
+    assert plane.options == {"depth": "plane:0.4"} and not plane.offered
     flat = ladder(("rig", "depth"), rig=tmp_path / "rig.toml", depth="plane:3")
     assert all(rung.group != "views" for rung in flat.rungs)
 
