@@ -17,7 +17,7 @@ from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_mos
 from vid2ev.errors import UsageError
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.exposure_sums import OVERFULL, SUMS, add_change, add_light
-from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of
+from vid2ev.plan.frame_camera import ALWAYS, FRAME_EFFECTS, frame_plan_of, frame_plan_unseen
 from vid2ev.plan.plan import KNOWN, names_of
 from vid2ev.seen.instants import instants
 from vid2ev.seen.recipe import Recipe
@@ -146,6 +146,7 @@ def test_auto_keeps_within_the_tolerance(name: str, tolerance: float) -> None:
     assert [row.effect for row in plan.rows] == [*spec.effects(), *ALWAYS]
     assert plan.spec.line_us == spec.line_us
     assert all(row.effect in str(plan) and row.omission.why for row in plan.rows)
+    assert all((row.ns_per_pixel, row.fate) == (0, "kept") for row in plan.rows if row.effect in ALWAYS)
     assert json.loads(json.dumps(plan.describe(), allow_nan=False))["max_lsb"] == plan.max_lsb
 
 
@@ -238,9 +239,28 @@ def test_effects_by_name() -> None:
     none = frame_plan_of(seen, spec, effects="none")
     assert none.spec.effects() == [] and none.max_lsb is None and "no bound" in str(none)
     assert frame_plan_of(seen, spec, effects="noise,exposure").spec.effects() == ["exposure", "noise"]
+    for gone, known in ((("exposure",), True), (("rolling_shutter",), True), (("exposure", "rolling_shutter"), False)):
+        plan = frame_plan_of(seen, spec, effects=[name for name in spec.effects() if name not in gone])
+        assert {*plan.gone} == {*gone} and (plan.max_lsb is not None) == known
     assert set(FRAME_EFFECTS) == set(EFFECTS) and names_of("all") == list(KNOWN)
     with pytest.raises(UsageError, match="did you mean shot_noise"):
         frame_plan_of(seen, spec, effects="shot_nois")
+
+
+def test_what_was_not_looked_at_is_kept_and_says_why() -> None:
+    spec = load_cis("phone", ["cis.colour=false"])
+    plan = frame_plan_unseen(spec, "it passes once")
+    assert plan.spec == spec and plan.gone == () and plan.max_lsb == 0
+    assert [row.effect for row in plan.rows] == spec.effects()
+    for row in plan.rows:
+        assert (row.fate, row.omission.why, row.omission.sure) == ("kept", "it passes once", False)
+        assert row.ns_per_pixel == FRAME_EFFECTS[row.effect].ns and row.ns_per_event == 0
+    without = frame_plan_unseen(spec, "it passes once", effects="none")
+    assert without.spec.effects() == [] and without.distance is None
+    with pytest.raises(UsageError, match=r"tolerance 1\.5"):
+        frame_plan_unseen(spec, "it passes once", 1.5)
+    with pytest.raises(UsageError, match=r"tolerance 1\.5"):
+        frame_plan_of(Expose(spec, (8, 6)).exposed(), spec, 1.5)
 
 
 def test_light_shorter_than_an_exposure_changes_nothing() -> None:
