@@ -21,11 +21,12 @@ from vid2ev.commands.worker_options import NAMES
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
+from vid2ev.gui.boards import SceneBoard
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.light import duration_s
 from vid2ev.gui.loading import loaded, loaded_from
-from vid2ev.gui.scene_edit import moved, pose_at, thing_named, value_of, with_place, with_values
+from vid2ev.gui.scene_edit import moved, pose_at, thing_named, things_of, value_of, with_place, with_values
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.tasks import gathered
@@ -151,6 +152,25 @@ def test_files_that_are_saved_and_loaded_are_the_setup() -> None:
     assert with_sensor.spec(0) == setup.spec(0) and with_sensor.spec(1) == setup_of(SMALL).spec(1)
     with pytest.raises(OSError, match=r"bad.toml is not valid TOML"):
         loaded(setup, "[dvs", "bad.toml")
+
+
+def test_every_part_of_a_scene_that_was_loaded_over_another_can_be_changed() -> None:
+    """What both have is brought back as the other has it; of what that has not nothing is known but what it is."""
+    given = setup_of(SMALL)
+    text = command_of(given.with_scene(given.settled())).files["scene.toml"]
+    session = Session(loaded(setup_of("scene:room"), text, "given.toml"))
+    there = {thing.name for thing in things_of(setup_of("scene:room").settled())}
+    parts = [thing.name for thing in things_of(session.setup.settled())]
+    assert {"scene", "camera", "objects.disc-1", "lights.sun"} <= {*parts} and "objects.disc-1" not in there
+    for name in parts:
+        board = SceneBoard(session, name)
+        shown = [(board.value(control.key), board.base(control.key)) for control in board.controls]
+        assert len(shown) > 3 and (name in there or all(value == base for value, base in shown))
+    board = SceneBoard(session, "objects.disc-1")
+    board.put("specular", 0.25)
+    assert board.value("specular") == board.base("specular") == 0.25
+    assert SceneBoard(session, "scene").base("duration_s") == setup_of("scene:room").settled().scene.duration_s
+    session.close()
 
 
 def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(

@@ -159,8 +159,9 @@ class SceneBoard(_Board):
         return value_of(self.session.setup.settled(), self.name, key)
 
     def base(self, key: str) -> Any:
-        """As the scene's file has it."""
-        return value_of(self.session.setup.with_scene(None).settled(), self.name, key)
+        """As the scene's file has it; as it is, of a part that a scene has that was loaded in its place."""
+        file = self.session.setup.with_scene(None).settled()
+        return value_of(file, self.name, key) if thing_named(file, self.name).name == self.name else self.value(key)
 
     def changed(self, values: Mapping[str, Any]) -> Setup:
         """The setup with these values."""
