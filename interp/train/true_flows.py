@@ -1,5 +1,5 @@
-"""Flows between frames: dense optical flow (DIS) of their codes, for losses that look at what flickers, and to learn
-from."""
+"""Flows between frames: dense optical flow (DIS) of their codes, and of HDR frames of their light up to white, for losses
+that look at what flickers, and to learn from."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def with_flows(sample: Batch) -> Batch:
 
 
 def _codes(frames: torch.Tensor) -> np.ndarray:
-    """Luma of frames [N, C, H, W], uint8."""
+    """Luma of frames [N, C, H, W] of codes, or luminance of those of light, uint8."""
     grey = np.tensordot(LUMINANCE, frames.expand(-1, 3, -1, -1).numpy(), (0, 1))
     return np.rint(255 * np.clip(grey, 0, 1)).astype(np.uint8)
 
