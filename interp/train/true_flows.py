@@ -1,5 +1,5 @@
-"""Flows between frames: dense optical flow (DIS) of their codes, and of HDR frames of their light up to white, for losses
-that look at what flickers, and to learn from."""
+"""Flows between frames: dense optical flow (DIS) of their codes, and of HDR frames of their light up to white, for
+losses that look at what flickers, and to learn from."""
 
 from __future__ import annotations
 
