@@ -87,6 +87,41 @@ def test_extremes_reach_both_ends_and_every_choice() -> None:
 
 
 @pytest.mark.parametrize(
+    ("node", "low", "high"),
+    [
+        ({"uniform": [-4, 8]}, -4, 8),
+        ({"log_uniform": [0.25, 8]}, 0.25, 8),
+        ({"normal": [5, 2]}, -1, 11),  # (three standard deviations)
+        ({"integer": [-2, 7]}, -2, 7),
+        ({"spread": [-4, 8]}, -4, 8),
+    ],
+)
+def test_ranges_go_from_one_end_to_the_other(node: dict[str, Any], low: float, high: float) -> None:
+    lowest, *_, highest = (drawn(node, chance, "key") for chance in extremes(node))
+    assert lowest == pytest.approx(low, rel=1e-9) and highest == pytest.approx(high, rel=1e-9)
+
+
+def test_log_uniform_has_as_many_draws_below_the_geometric_mean_as_above() -> None:
+    low, high = 0.25, 64.0
+    below = sum(value < math.sqrt(low * high) for value in draws({"log_uniform": [low, high]}))
+    assert abs(below - 2000) < 5 * math.sqrt(1000)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("integer", "two ends of whole numbers, a lower and an upper end"),
+        ("log_uniform", "two ends above 0, a lower and an upper end"),
+        ("normal", "two ends, a mean and a standard deviation from 0"),
+        ("uniform", "two ends, a lower and an upper end"),
+    ],
+)
+def test_what_ends_a_range_takes_is_said(kind: str, said: str) -> None:
+    with pytest.raises(UsageError, match=f"expected {said}$"):
+        drawn({kind: ["a", "b"]}, chance_of(0), "key")
+
+
+@pytest.mark.parametrize(
     "node",
     [
         {"uniform": 3},
