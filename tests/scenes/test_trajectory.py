@@ -85,11 +85,27 @@ def test_beyond_its_ends_a_spline_goes_straight_on(ends_s: tuple[float, float]) 
     np.testing.assert_allclose(speeds, np.tile(speeds[0], (4, 1)), atol=1e-12)
 
 
-def test_a_spline_turns_by_the_shorter_way() -> None:
+@pytest.mark.parametrize("axis", range(3))
+def test_a_spline_turns_by_the_shorter_way(axis: int) -> None:
     """From 170 degrees to -170 it is 20 degrees, over the back."""
-    turns = [[0, 170, 0], [0, -170, 0]]
+    along = np.eye(3)[axis]
+    turns = [(degrees * along).tolist() for degrees in (170, -170)]
     motion = trajectory({"kind": "keyframes", "times_s": [0, 1], "rotations_deg": turns})
-    assert np.allclose(pose_of(motion, 0.5).rotation, np.diag([-1, 1, -1]), atol=1e-12)
+    assert np.allclose(pose_of(motion, 0.5).rotation, np.diag(2 * along - 1), atol=1e-12)
+
+
+@pytest.mark.parametrize("path", ["spline", "linear"])
+@pytest.mark.parametrize("t_s", [-0.3, 0.0, 0.4, 2.2])
+def test_keyframes_without_places_stay_where_they_are_and_without_turns_are_not_turned(path: str, t_s: float) -> None:
+    whole = pose_of(trajectory(KEYS | {"path": path}), t_s)
+    one, other = (
+        {key: value for key, value in KEYS.items() if key != left} for left in ("positions_m", "rotations_deg")
+    )
+    turned, placed = (pose_of(trajectory(motion | {"path": path}), t_s) for motion in (one, other))
+    assert np.array_equal(turned.translation_m, np.zeros(3))
+    assert np.allclose(turned.rotation, whole.rotation, atol=1e-12)
+    assert np.allclose(placed.rotation, np.eye(3), atol=1e-12)
+    assert np.allclose(placed.translation_m, whole.translation_m, atol=1e-12)
 
 
 @settings(max_examples=60)
