@@ -173,6 +173,19 @@ def test_every_part_of_a_scene_that_was_loaded_over_another_can_be_changed() -> 
     session.close()
 
 
+def test_a_scene_whose_values_are_brought_back_is_that_of_its_file() -> None:
+    """Which the command names; there is nothing to save."""
+    session = Session(setup_of(SMALL))
+    board = SceneBoard(session, "objects.disc-1")
+    for key, value in (("specular", 0.25), ("colour", (0.1, 0.2, 0.3))):
+        before = board.value(key)
+        board.put(key, value)
+        assert session.setup.scene is not None and command_of(session.setup).files and before != value
+        board.put(key, board.base(key))
+        assert session.setup == setup_of(SMALL) and not command_of(session.setup).files
+    session.close()
+
+
 def test_a_rig_and_a_scene_are_loaded_with_the_files_that_they_name_beside_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,8 +165,9 @@ class SceneBoard(_Board):
 
     def changed(self, values: Mapping[str, Any]) -> Setup:
         """The setup with these values."""
-        setup = self.session.setup
-        return setup.with_scene(with_values(setup.settled(), self.name, values))
+        setup, whole = self.session.setup, self.session.setup.with_scene(None)
+        scene = with_values(setup.settled(), self.name, values)
+        return whole if scene == whole.settled() else setup.with_scene(scene)  # (all is as it was: nothing to save)
 
 
 class OptionBoard(_Board):
