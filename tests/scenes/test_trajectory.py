@@ -125,9 +125,10 @@ def test_spin_turns_at_its_rate_for_any_time() -> None:
         assert np.allclose(pose_of(motion, t_s).rotation[:2, 0], [math.cos(angle), math.sin(angle)], atol=1e-7)
 
 
-def test_orbits_are_circles_without_a_turn() -> None:
-    motion = trajectory({"kind": "orbit", "centre_m": [1, 2, 3], "axis": [1, 1, 0], "radius_m": 2, "period_s": 4})
-    centre, axis = np.array([1, 2, 3]), np.array([1, 1, 0]) / math.sqrt(2)
+@pytest.mark.parametrize("along", [(1, 1, 0), (1, 2, 3), (-3, 1, 0.5)])
+def test_orbits_are_circles_without_a_turn(along: tuple[float, float, float]) -> None:
+    motion = trajectory({"kind": "orbit", "centre_m": [1, 2, 3], "axis": along, "radius_m": 2, "period_s": 4})
+    centre, axis = np.array([1, 2, 3]), np.array(along) / np.linalg.norm(along)
     ways = np.array([pose_of(motion, t).translation_m - centre for t in np.linspace(0, 4, 9)])
     assert np.allclose(np.linalg.norm(ways, axis=1), 2) and np.allclose(ways @ axis, 0)
     assert np.allclose(ways[0], ways[-1]) and np.allclose(ways[0], -ways[4])
