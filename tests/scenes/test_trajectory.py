@@ -206,6 +206,7 @@ def test_a_shake_turns_by_its_root_mean_square_apart_from_where_it_goes() -> Non
         {"kind": "spin", "axis": [0, 0, 0], "rate_deg_s": 1},
         {"kind": "orbit", "radius_m": 1, "period_s": 0},
         {"kind": "keyframes", "times_s": [0, 0], "positions_m": [[0, 0, 0]] * 2},
+        {"kind": "keyframes", "times_s": [2, 1], "positions_m": [[0, 0, 0]] * 2},
         {"kind": "keyframes", "times_s": [0, 1], "positions_m": [[0, 0, 0]]},
         {"kind": "shake", "low_hz": 5, "high_hz": 1},
         {"kind": "straight", "velocity_m_s": [math.inf, 0, 0]},
