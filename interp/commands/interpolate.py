@@ -124,9 +124,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
     else:
         paths = places(found, output or Path(), lambda source: _default(source, options))
 
-    def one(source: str, path: Path) -> dict[str, Any]:
-        return _one(source, path, quiet, taken, options)
-
+    one = partial(_one, quiet=quiet, taken=taken, options=options)
     shared = partial(_shared, paths, workers, quiet, taken, options)
     results = batch.convert_each(paths, one, quiet) if workers.alone else shared()
     if not quiet or as_json:

@@ -28,7 +28,7 @@ def events_between(
     left, top, *size = part or (0, 0, *sequence.event_size)
     start_us, stop_us = between_us
     placed = sequence.events(matter_from_us(sequence, start_us, sequence.dead_time), stop_us)
-    seen, _ = placed._replace(x=placed.x - left, y=placed.y - top).within((size[0], size[1]))
+    seen, _ = placed.part(left, top, size[0], size[1])
     counts = count_events(seen, (size[0], size[1]), start_us, stop_us, steps, dead_time=sequence.dead_time)
     looks = sequence.looks((start_us + stop_us) // 2)
     return calibrated(as_tensor(keys), counts, sequence.contrast, sequence.apart, looks)

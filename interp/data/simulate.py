@@ -23,10 +23,10 @@ from interp.data.settings import ClipSettings
 from interp.data.shot import Shot
 from interp.representation.event_counts import EventCounts, count_events
 from vid2ev import Cis, CisSpec, Dvs, Events
+from vid2ev.stream.still import MOST_OF_HALF_FLOATS
 from vid2ev.stream.upload import as_array
 
 MOST = 255  # that events of a pixel, sub-interval and polarity count for
-BRIGHTEST = 65504.0  # of float16
 
 
 def simulated(shot: Shot, cameras: Cameras, settings: ClipSettings) -> Clip:
@@ -81,7 +81,7 @@ class Frames:
         if not 0 <= j <= steps or j % self._each:
             return
         if self._linear:
-            self.truth.append(np.clip(as_array(frame), 0, BRIGHTEST).astype(np.float16))
+            self.truth.append(np.clip(as_array(frame), 0, MOST_OF_HALF_FLOATS).astype(np.float16))
         else:
             self.truth += [self._codes[each.codes] for each in self._sampler.step(frame, t_ns)]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from interp.data.layouts.sequence import Placed
 from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.instants import rate_of
 from interp.interpolate.of_source import OfSource
@@ -20,26 +21,6 @@ from vid2ev.recording.manifest import identity
 from vid2ev.sources.framing import framing_of
 
 MOMENT = 4  # of a gap, before the first event and after the last: there need not be one at every instant
-
-
-class Part(NamedTuple):
-    """A part of a sensor [px]: from left and top up to, not including, right and bottom."""
-
-    left: int
-    top: int
-    right: int
-    bottom: int
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height."""
-        return self.right - self.left, self.bottom - self.top
-
-    def of(self, events: Events) -> Events:
-        """The events in it, from its own corner on."""
-        across = (self.left <= events.x) & (events.x < self.right)
-        found = events.select(across & (self.top <= events.y) & (events.y < self.bottom))
-        return Events(found.t, found.x - np.uint16(self.left), found.y - np.uint16(self.top), found.p)
 
 
 class FramesBesideEvents(OfSource):
@@ -56,8 +37,9 @@ class FramesBesideEvents(OfSource):
         corner, self._guessed = self._cursor.size, self._cursor.file.size is None
         guess = next((size for size in (self.size, self._whole) if all(np.less_equal(corner, size))), corner)
         sent = guess if self._guessed else corner
-        self._cropped = sent != self.size and sent == self._whole != self._part.size
-        self.event_size: tuple[int, int] = self._part.size if self._cropped else sent
+        *_, width, height = self._part
+        self._cropped = sent != self.size and sent == self._whole != (width, height)
+        self.event_size: tuple[int, int] = (width, height) if self._cropped else sent
         self.apart = self.event_size != self.size
 
     @property
@@ -93,7 +75,9 @@ class FramesBesideEvents(OfSource):
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
         events = _within(self._cursor, start_us, stop_us)
-        return events if events is None or not self._cropped else self._part.of(events)
+        if events is None or not self._cropped:
+            return events
+        return Placed(events.t, events.x, events.y, events.p).part(*self._part)[0]
 
     @property
     def _whole(self) -> tuple[int, int]:
@@ -102,13 +86,14 @@ class FramesBesideEvents(OfSource):
         return self.size if framing is None else framing.whole
 
     @property
-    def _part(self) -> Part:
+    def _part(self) -> tuple[int, int, int, int]:
+        """Left, top, width and height of what is cropped [px]."""
         framing = framing_of(self._source)
         if framing is None:
-            return Part(0, 0, *self.size)
-        first = [round(place) for place in framing.corner]
-        after = [round(place + side) for place, side in zip(framing.corner, framing.extent, strict=True)]
-        return Part(*first, *after)
+            return 0, 0, *self.size
+        left, top = map(round, framing.corner)
+        right, bottom = (round(place + side) for place, side in zip(framing.corner, framing.extent, strict=True))
+        return left, top, right - left, bottom - top
 
 
 class OfEventFile:

@@ -19,9 +19,8 @@ from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
-from vid2ev.sources.edit import Edit
-
-BRIGHTEST = 65504.0  # what infinite light is taken for: the most that 16-bit floats hold, of which EXR mostly are
+from vid2ev.sources.edit import unedited
+from vid2ev.stream.still import MOST_OF_HALF_FLOATS
 
 
 class OfSource:
@@ -92,7 +91,7 @@ class OfSource:
 
     def _codes(self, light: np.ndarray) -> np.ndarray:
         """Of light [H, W, 3], [H, W, channels]."""
-        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0, posinf=BRIGHTEST))
+        seen = torch.from_numpy(np.nan_to_num(light, nan=0.0, posinf=MOST_OF_HALF_FLOATS))
         codes = to_codes(seen if self.channels == 3 else seen[..., :1], "srgb").numpy()
         if self._top:
             codes *= self._top
@@ -102,9 +101,7 @@ class OfSource:
 
     def _mean_rate(self) -> Fraction:
         """Of the whole: where a part begins and ends, there need not be a frame."""
-        whole = self._source
-        while isinstance(whole, Edit):
-            whole = whole.source
+        whole = unedited(self._source)
         count, span_s = whole.frames_expected, whole.duration_expected_s
         return rate_of(Fraction((count - 1) / span_s)) if count and count > 1 and span_s else Fraction(30)
 

@@ -96,42 +96,42 @@ def test_a_scene_is_written_with_its_truth() -> None:
     assert json.loads((out / "intrinsics.json").read_text())["size"] == [48, 36]
 
 
-def test_instants_suit_the_finest_camera_of_a_rig(tmp_path: Path) -> None:
-    (tmp_path / "rig.toml").write_text(
-        '[[camera]]\nname = "coarse"\nkind = "dvs"\n'
-        '[[camera]]\nname = "fine"\nkind = "cis"\nsize = [96, 72]\nfocal_px = [72, 72]\n'
-    )
-    (tmp_path / "scene.toml").write_text(
+def source_of_a_ball(folder: Path, rig: str, position_m: list[float], velocity_m_s: list[float]) -> SceneSource:
+    """A ball on its way, seen by a camera of 32x24 pixels and the cameras of a rig."""
+    (folder / "rig.toml").write_text(rig)
+    (folder / "scene.toml").write_text(
         '[scene]\nduration_s = 0.1\nmin_fps = 1\nambient = 1\nrig = "rig.toml"\n'
         "[camera]\nsize = [32, 24]\nfocal_px = [24, 24]\n"
         '[[objects]]\nname = "ball"\nkind = "sphere"\n'
-        'trajectory = { kind = "straight", position_m = [0, 0, 3], velocity_m_s = [1, 0, 0] }\n'
+        f'trajectory = {{ kind = "straight", position_m = {position_m}, velocity_m_s = {velocity_m_s} }}\n'
     )
-    source = SceneSource(World.of(tmp_path / "scene.toml"))
+    return SceneSource(World.of(folder / "scene.toml"))
+
+
+def farthest_px(folder: Path) -> float:
+    """How far anything moves from one picture of a camera to the next."""
+    flows = [read_flow(file) for file in sorted((folder / "flow").iterdir())]
+    return max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows)
+
+
+def test_instants_suit_the_finest_camera_of_a_rig(tmp_path: Path) -> None:
+    rig = (
+        '[[camera]]\nname = "coarse"\nkind = "dvs"\n'
+        '[[camera]]\nname = "fine"\nkind = "cis"\nsize = [96, 72]\nfocal_px = [72, 72]\n'
+    )
+    source = source_of_a_ball(tmp_path, rig, [0, 0, 3], [1, 0, 0])
     write_scene(tmp_path / "out", source, Contents(truth=("flow",), preview=False))
-    farthest = {}
-    for name in ("coarse", "fine"):
-        flows = [read_flow(file) for file in sorted((tmp_path / "out" / name / "flow").iterdir())]
-        farthest[name] = max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows)
+    farthest = {name: farthest_px(tmp_path / "out" / name) for name in ("coarse", "fine")}
     assert 0.3 < farthest["fine"] <= 0.5  # (`max_shift_px`)
     assert farthest["coarse"] == pytest.approx(farthest["fine"] / 3, rel=0.1)
 
 
 def test_instants_suit_cameras_of_a_rig_that_look_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "rig.toml").write_text(
-        '[[camera]]\nname = "back"\nkind = "dvs"\nsize = [32, 24]\nfocal_px = [24, 24]\nrotation_deg = [0, 180, 0]\n'
-    )
-    (tmp_path / "scene.toml").write_text(
-        '[scene]\nduration_s = 0.1\nmin_fps = 1\nambient = 1\nrig = "rig.toml"\n'
-        "[camera]\nsize = [32, 24]\nfocal_px = [24, 24]\n"
-        '[[objects]]\nname = "ball"\nkind = "sphere"\n'
-        'trajectory = { kind = "straight", position_m = [0, 0, -3], velocity_m_s = [4, 0, 0] }\n'
-    )
-    source = SceneSource(World.of(tmp_path / "scene.toml"))
+    rig = '[[camera]]\nname = "back"\nkind = "dvs"\nsize = [32, 24]\nfocal_px = [24, 24]\nrotation_deg = [0, 180, 0]\n'
+    source = source_of_a_ball(tmp_path, rig, [0, 0, -3], [4, 0, 0])
     assert len(source.instants) <= 2  # (of the reference camera, before which nothing moves)
     write_scene(tmp_path / "out", source, Contents(truth=("flow",), preview=False))
-    flows = [read_flow(file) for file in sorted((tmp_path / "out" / "back" / "flow").iterdir())]
-    assert 0.3 < max(float(np.nanmax(np.hypot(*np.moveaxis(flow, -1, 0)))) for flow in flows) <= 0.5
+    assert 0.3 < farthest_px(tmp_path / "out" / "back") <= 0.5
     alone = SceneSource(source.world)
     recipe = Recipe.of(str(tmp_path / "scene.toml"))
     assert len(scene_of(recipe.source).instants) == len(source.instants) > len(alone.instants)

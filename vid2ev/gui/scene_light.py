@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vid2ev.scenes.instants import Eye, rate_hz
+from vid2ev.scenes.instants import Eye, key_of, rate_hz
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.world import World
 from vid2ev.seen.instants import Instant
@@ -45,7 +45,7 @@ class Film:
     def rate_hz(self, world: World, begin_s: float, end_s: float, eyes: Sequence[Eye] = ()) -> float:
         """How often motion and light ask for a picture from `begin_s` to `end_s` [1/s], as cameras see them."""
         self._turn_to(world)
-        seen = tuple(map(_key, eyes))
+        seen = tuple(map(key_of, eyes))
         knots = range(math.floor(begin_s / KNOT_S), math.ceil(end_s / KNOT_S) + 1)
         every = max(1, len(knots) // 4)
         for knot in knots[::every]:
@@ -71,7 +71,7 @@ class Film:
         yield tuple(seen[each] for each in sorted(seen))
 
     def _instant(self, world: World, mounts: Sequence[Mount], t_ns: int, slower: float) -> Instant:
-        views = [_key(mount.view) for mount in mounts]
+        views = [key_of(mount.view) for mount in mounts]
         coloured = {view for view, mount in zip(views, mounts, strict=True) if mount.sensor.colour}
         lights = [
             self._light(world, mount, (view, view in coloured, t_ns)) for view, mount in zip(views, mounts, strict=True)
@@ -96,11 +96,6 @@ class Film:
             self._world = world
             for known in (self._reels, self._kept, self._rates):
                 known.clear()
-
-
-def _key(eye: Eye) -> tuple[Any, ...]:
-    lens, pose = eye
-    return lens, pose.rotation.tobytes(), pose.translation_m.tobytes()
 
 
 def grid_hz(asked_hz: float, length_s: float) -> int:

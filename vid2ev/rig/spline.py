@@ -26,10 +26,10 @@ import numpy as np
 
 from vid2ev.compiling.cache import cached
 from vid2ev.rig.bands import Bands
+from vid2ev.stream.still import MOST_OF_HALF_FLOATS as BRIGHTEST
 
 F = np.float32
 POLE = F(math.sqrt(3) - 2)
-BRIGHTEST = 65504.0
 HORIZON = 16  # pixels after which the filter has forgotten: |POLE| ** 16 < 1e-9
 MARGIN = 2  # px around the weights, so that sampling needs no conditions
 _QUARTER, _HALF, _ONE, _SIX, _ZERO = F(0.25), F(0.5), F(1), F(6), F(0)

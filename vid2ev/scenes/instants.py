@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from fractions import Fraction
 from itertools import product
 
@@ -49,11 +49,10 @@ CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 AXES = np.concatenate([np.eye(3), -np.eye(3)]) / 2
 ROUND = np.concatenate([AXES, CORNERS / math.sqrt(3)])  # on a sphere
 RIM = np.array([(math.cos(a) / 2, math.sin(a) / 2, z) for a in np.arange(8) * math.pi / 4 for z in (-0.5, 0.5)])
-
-Eye = tuple[Intrinsics, Pose]  # a camera, and where it is in the coordinates of the reference camera
-
 OUTERMOST = {"plane": CORNERS * (1, 1, 0), "box": CORNERS, "sphere": ROUND, "cylinder": RIM}
 NEAREST_M = 0.05
+
+Eye = tuple[Intrinsics, Pose]  # a camera, and where it is in the coordinates of the reference camera
 
 
 class Instants:
@@ -98,15 +97,16 @@ def _reference(world: World) -> Eye:
 
 def others(world: World, eyes: Iterable[Eye]) -> tuple[Eye, ...]:
     """The cameras whose pictures are those of no camera before them, nor of the reference camera."""
-    found = [_reference(world)]
-    for lens, pose in eyes:
-        if not any(lens == other and _is_at(pose, there) for other, there in found):
-            found.append((lens, pose))
-    return tuple(found[1:])
+    reference, found = key_of(_reference(world)), dict[Hashable, Eye]()
+    for eye in eyes:
+        found.setdefault(key_of(eye), eye)
+    return tuple(eye for key, eye in found.items() if key != reference)
 
 
-def _is_at(pose: Pose, other: Pose) -> bool:
-    return all(map(np.array_equal, vars(pose).values(), vars(other).values()))
+def key_of(eye: Eye) -> Hashable:
+    """What is the same for cameras that see the same."""
+    lens, pose = eye
+    return lens, (pose.rotation + 0.0).tobytes(), (pose.translation_m + 0.0).tobytes()  # (no zero has a sign)
 
 
 def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:

@@ -36,6 +36,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.stream.still import MOST_OF_HALF_FLOATS
 
 if TYPE_CHECKING:
     from vid2ev.scenes.mesh_numbers import MeshNumbers
@@ -68,7 +69,7 @@ class Texture:
         if len(shape) != 3 or shape[2] != 3 or 0 in shape:
             raise UsageError(f"a texture of shape {shape} must be [height, width, 3 (red, green, blue)]")
         pixels = np.ascontiguousarray(self.pixels, np.float32)
-        object.__setattr__(self, "pixels", np.nan_to_num(pixels, nan=0.0, posinf=65504.0, neginf=0.0))
+        object.__setattr__(self, "pixels", np.nan_to_num(pixels, nan=0.0, posinf=MOST_OF_HALF_FLOATS, neginf=0.0))
 
     @cached_property
     def levels(self) -> Levels:

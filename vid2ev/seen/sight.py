@@ -21,7 +21,7 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.seen.mounts import Mount
 from vid2ev.sources import Source
 from vid2ev.sources.cut import Cut, Slowed
-from vid2ev.sources.edit import Edit
+from vid2ev.sources.edit import Edit, unedited
 from vid2ev.sources.framing import framing_of
 from vid2ev.stream.frames import Frame
 
@@ -90,8 +90,8 @@ def scene_of(source: Source) -> SceneSource | None:
 
 def scene_behind(source: Source) -> SceneSource | None:
     """The scene whose pictures a source shows, or what is left of them; None for other sources."""
-    unedited = _unedited(source)
-    return unedited if isinstance(unedited, SceneSource) else None
+    scene = unedited(source)
+    return scene if isinstance(scene, SceneSource) else None
 
 
 def instants_of(scene: SceneSource, source: Source) -> dict[int, int]:
@@ -117,13 +117,7 @@ def lens_of(source: Source) -> Intrinsics | None:
 
 def taken_by(source: Source) -> Taker | None:
     """The camera that took the pictures of a source, where these come with it."""
-    return getattr(_unedited(source), "taken_by", None)
-
-
-def _unedited(source: Source) -> Source:
-    while isinstance(source, Edit):
-        source = source.source
-    return source
+    return getattr(unedited(source), "taken_by", None)
 
 
 def staged(source: Source) -> SceneSource:

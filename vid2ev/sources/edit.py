@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from vid2ev.sources.source import Source
 
 
+def unedited(source: Source) -> Source:
+    """The source below all changes."""
+    while isinstance(source, Edit):
+        source = source.source
+    return source
+
+
 class Edit:
     """The source itself, but for what a subclass changes; `describe` says so under "edits"."""
 

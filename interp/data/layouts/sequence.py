@@ -33,6 +33,10 @@ class Placed(NamedTuple):
         kept = Events(self.t[inside], x[inside].astype(np.uint16), y[inside].astype(np.uint16), self.p[inside])
         return kept, len(inside) - len(kept)
 
+    def part(self, left: int, top: int, width: int, height: int) -> tuple[Events, int]:
+        """The same of a part of a sensor, whose pixels count from its own corner."""
+        return self._replace(x=self.x - np.float32(left), y=self.y - np.float32(top)).within((width, height))
+
 
 class Sequence(Protocol):
     """Frames and events on one clock.
