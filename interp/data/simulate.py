@@ -23,7 +23,7 @@ from interp.data.settings import ClipSettings
 from interp.data.shot import Shot
 from interp.representation.event_counts import EventCounts, count_events
 from vid2ev import Cis, CisSpec, Dvs, Events
-from vid2ev.stream.still import MOST_OF_HALF_FLOATS
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.stream.upload import as_array
 
 MOST = 255  # that events of a pixel, sub-interval and polarity count for

@@ -18,9 +18,9 @@ from interp.own_codes import BRIGHT, curve_of
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.manifest import identity
 from vid2ev.sources.edit import unedited
-from vid2ev.stream.still import MOST_OF_HALF_FLOATS
 
 
 class OfSource:

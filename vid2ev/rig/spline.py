@@ -25,8 +25,8 @@ import math
 import numpy as np
 
 from vid2ev.compiling.cache import cached
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS as BRIGHTEST
 from vid2ev.rig.bands import Bands
-from vid2ev.stream.still import MOST_OF_HALF_FLOATS as BRIGHTEST
 
 F = np.float32
 POLE = F(math.sqrt(3) - 2)

@@ -35,8 +35,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.rig.pose import IDENTITY, Pose
-from vid2ev.stream.still import MOST_OF_HALF_FLOATS
 
 if TYPE_CHECKING:
     from vid2ev.scenes.mesh_numbers import MeshNumbers

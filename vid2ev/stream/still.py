@@ -9,7 +9,6 @@ import numpy as np
 
 STRIP = 256  # pixels, row by row
 NOT_SAID = np.uint8(2)
-MOST_OF_HALF_FLOATS = 65504.0  # what infinite light of pictures counts as where it is mixed with other light
 BRIGHTEST = 1e30  # light that sensors take as it is; what is below 0 or not finite they mend, and count
 
 
