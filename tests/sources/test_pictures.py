@@ -189,10 +189,16 @@ def test_a_single_picture_says_what_can_be_done(tmp_path: Path, name: str) -> No
         open_source(tmp_path / name)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".gif"])
-def test_an_animation_is_a_video_of_the_light_of_its_pictures(tmp_path: Path, suffix: str) -> None:
+PROFILE = np.random.default_rng(0).bytes(9999)  # no profile, but as large as those of printers
+
+
+@pytest.mark.parametrize(("suffix", "profile"), [(".png", b""), (".png", PROFILE), (".gif", b"")])
+def test_an_animation_is_a_video_of_the_light_of_its_pictures(tmp_path: Path, suffix: str, profile: bytes) -> None:
+    """Also where it says so far behind its first bytes, and where it has a colour profile, of which PyAV frees the name
+    twice."""
     pictures = [Image.fromarray(np.full((16, 16, 3), level, np.uint8)) for level in (30, 200)]
-    pictures[0].save(tmp_path / f"a{suffix}", save_all=True, append_images=pictures[1:], duration=40)
+    more = {"icc_profile": profile} if profile else {}
+    pictures[0].save(tmp_path / f"a{suffix}", save_all=True, append_images=pictures[1:], duration=40, **more)
     animated = [frame.light for frame in open_source(tmp_path / f"a{suffix}").frames()]
     (tmp_path / "still").mkdir()
     for number, picture in enumerate(pictures):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vid2ev.light.icc import jpeg_parts
 from vid2ev.light.picture_files import read_picture
-from vid2ev.light.recognise import JPEG, PNG, head_of
+from vid2ev.light.recognise import JPEG, PNG, head_of, is_animated_png
 
 NETPBM = {b"P1": True, b"P2": True, b"P4": True, b"P5": True, b"Pf": True, b"P3": False, b"P6": False, b"PF": False}
 SIZES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}  # marks of a JPEG at the part that says how large it is
@@ -25,7 +25,7 @@ def _by_header(path: Path) -> bool | None:
     """None where it does not say so for certain."""
     head = head_of(path)
     if head.startswith(PNG):
-        return head[25] == 0 if head[12:16] == b"IHDR" and len(head) > 25 and b"acTL" not in head else None
+        return head[25] == 0 if head[12:16] == b"IHDR" and len(head) > 25 and not is_animated_png(path) else None
     if head.startswith(JPEG):
         return _of_jpeg(path)
     return NETPBM.get(head[:2])

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import re
 import zipfile
+from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
 from vid2ev.errors import DataError
-from vid2ev.untrusted import check_file
+from vid2ev.untrusted import check_file, png_chunks
 
 Kind = Literal["picture", "array", "arrays", "video"]
 
@@ -46,7 +47,7 @@ def recognise(path: Path) -> Kind:
         return "array"
     if head.startswith(b"PK\x03\x04") and _holds_arrays(path):
         return "arrays"
-    if head.startswith(PNG) and b"acTL" in head:
+    if is_animated_png(path):
         return "video"
     if head.startswith(JPEG) and path.suffix.lower() in MOTION_JPEG_SUFFIXES:
         return "video"
@@ -64,6 +65,13 @@ def head_of(path: Path) -> bytes:
             return file.read(HEAD)
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); leave it out, or get another copy") from error
+
+
+def is_animated_png(path: Path) -> bool:
+    """Whether a file is a PNG that says so before its pixels, behind a profile of any size."""
+    with open(path, "rb") as file:
+        kinds = (kind for kind, _, _ in png_chunks(file))
+        return file.read(len(PNG)) == PNG and b"acTL" in takewhile(lambda kind: kind != b"IDAT", kinds)
 
 
 def _holds_arrays(path: Path) -> bool:

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import av
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.recognise import recognise
+from vid2ev.light.recognise import is_animated_png, recognise
 from vid2ev.sources.ffv1 import is_sound
 from vid2ev.sources.kept import Kept, Reader
 from vid2ev.sources.matroska import missing_bytes
@@ -62,6 +62,8 @@ class VideoFile:
         self.path = Path(path)
         self.name = str(path)
         self.missing = missing_bytes(self.path) if self.path.is_file() else 0
+        # FFmpeg takes one for a still where it says that it moves behind a large profile
+        self._format = "apng" if self.path.is_file() and is_animated_png(self.path) else None
         with self._opened() as (container, stream):
             self.rate, self.pixel_shape, self.codec = _said_of(stream)
             self.planned: int = stream.frames
@@ -95,7 +97,7 @@ class VideoFile:
     def _opened(self) -> Iterator[tuple[Any, Any]]:
         try:
             # `file:` and the whitelist keep playlists and odd file names from opening anything but local files
-            container = av.open(f"file:{self.path}", options={"protocol_whitelist": "file"})
+            container = av.open(f"file:{self.path}", format=self._format, options={"protocol_whitelist": "file"})
         except (av.FFmpegError, ValueError) as error:
             raise DataError(f"{self.path}: not a video that can be read ({reason(error)}); {REMEDY}") from error
         with container:

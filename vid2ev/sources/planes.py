@@ -56,9 +56,11 @@ def _display_matrix(picture: Any) -> tuple[float, float, float, float]:
 
 
 def _beside(picture: Any) -> list[Any]:
-    """What FFmpeg says beside a picture, but for kinds that PyAV has no name for, such as EXIF: it gives nothing at all
-    beside these, so FFmpeg takes them away, one after the other."""
+    """What FFmpeg says beside a picture, but for colour profiles, of which PyAV frees the name that a PNG gives them
+    twice, and for kinds that it has no name for, such as EXIF: it gives nothing at all beside these.  FFmpeg takes
+    them away, one after the other."""
     taken = set[str]()
+    picture = _without(picture, "ICC_PROFILE")
     while True:
         try:
             return list(picture.side_data)
