@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from vid2ev.light.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
 from vid2ev.light.pictures import PictureReader
+from vid2ev.light.primaries import primaries_of
 from vid2ev.light.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
 from vid2ev.light.transfer import code_table, parse_transfer
 
@@ -183,3 +184,13 @@ def test_infinite_light_stays_so_in_its_own_channels() -> None:
     for channels in ([np.inf, 1.0, 0.5], [np.inf] * 3, [0.5, -1.0, np.inf]):
         picture = np.full((2, 3, 3), channels, np.float32)
         np.testing.assert_array_equal(PictureReader("linear", "rgb").light(picture), picture)
+
+
+def test_infinite_light_of_other_primaries_is_a_number_in_every_channel() -> None:
+    """What is infinite has no colour that could be mixed anew; the pixels beside it do."""
+    wide = primaries_of(9)
+    picture = np.float32([[[np.inf, np.inf, np.inf], [0.5, np.inf, 0.2], [0.2, 0.5, 0.1]]])
+    light = PictureReader("linear", "rgb").light(picture, wide)
+    np.testing.assert_array_equal(light[0, :2], picture[0, :2])
+    np.testing.assert_allclose(light[0, 2], wide.to_bt709 @ picture[0, 2], rtol=1e-5)
+    assert (PictureReader("linear").light(picture, wide)[0, :2] == np.inf).all()

@@ -85,10 +85,14 @@ class PictureReader:
         with np.errstate(over="ignore", invalid="ignore"):  # (infinite light is counted, too)
             if light.ndim == 2:
                 return self._grey(np.array(light, np.float32, order="C"))
-            if self.colour == "rgb" and np.array_equal(to_bt709, IDENTITY):  # (infinite x 0 would be no number)
+            if self.colour == "rgb" and np.array_equal(to_bt709, IDENTITY):
                 return np.array(light, np.float32, order="C")
             mix = np.asarray(weights if self.colour == "luminance" else to_bt709.T, light.dtype)
-            return np.array(light @ mix, np.float32, order="C")
+            mixed = np.array(light @ mix, np.float32, order="C")
+        if self.colour == "rgb":  # (of which infinite - infinite and infinite x 0 would be no number)
+            endless = np.isposinf(light).any(axis=-1)
+            mixed[endless] = light[endless]
+        return mixed
 
     def _grey(self, light: np.ndarray) -> np.ndarray:
         return light if self.colour == "luminance" else np.repeat(light[..., None], 3, axis=-1)
