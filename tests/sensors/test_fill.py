@@ -149,6 +149,8 @@ def test_what_cannot_be_is_said() -> None:
         batch.steps(light[:, :1], t_ns)
     with pytest.raises(UsageError, match="expected a later one"):
         batch.steps(light[::-1], t_ns[::-1])
+    with pytest.raises(UsageError, match="expected a whole number of nanoseconds"):
+        batch.steps(light, t_ns + 0.5)
     with pytest.raises(UsageError, match="each after the one before"):
         NetCounts(SIZE, [0, 5, 5])
     with pytest.raises(UsageError, match="expected whole numbers of microseconds"):

@@ -93,7 +93,7 @@ class DvsBatch:
 
     def _checked(self, light: Any, t_ns: Any) -> tuple[np.ndarray, np.ndarray]:
         """Light as an array of as many clips as there are sensors, in one piece, and a time for each of its frames."""
-        light, times = np.ascontiguousarray(light), np.asarray(t_ns, np.int64)
+        light, times = np.ascontiguousarray(light), np.asarray(t_ns)
         clips, (width, height) = len(self._sensors), self.size
         if light.ndim != 4 or light.shape[1:] != (clips, height, width):
             raise UsageError(f"light of shape {light.shape}: expected (frames, {clips}, {height}, {width})")

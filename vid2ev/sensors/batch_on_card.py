@@ -14,7 +14,7 @@ from vid2ev.sensors.card_events import CardEvents
 from vid2ev.sensors.card_walk import CardWalk
 from vid2ev.sensors.clock import Clock, Step, first_count, later, pace_of
 from vid2ev.sensors.compiled import flags_of, numbers_of
-from vid2ev.sensors.limits import check_sensor, check_spec
+from vid2ev.sensors.limits import check_sensor, check_spec, time_ns
 from vid2ev.sensors.pixel_planes import blank_planes
 from vid2ev.sensors.spec import DvsSpec
 
@@ -89,7 +89,7 @@ class DvsBatchOnCard:
     def _checked_steps(self, t_ns: Any) -> list[list[Step]]:
         if not self._clocks:
             raise UsageError("a batch without light: expected restart(light, t_ns) before its steps")
-        times = np.asarray(t_ns, np.int64)
+        times = np.array([[time_ns(t) for t in row] for row in t_ns], np.int64)
         before = np.array([[clock.t_ns for clock in self._clocks]], np.int64)
         if (np.diff(np.concatenate([before, times]), axis=0) <= 0).any():
             raise UsageError("frame times of a batch: expected each after the one before; sort the frames")
