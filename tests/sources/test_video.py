@@ -298,6 +298,15 @@ def test_the_picture_is_upright(encode, matrix: tuple[int, int, int, int], turn:
         np.testing.assert_array_equal(frame.light, np.rot90(upright.light, angle // 90))
 
 
+def test_pictures_that_a_decoder_writes_upwards_are_upright(encode, make_picture) -> None:
+    """From the last row in memory to the first one, as that of AMV does."""
+    luma, colour = np.full((32, 64), 40, np.uint8), np.full((16, 32), 128, np.uint8)
+    luma[:16, :32] = 220
+    stored = make_picture([luma, colour, colour], "yuvj420p", color_range=FULL)
+    (frame,) = open_source(encode("a.avi", [stored], codec="amv")).frames()
+    np.testing.assert_array_equal(frame.light > 0.3, luma > 100)
+
+
 # ---------------------------------------------------------------------------------------------------------- damage
 
 

@@ -94,7 +94,8 @@ def upright(light: np.ndarray, orientation: tuple[bool, bool, bool]) -> np.ndarr
 def codes_of(plane: Any, kind: Any) -> np.ndarray:
     """Codes of a plane [rows x row length in memory]: uint8, or uint16 for more than 8 bits."""
     dtype = np.uint8 if kind.components[0].bits <= 8 else np.uint16
-    return np.frombuffer(plane, dtype).reshape(plane.height, -1)
+    rows = np.frombuffer(plane, dtype).reshape(plane.height, -1)
+    return rows if plane.line_size > 0 else np.ascontiguousarray(rows[::-1])  # (of decoders that go upwards)
 
 
 def halvings_of(chroma_length: Any) -> int:
