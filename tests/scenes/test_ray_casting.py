@@ -144,6 +144,19 @@ def test_what_is_thinner_than_a_pixel_has_its_width(kind, width_px):
     np.testing.assert_allclose(across, width_px / math.cos(math.radians(10)), rtol=0.12, atol=0.04)
 
 
+def test_nothing_is_missing_where_a_tile_sees_nearly_half_of_all_around():
+    # (eleven pixels across 169 degrees, and 98 down through the same lens)
+    camera, rng = Intrinsics.of_field((11, 98), 169), np.random.default_rng(1)
+    plane = rays_of_pixels(camera)[1:-1, 1:-1]
+    rays = np.concatenate([plane, np.ones((98, 11, 1))], axis=-1)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    for x, y, z in rng.normal(size=(60, 3)):
+        centre = np.array([x, y, 0.3 * abs(z)]) * 3 / math.hypot(x, y, 0.3 * z)
+        picture = seen(thing("sphere", (1.5,) * 3, way=tuple(centre)), camera=camera, samples=1)
+        along = rays @ centre
+        assert np.array_equal(picture.thing == 0, (along > 0) & (along**2 > centre @ centre - 0.75**2))
+
+
 def test_what_is_smaller_than_a_pixel_has_its_area():
     for radius_px in (0.3, 0.5, 0.9):
         for shift in (0, 0.3, 0.5):

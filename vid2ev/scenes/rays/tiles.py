@@ -7,6 +7,7 @@ import math
 from vid2ev.scenes.rays.compiler import law
 
 TILE = 16
+WIDE = 1.2  # rad from the middle of a tile to its corners: of wider ones the corners may not be farthest from it
 
 
 @law
@@ -45,7 +46,7 @@ def cone(rays, first, last, left, right):
             else:
                 cosine = (x * rx + y * ry + z) / (length * middle)
                 widest = max(widest, math.acos(min(max(cosine, -1.0), 1.0)))
-    if not middle > 0.0:  # (a corner sees nothing: look at everything)
+    if not middle > 0.0 or widest > WIDE:  # (a corner sees nothing, or nearly all is in the tile: look at everything)
         return 0.0, 0.0, 1.0, math.pi
     # (sides between the corners may bend outwards through a lens)
     return x / middle, y / middle, z / middle, 1.1 * widest + 1e-6
