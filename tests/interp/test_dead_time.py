@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interp.interpolate.take import Options
+from interp.representation import blind_runs
 from interp.representation.dead_time import MOST, DeadTime, Law, look_back_us
 from interp.representation.event_counts import count_events
 from vid2ev import Dvs, Events, UsageError, load_sensor
@@ -77,6 +81,57 @@ def test_pixels_and_signs_have_nothing_to_do_with_each_other(sent: list[tuple[in
             np.testing.assert_array_equal(worth[alone], dead_time.crossings(t_us[alone], 0 * pixel[alone], p[alone]))
         turned = dead_time.crossings(t_us, pixel, 1 - p)
         np.testing.assert_array_equal(turned, worth)
+
+
+def all_ways(runs: list[list[int]], blind_us: float) -> list[float]:
+    """The means of m of runs of events, one after the other, as the docstring has them: of all ways to choose the m of
+    a run, each as likely as the product of what is said of it."""
+    intervals = [np.diff(run) for run in runs]
+    every = np.concatenate(intervals)
+    short, longer = blind_runs.SHORT * blind_us, 2 * blind_us
+    slow, fast = np.sum((every >= short) & (every < longer)), np.sum((every >= blind_us - 1) & (every < short))
+    a = blind_runs.EVEN + blind_runs.STEEP * math.log((1 + slow) / (1 + fast))
+    a = min(max(a, blind_runs.LEAST), blind_runs.GREATEST)
+    shared, means = len(every) / sum(map(len, runs)), list[float]()
+    for ds in intervals:
+        q = (len(ds) + blind_runs.USUAL * shared) / (len(ds) + 1 + blind_runs.USUAL)
+        told = list[dict[int, float]]()
+        for d in ds:
+            told.append({1: 1.0})
+            for m in range(2, MOST + 1 if d >= blind_us - 1 else 2):
+                z = (blind_us - (m - 1) * d / m) * m / d / blind_runs.JITTER
+                if (within := 0.5 * math.erfc(-z / math.sqrt(2))) < blind_runs.UNLIKELY:
+                    break
+                told[-1][m] = m ** (1 - a) * q ** (m - 1) * within
+        total, sums = 0.0, np.zeros(len(ds))
+        for way in itertools.product(*told):
+            nats = np.diff(np.log(np.array(way) / ds))
+            follow = np.prod(blind_runs.LEAP + 1 / (1 + (nats / blind_runs.PACE) ** 2))
+            likely = follow * math.prod(each[m] for each, m in zip(told, way, strict=True))
+            total, sums = total + likely, sums + likely * np.array(way)
+        means += [1.0, *(sums / total)]
+    return means
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.lists(st.floats(0.6, 3.5), max_size=4), min_size=1, max_size=5),
+    st.sampled_from([1.0, 40.0, 1000.5]),
+    st.integers(0, 1),
+)
+def test_of_a_run_it_is_the_mean_of_all_ways_that_it_may_have_come_about(
+    shares: list[list[float]], blind_us: float, sign: int
+) -> None:
+    """Events of pixels that begin one after the other, each a run whose intervals are these shares of R."""
+    runs = [
+        (7 * k + np.cumsum([0, *np.ceil(np.array(run) * blind_us)])).astype(int).tolist()
+        for k, run in enumerate(shares)
+    ]
+    events = sorted((t_us, pixel) for pixel, run in enumerate(runs) for t_us in run)
+    t_us, pixel = np.array(events, np.int64).T
+    worth = DeadTime(blind_us, "quantised").crossings(t_us, pixel, np.full(len(events), sign, np.uint8))
+    expected = np.array(all_ways(runs, blind_us))[np.argsort(np.argsort(pixel, kind="stable"), kind="stable")]
+    np.testing.assert_allclose(worth, expected, rtol=1e-5)
 
 
 def test_light_that_was_slow_is_not_taken_for_fast_at_once() -> None:
