@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interp.candidates.beyond import (
     ABOVE,
+    AROUND_PX,
     BELOW,
     BELOW_AROUND,
     BELOW_SHARE,
     BOTTOM,
     BRIGHTEST,
+    DARK,
     DARKEST,
     KEPT,
+    NOISE_PX,
     TOP,
     carried,
 )
@@ -86,6 +91,54 @@ def test_frames_are_never_contradicted(steps: list[tuple[float, float]]) -> None
             assert DARKEST / 2 < made <= bottom
         else:
             assert made == pytest.approx(value)
+
+
+def around(plane: np.ndarray, across_px: int) -> np.ndarray:
+    """Means over squares around each pixel of a plane, over what there is."""
+    reach, padded = across_px // 2, np.pad(plane.astype(np.float64), across_px // 2, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1, 2 * reach + 1))
+    return np.nanmean(windows, axis=(2, 3))
+
+
+def slowly(frame: np.ndarray, change: np.ndarray, before: np.ndarray | None, limits: tuple[float, float]) -> Any:
+    """The docstring for one grey frame [H, W]: light, and where it is beyond the range."""
+    span = limits[1] - limits[0]
+    bottom, top = max(limits[0] + BOTTOM * span, DARKEST), limits[0] + TOP * span
+    above, low = frame >= top, frame <= bottom + (1 - TOP) * (top - bottom)
+    below = (frame <= bottom) | (low & (around(frame, NOISE_PX) <= bottom + DARK * (top - bottom)))
+    deep = BELOW + BELOW_SHARE * below.mean() + BELOW_AROUND * around(below, AROUND_PX)
+    if before is None:  # as it is usually: a third above the top, so deep below the bottom
+        before = np.where(above, top * 4 / 3, np.where(below, bottom * np.exp(deep), frame))
+    nats = np.log(np.clip(before, DARKEST, BRIGHTEST)) + change
+    below |= low & (nats < np.log(bottom))
+    found = frame.copy()
+    for place in np.argwhere(above | below):
+        y, x = place
+        end, usual = (top, math.log(4 / 3)) if above[y, x] else (bottom, deep[y, x])
+        away = usual + KEPT * (nats[y, x] - math.log(end) - usual)
+        away = max(away, 0) if above[y, x] else min(away, 0)
+        found[y, x] = min(max(end * math.exp(away), DARKEST), BRIGHTEST)
+    return found, above | below
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(0.0, 1.0), (0.05, 0.6), (0.0, 0.001)]), st.floats(0.1, 6))
+def test_it_is_the_law_pixel_by_pixel(seed: int, limits: tuple[float, float], pace: float) -> None:
+    """Of two sequences of frames of which parts are beyond the range, near its ends and far within; of each alone."""
+    draw = np.random.default_rng(seed)
+    span, states, found = limits[1] - limits[0], [None, None], None
+    for _ in range(6):
+        levels = draw.choice(
+            [-0.1, 2e-4, 2e-3, 0.01, 0.4, 0.99, 1.2], (2, 1, 12, 14), p=[0.3, 0.1, 0.1, 0.1, 0.1, 0.1, 0.2]
+        )
+        levels[:, :, :6, :7] = 3e-4 + 0.02 * (draw.random((2, 1, 6, 7)) < 0.1)  # dark, with noise
+        frame = (limits[0] + span * levels * draw.uniform(0.95, 1.05, levels.shape)).astype(np.float32)
+        change = draw.normal(0, pace, levels.shape).astype(np.float32)
+        found, beyond = carried(torch.from_numpy(frame), torch.from_numpy(change), found, torch.tensor([limits] * 2))
+        for k in range(2):
+            states[k], expected = slowly(frame[k, 0].astype(np.float64), change[k, 0], states[k], limits)
+            np.testing.assert_array_equal(beyond[k, 0], expected)
+            np.testing.assert_allclose(found[k, 0], states[k], rtol=1e-4)
 
 
 def test_single_pixels_that_noise_lifts_from_the_bottom_are_below_it() -> None:
