@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from pairs import counts, frames
 
-from interp.candidates.bridge import bridge, coloured, integrated, ratios_of
-from interp.candidates.contrast import with_fitted_contrast
+from interp.candidates.bridge import BRIGHTEST, DARKEST, bridge, coloured, highest_of, integrated, ratios_of
+from interp.candidates.contrast import LEAST, MOST, with_fitted_contrast
+from interp.candidates.ramps import ramps
 from interp.light import luminance, to_codes, to_light
 from interp.representation.event_counts import EventCounts
 from vid2ev import UsageError
@@ -100,6 +102,55 @@ def test_colours_come_from_the_frames_or_from_a_picture_of_the_instant() -> None
     assert not torch.allclose(found, to_light(bridge(first, second, some, times), "srgb"), atol=0.05)
 
 
+@pytest.mark.parametrize("method", [bridge, ramps])
+def test_colours_go_from_those_of_the_one_frame_to_those_of_the_other_as_the_drift_does(method: Any) -> None:
+    """r = (RGB + 0.01) / (Y + 0.01); all events come in the last quarter."""
+    off_on = torch.zeros(1, 2, STEPS, 1, 1)
+    off_on[0, 1, 6:] = 10
+    lights = [torch.tensor(each).reshape(1, 3, 1, 1) for each in ((0.3, 0.1, 0.2), (0.5, 0.7, 0.6))]
+    first, second = ((each + 0.01) / (luminance(each) + 0.01) for each in lights)
+    found = method(*lights, EventCounts(off_on, torch.full((1, 2), 0.01)), torch.tensor([[0.75]]), "linear")[:, 0]
+    # (ramps are on the way to the first event, which counts half and comes in the middle of a sub-interval)
+    drift = 1.5 / (20 + 2) if method is bridge else (0.5 * (0.75 / 0.8125) ** 2 + 1.5) / (19.5 + 2)
+    made = (found + 0.01) / (luminance(found) + 0.01)
+    torch.testing.assert_close(made, first + drift * (second - first), rtol=1e-4, atol=0)
+
+
+def test_the_nearest_is_integrated_from_the_nearer_frame_alone() -> None:
+    first, second, events = ramp(1)
+    other = 3 * second  # of which events tell nothing
+    times = torch.tensor([[0.45, 0.5, 0.55]])
+    found = bridge(first, other, events, times, "linear", "nearest")[0]
+    logs = [torch.log(each[0] + 1e-3) for each in (first, other)]
+    expected = [logs[0] + C * STEPS * 0.45, logs[0] + C * STEPS * 0.5, logs[1] - C * STEPS * 0.45]
+    torch.testing.assert_close(found, torch.exp(torch.stack(expected)) - 1e-3, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("brightest", [0.2, 1.0, 6.0])
+@pytest.mark.parametrize("order", [1, -1])
+def test_light_is_within_what_frames_can_show_or_as_bright_as_they_are(brightest: float, order: int) -> None:
+    """However many events there are: a tenth of a nat above white, or the brightest of any colour in either frame."""
+    pair = [torch.full((1, 3, 2, 2), 0.1), torch.full((1, 3, 2, 2), 0.1)]
+    pair[0][0, 1, 1, 0] = brightest  # in a single colour of a single pixel
+    first, second = pair[::order]
+    highest = highest_of(first, second, "linear")
+    assert float(highest) == pytest.approx(max(BRIGHTEST, math.log(brightest + 1e-3)))
+    off_on = torch.zeros(1, 2, STEPS, 2, 2)
+    off_on[:, 0, :, 0], off_on[:, 1, :, 1] = 1e4, 1e4  # darker above, brighter below
+    events, times = EventCounts(off_on, torch.full((1, 2), C)), torch.tensor([[0.0, 0.5, 1.0]])
+    found = integrated(luminance(first), luminance(second), events, times, highest)
+    begun, lowest, top = math.log(0.1 + 1e-3), torch.full((2,), DARKEST), highest.flatten().expand(2)
+    torch.testing.assert_close(found.forward[0, 1, 0], torch.stack([lowest, top]))
+    torch.testing.assert_close(found.backward[0, 1, 0], torch.stack([top, lowest]))
+    assert float(found.forward[0, 0, 0, 0, 1]) == float(found.backward[0, 2, 0, 0, 1]) == pytest.approx(begun)
+    assert float(found.light().min()) >= 0
+    for method in (bridge, ramps):
+        made = luminance(method(first, second, events, times, "linear"))
+        assert float(made.min()) >= 0 and float(made.max()) <= float(torch.exp(highest)) * 1.0001
+    dark = integrated(-luminance(first), luminance(second), events, times)
+    assert torch.isfinite(dark.forward).all()  # noise below black counts as black
+
+
 @pytest.mark.parametrize("level", [0.0, 1e-8, 0.5, 1.0, 1e4])
 def test_gradients_are_finite_on_light_of_any_level(level: float) -> None:
     first, second = (torch.full((1, 3, 8, 8), level, requires_grad=True) for _ in range(2))
@@ -150,6 +201,20 @@ def test_without_events_the_contrast_is_the_usual_one() -> None:
     first, second = frames(2, (8, 8))
     found = with_fitted_contrast(first, second, EventCounts.none(2, (8, 8))).contrast
     torch.testing.assert_close(found, torch.full((2, 2), C))
+
+
+def test_a_contrast_is_one_that_sensors_have() -> None:
+    first, second = torch.full((1, 1, 20, 20), 1e-3), torch.full((1, 1, 20, 20), 1.0)
+    off_on = torch.zeros(1, 2, 1, 20, 20)
+    off_on[:, 0, :, :10], off_on[:, 1, :, 10:] = 100, 1
+    found = with_fitted_contrast(
+        torch.cat([first, first]),
+        torch.cat([first, second]),
+        EventCounts(off_on.expand(2, -1, -1, -1, -1), torch.full((2, 2), C)),
+        "linear",
+    ).contrast
+    torch.testing.assert_close(found[:, 1], torch.tensor([C * (16 / 216) ** 0.5, MOST]))
+    assert float(found[0, 0]) == pytest.approx(LEAST)
 
 
 def test_few_events_weigh_against_sixteen_pixels_of_the_usual_contrast() -> None:
