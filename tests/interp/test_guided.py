@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +14,16 @@ from torch.nn import functional as F
 from interp.around import mean_around
 from interp.candidates.bridge import DARK
 from interp.candidates.guided import (
+    AROUND_PX,
+    DARKEST,
+    DOUBT_PX,
     GAMMA,
     SHARP,
     agreement,
     carried_off_by,
     flows_to,
     guided,
+    motion_between,
     off_by,
     part_of,
     recoloured,
@@ -149,6 +154,62 @@ def test_light_of_coarse_pixels_is_in_doubt_by_what_it_does_not_show() -> None:
     assert 0.6 < float(fine) <= 1 and float(coarse) > 0.85
     even = share_of(apart, target, torch.full_like(target, 0.02), footprint=2)
     assert float(even.max()) < 0.1
+
+
+def over_squares(maps: np.ndarray, before: int, after: int, beyond: Any) -> np.ndarray:
+    """Means over the squares from so many pixels before each of a map to so many after it; `beyond` as numpy pads."""
+    padded = np.pad(maps.astype(np.float64), (before, after), **beyond)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (before + after + 1,) * 2)
+    return np.nanmean(windows, axis=(2, 3))
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_what_is_off_and_what_is_believed_is_as_the_docstring_has_it(k: int) -> None:
+    """Where a pixel of the event camera is k pixels of the frames wide; of grey codes, some of them black."""
+    draw = np.random.default_rng(k)
+    picture = np.where(draw.random((40, 50)) < 0.2, 0, draw.random((40, 50)))
+    carried = picture + draw.normal(0, [[[0.02]], [[0.06]]], (2, 40, 50)).clip(0)
+    doubt = draw.normal(0, 0.3, (40, 50))
+    edge, none = {"mode": "edge"}, {"constant_values": np.nan}
+
+    def alike(maps: np.ndarray) -> np.ndarray:
+        return over_squares(maps, (k - 1) // 2, k // 2, edge)
+
+    def around(maps: np.ndarray, across_px: int) -> np.ndarray:  # (an odd number of pixels, about k times as many)
+        reach = across_px * k // 2
+        return over_squares(maps, reach, reach, none)
+
+    logits = [-SHARP / k**0.5 * around(np.abs(alike(each - picture)), AROUND_PX) for each in carried]
+    per_nat = (np.maximum(picture, DARKEST) / GAMMA) ** 2  # code ~ light ** (1 / GAMMA), as light is seen
+    wrong, seen_wrong = per_nat * around(doubt**2, DOUBT_PX), per_nat * around(alike(doubt) ** 2, DOUBT_PX)
+    apart = math.pi / 2 * (np.maximum(*logits) / SHARP) ** 2 * k
+    off = np.maximum(apart - seen_wrong, 0)
+    seen, both, doubts = (
+        torch.from_numpy(each).float()[None, None] for each in (picture[None], carried[:, None], doubt[None])
+    )
+    found = agreement(both, seen, footprint=k)
+    np.testing.assert_allclose(found[0, 0], logits, atol=1e-4)
+    said = off_by(seen, doubts, footprint=k)
+    for mine, theirs in zip((wrong, seen_wrong), said, strict=True):
+        np.testing.assert_allclose(mine, theirs[0, 0, 0], rtol=1e-3)
+    np.testing.assert_allclose(carried_off_by(found, said[1], k)[0, 0, 0], off, atol=1e-6)
+    share = part_of(said[0], carried_off_by(found, said[1], k))[0, 0, 0]
+    np.testing.assert_allclose(share, wrong / (wrong + off + 0.003**2), atol=1e-3)
+
+
+def test_motion_of_coarse_light_is_that_of_means() -> None:
+    """Of codes in 256ths, of which the means over 3 x 3 are never halfway between two."""
+    first, between, last = (((255 * shifted(by)[:, :1]).round() / 255) for by in (0.0, 2.0, 5.0))
+    means = [F.avg_pool2d(F.pad(each, (1, 1, 1, 1), mode="replicate"), 3, 1) for each in (first, last, between)]
+    found = flows_to(first, last, between[:, None], footprint=3)
+    expected = flows_to(means[0], means[1], means[2][:, None])
+    torch.testing.assert_close(found, expected, atol=1e-3, rtol=0)
+    assert not torch.equal(found, flows_to(first, last, between[:, None]))
+
+
+def test_motion_between_is_of_the_first_and_then_of_the_second() -> None:
+    found = motion_between(shifted(0.0), shifted(4.0))[0, :, 16:-16, 16:-16].mean((-1, -2))
+    torch.testing.assert_close(found, torch.tensor([-4.0, 0.0, 4.0, 0.0]), atol=0.3, rtol=0)
 
 
 @pytest.mark.parametrize("size", [(8, 30), (16, 16)])

@@ -10,8 +10,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interp.candidates.bridge import DARK, bridge
-from interp.candidates.ramps import in_doubt, ramps, risen
+from interp.candidates.bridge import DARK, bridge, ratios_of
+from interp.candidates.ramps import Risen, in_doubt, ramps, risen
 from interp.light import luminance, to_codes, to_light
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
@@ -98,6 +98,25 @@ def test_doubt_is_what_is_missed_where_half_of_it_may_have_come() -> None:
     early = (0.5 * (0.25 / 0.4375) ** 2 + 2 * 0.25) / 2.5  # w before the event, in the middle of 3/8 ... 4/8
     expected = [0.0, missed * math.sqrt(early * (1 - early)), missed * 0.4, 0.0]  # w = 0.8 after it: sqrt(0.8 0.2)
     torch.testing.assert_close(doubt, torch.tensor(expected), atol=1e-5, rtol=0)
+
+
+def test_networks_are_given_thirds_of_usual_events_and_half_the_log_of_their_number() -> None:
+    """In this order and these units the weights that come with the package have learnt them."""
+    change, left, number, more = torch.randn(4, 1, 2, 1, 3, 5)
+    found = Risen(change, left, number.abs(), more.abs()).channels()
+    expected = [change / 0.45, left / 0.45, torch.log(1 + number.abs()) / 2, torch.log(1 + more.abs()) / 2]
+    torch.testing.assert_close(found, torch.cat(expected, 2))
+
+
+def test_colours_are_those_of_a_picture_of_the_instant_if_there_is_one() -> None:
+    first, second = 0.3 + 0.4 * torch.rand(2, 1, 3, 6, 7)
+    events, times = of_one_pixel([0, 1, 0, 0, -2, 0, 0, 0]), torch.tensor([[0.3, 0.6]])
+    events = EventCounts(events.off_on.expand(-1, -1, -1, 6, 7), events.contrast)
+    pictures = 0.4 + 0.3 * torch.rand(1, 2, 3, 6, 7)  # (not so saturated that a colour would be below black)
+    found = to_light(ramps(first, second, events, times, around=pictures), "srgb")
+    torch.testing.assert_close(ratios_of(found), ratios_of(to_light(pictures, "srgb")), rtol=0, atol=1e-4)
+    plain = to_light(ramps(first, second, events, times), "srgb")
+    torch.testing.assert_close(luminance(found), luminance(plain), rtol=1e-4, atol=1e-6)
 
 
 def test_light_that_rises_steadily_is_nearer_than_by_stairs() -> None:

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from torch.nn import functional as F
 
 from interp.candidates.calibrated import calibrated
-from interp.candidates.registered import registered
+from interp.candidates.registered import registered, unexplained
+from interp.light import luminance, to_light
 from interp.representation.carried import Look, over
 from interp.representation.event_counts import EventCounts
 
@@ -116,6 +117,31 @@ def test_places_that_are_known_are_where_it_is_looked_from(contrast: tuple[float
     assert torch.equal(
         calibrated(frames, beside, (C, C), False, [Look(places, exact=True)]).off_on, beside.off_on
     )  # (nothing is apart)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_events_explain_is_the_square_of_their_correlation(sign: int) -> None:
+    """Also where they say that what got brighter got darker, and thresholds of both signs are not alike."""
+    generator = torch.Generator().manual_seed(4)
+    first, last = torch.rand(2, 1, 3, 30, 40, generator=generator)
+    d = (torch.log(luminance(to_light(each, "srgb")) + 1e-3)[0, 0].numpy() for each in (last, first))
+    change = np.subtract(*d)
+    net = torch.from_numpy(sign * change / 0.2).round() + torch.randint(-3, 4, (30, 40), generator=generator)
+    off_on = torch.stack([(-net).clamp(min=0), net.clamp(min=0)])[None, :, None]
+    seen = 0.3 * off_on[0, 1, 0] - 0.1 * off_on[0, 0, 0]
+    explained = np.corrcoef(change.ravel(), seen.numpy().ravel())[0, 1] ** 2
+    counts = EventCounts(off_on, torch.tensor([[0.1, 0.3]]))
+    assert unexplained(first, last, counts) == pytest.approx(1 - explained, abs=1e-5) and explained > 0.1
+    assert unexplained(first, last, EventCounts.none(1, (30, 40))) == 1
+
+
+def test_a_contrast_that_is_known_is_kept_wherever_the_events_are_brought() -> None:
+    first, last, beside = seen(1, (7, 0))
+    contrast = (0.07, 0.13)
+    for elsewhere in (True, False):
+        found = calibrated((first[0], last[0]), beside, contrast, elsewhere)
+        assert found.contrast.tolist() == [pytest.approx(contrast)]
+        assert (found.places is not None) == elsewhere
 
 
 def test_noise_is_not_matched_with_noise() -> None:
