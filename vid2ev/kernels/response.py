@@ -33,8 +33,8 @@ JOBS = NEXT - Y0
 # Planes of a batch in float32.
 G_D0, G_RISE, G_C1, G_C2, G_A, G_S, G_LO, G_HI, G_UP = (k * LANE_PITCH for k in range(9))
 GUESSES = 9 * LANE_PITCH
-# Accepted last step, in units of the faster time constant: the method is of third order, with a large constant near a
-# turning point.
+# Accepted last step, in units of the faster time constant, or of the way in which the slope changes by itself where
+# that is shorter, as near a turning point or in the dark before a flash: the method is of third order in it.
 ENOUGH = 2e-3
 ROUNDED, TRACE = 1e-15, 1e-30
 POLISHES = 3  # steps in float64, at the most
@@ -273,20 +273,19 @@ def improve(guesses, count, b, flags):
 
 @inner
 def polished(levels, jobs, s, k, b, flags):
-    """One step of Halley's method in float64 for job k at s: the time, and what is left, in units of the faster time
-    constant."""
+    """One step of Halley's method in float64 for job k at s: the time, and what is left, in units of `ENOUGH`."""
     poles, two = len(flags.poles) > 0, len(flags.poles) == 2
     rise, c1, c2, a = jobs[JOB_RISE + k], jobs[JOB_C1 + k], jobs[JOB_C2 + k], jobs[JOB_A + k]
     m1 = expm1_64(-a * s) if poles else 0.0
     m2 = expm1_64(-b * s) if two else 0.0
     f = (jobs[JOB_Y0 + k] - levels[k]) + (rise * s + (c1 * m1 + c2 * m2))
     k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
-    d = rise - k1 - k2
-    step = -(f * d) / (d * d - 0.5 * f * (a * k1 + b * k2))
+    d, bend = rise - k1 - k2, a * k1 + b * k2
+    step = -(f * d) / (d * d - 0.5 * f * bend)
     there = s + step
     inside = (there >= jobs[FROM_S + k]) & (there <= jobs[TO_S + k])
     # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-    left = max(abs(step), abs(f / d)) * max(1.0, max(a, b))
+    left = max(abs(step), abs(f / d)) * max(max(1.0, abs(bend / d)), max(a, b))
     return there if inside else s, left if inside else np.inf
 
 
