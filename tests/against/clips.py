@@ -62,7 +62,7 @@ def uneven(**keys) -> DvsSpec:
 
 def sensor(pixel: Pixel, **keys) -> DvsSpec:
     """The sensor all of whose pixels are `pixel`."""
-    return clean(**asdict(pixel), **keys)
+    return clean(**asdict(pixel) | keys)
 
 
 def start(spec: DvsSpec, light: np.ndarray, **options) -> Dvs:

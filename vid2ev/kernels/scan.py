@@ -12,9 +12,9 @@ from numba.core.extending import overload
 
 from vid2ev.compiling.compiler import INNER_OPTIONS, inner
 from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, NOT_FINITE, PITCH, last_light
-from vid2ev.physics.elementary import exp64, expm1_32
+from vid2ev.physics.elementary import exp64, expm1_32, expm1_64
 from vid2ev.physics.log_curve import light_at, log_level_32
-from vid2ev.physics.photoreceptor import light_weights_32
+from vid2ev.physics.photoreceptor import light_weights_32, light_weights_64
 from vid2ev.physics.photoreceptor_noise import noise_draw, rice_expected, rice_gap
 from vid2ev.stream.still import BRIGHTEST as MOST
 
@@ -22,6 +22,7 @@ F = np.float32
 BRIGHTEST = F(MOST)
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
 STEEP = 2.0
+FALLEN = 8.0  # times 9e-8, the rounding of a step, is 7e-7 nat
 
 # Planes of the scratch of one block: the new light, input of the filter and lags; the clock of the first pole
 # (dt/tau1); the noise before and after, the comparator's input without it; what the lags before and after have beyond
@@ -131,7 +132,8 @@ def advance(block, scratch, flagged, n, flags, num, iv):
                 e2 = block[LAG2 * PITCH + i]
                 scratch[NEW2 + i] = (e2 - x2 * e2) + (g * e1 + w2 * du)
             if len(flags.log_input) == 0:
-                steep = np.int32(steep + np.int32(was_steep(block, i, flags, num) | gets_steep(scratch, i, flags, num)))
+                here = was_steep(block, i, flags, num) | gets_steep(block, scratch, i, flags, num)
+                steep = np.int32(steep + np.int32(here))
         flagged[i] = np.uint8(reaches(block, scratch, i, gain0, flags, num, iv))
     return steep
 
@@ -142,6 +144,15 @@ def light_weights(clock, b, flags):
     if len(flags.poles) > 1:
         return light_weights_32(clock, b)
     x1 = -expm1_32(-clock)
+    return x1, x1 / clock, x1, x1, x1
+
+
+@inner
+def exact_light_weights(clock, b, flags):
+    """The same in float64."""
+    if len(flags.poles) > 1:
+        return light_weights_64(clock, b)
+    x1 = -expm1_64(-clock)
     return x1, x1 / clock, x1, x1, x1
 
 
@@ -288,11 +299,12 @@ def was_steep(block, i, flags, num):
 
 
 @inner
-def gets_steep(scratch, i, flags, num):
-    """The same after it."""
-    e1 = scratch[NEW1 + i]
-    e2 = scratch[NEW2 + i] if len(flags.poles) > 1 else e1
-    return is_steep(scratch[NEW + i], e1, e2, num)
+def gets_steep(block, scratch, i, flags, num):
+    """The same after it, or whether what is left of them in float32 has the rounding of far larger ones before it."""
+    e1, old1 = scratch[NEW1 + i], block[LAG1 * PITCH + i]
+    e2, old2 = (scratch[NEW2 + i], block[LAG2 * PITCH + i]) if len(flags.poles) > 1 else (e1, old1)
+    fallen = max(abs(old1), abs(old2)) > F(FALLEN) * ((scratch[NEW + i] - e2) + F(num.curve.floor))
+    return is_steep(scratch[NEW + i], e1, e2, num) | fallen
 
 
 @inner
@@ -310,11 +322,11 @@ def refine(block, rest, scratch, flagged, n, flags, num, iv):
     """
     x1, w1, x2, g, w2 = iv.x1, iv.w1, iv.x2, iv.g, iv.w2
     for i in range(n):
-        was, gets = was_steep(block, i, flags, num), gets_steep(scratch, i, flags, num)
+        was, gets = was_steep(block, i, flags, num), gets_steep(block, scratch, i, flags, num)
         if not (was or gets):
             continue
         if len(flags.light_bandwidth):
-            x1, w1, x2, g, w2 = light_weights(scratch[CLOCK + i], F(iv.b), flags)
+            x1, w1, x2, g, w2 = exact_light_weights(np.float64(scratch[CLOCK + i]), iv.b, flags)
         du = np.float64(scratch[NEW + i]) - np.float64(block[INPUT * PITCH + i])
         if was:
             scratch[OLD_REST1 + i], scratch[OLD_REST2 + i] = rest[i], rest[PITCH + i]

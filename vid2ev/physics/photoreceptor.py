@@ -119,6 +119,18 @@ def light_weights_32(a1, a2):
 
 
 @compiled
+def light_weights_64(a1, a2):
+    """The same in float64."""
+    slow, fast = min(a1, a2), max(a1, a2)
+    x_slow = -expm1_64(-slow)
+    apart = max(fast - slow, 1e-12)
+    difference = exp64(-slow) * (-expm1_64(-apart) / apart)
+    w2 = x_slow / slow + (x_slow - slow * difference) / fast
+    x1, x2 = -expm1_64(-a1), -expm1_64(-a2)
+    return x1, x1 / a1, x2, a2 * difference, w2
+
+
+@compiled
 def response_terms(du, e1, e2, a, b, two):
     """(c1, c2) of the response above; with one pole (`two` False) e1 is its lag, a its rate, and c2 is 0."""
     if not two:

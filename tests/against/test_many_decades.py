@@ -1,0 +1,49 @@
+"""Light that changes by many decades from frame to frame: the same times as ever, to 1 us + 2e-6 nat."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .clips import play, sensor
+from .judge import judge_clip
+from .reference import Pixel
+
+poles = pytest.mark.parametrize("taus_s", [(9.0, 0.0), (9.0, 2.0)], ids=["one", "two"])
+
+
+def judged(pixel: Pixel, span_s: float, light: np.ndarray, **keys) -> None:
+    """Judge the sensor on frames of light [F, 1, W], so long after each other."""
+    light = np.asarray(light, np.float32)
+    t_ns = np.arange(len(light)) * int(span_s * 1e9)
+    verdict = judge_clip(pixel, t_ns, light, play(sensor(pixel, **keys), t_ns, light))
+    assert verdict.events > 100
+    assert verdict.marginal <= 1e-3 * verdict.events + 1
+
+
+@poles
+def test_a_flash_after_rest(taus_s):
+    """The signal leaves its rest as a power of time: near it, it bends far faster than its poles and the light do."""
+    pixel = Pixel(0.15, 0.15, *(tau * 1e6 for tau in taus_s))
+    dark = np.geomspace(1e-3, 1, 16)
+    judged(pixel, 8.7, np.stack([dark, dark, np.geomspace(1e5, 1e3, 16)])[:, None])
+
+
+@poles
+def test_what_little_is_left_of_a_flash(taus_s):
+    """After many time constants, beside dim light: it is what is left of a lag a million times as large."""
+    pixel = Pixel(0.15, 0.15, *(tau * 1e6 for tau in taus_s))
+    flash = np.geomspace(1e4, 1e6, 16)
+    dim = np.geomspace(20, 2, 16)
+    judged(pixel, 100.0, np.stack([flash, dim, dim / 2, dim / 1000])[:, None])
+
+
+@poles
+def test_the_pole_that_depends_on_light_is_as_exact(taus_s):
+    """Light that goes to and fro has one mean: that pole is then one that does not depend on it."""
+    low, high, dark = 1e-2, 2e5, 0.1
+    light = np.array([low, high, low, high], np.float32).reshape(4, 1, 1)
+    tau1, tau2 = (tau * 1e6 for tau in taus_s)
+    slower = tau1 * (float(light[0, 0, 0] + light[1, 0, 0]) / 2 + dark) / (1 + dark)
+    pixel = Pixel(0.02, 0.02, tau1, 1e3 * tau2)
+    judged(pixel, 2.0, light, bandwidth="light", bandwidth_dark=dark, **{"photoreceptor_tau_us": slower})
