@@ -50,6 +50,26 @@ def test_lamps_change_light_in_small_steps() -> None:
     assert 0.001 < np.quantile(steps, 0.995) < 0.11 and np.max(steps) < 1  # (edges of shadows are faster)
 
 
+@pytest.mark.parametrize(("lamp", "sweeps"), [("[0, 0, -2]", True), ("[0, 0, 2.9]", False)])
+def test_a_shadow_that_moves_goes_in_small_steps_though_what_casts_it_is_not_seen(
+    tmp_path: Path, lamp: str, sweeps: bool
+) -> None:
+    # (a blade turns behind the camera, between a lamp and the wall: its shadow turns about the picture's middle)
+    file = tmp_path / "blade.toml"
+    file.write_text(
+        f"[scene]\nduration_s = 0.1\nmin_fps = 20\nambient = 0.2\n[camera]\nsize = [320, 240]\n{STILL}"
+        '[[objects]]\nname = "blade"\nkind = "plane"\nsize_m = [0.1, 1, 0]\n'
+        'trajectory = [{ kind = "fixed", position_m = [0, 0, -1.2] }, { kind = "spin", rate_deg_s = 360 }]\n'
+        '[[lights]]\nname = "lamp"\nkind = "point"\nreach_m = 4\nshadows = true\n'
+        f'trajectory = {{ kind = "fixed", position_m = {lamp} }}\n'
+    )
+    steps = len(Instants(World.of(file))) - 1
+    if not sweeps:
+        assert steps == 2
+    else:
+        assert 0.1 < np.radians(360 * 0.1 / steps) * 160 < 1  # px at the border
+
+
 def test_nothing_happens_at_the_least_rate(tmp_path: Path) -> None:
     file = tmp_path / "still.toml"
     file.write_text(f"[scene]\nduration_s = 2\nmin_fps = 10\n{STILL}")

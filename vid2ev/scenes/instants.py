@@ -3,7 +3,8 @@
 The rate at t is the greatest of
 
     fastest thing that any camera sees [px/s] / max_shift_px        motion
-    d ln light / dt by the lamps / max_light_step                   lamps that move, and highlights with them
+    d ln light / dt by the lamps / max_light_step                   lamps that move, and highlights with them; shadows
+                                                                    of things that move, on those that stand still
     samples_per_period * frequency of every flicker
     min_fps
 
@@ -34,7 +35,7 @@ from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.scene import LightSource, Object
-from vid2ev.scenes.snapshot import Thing
+from vid2ev.scenes.snapshot import Snapshot, Thing
 from vid2ev.scenes.world import World, is_still
 
 COARSEST_NS, FINEST_NS = 16_000_000, 2_000_000  # from knot to knot
@@ -140,9 +141,19 @@ def asked_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
         *(setting.samples_per_period * thing.flicker.frequency_hz for thing in lit if thing.flicker),
         max(speed_px_s(world, t_ns, eye) for eye in watching) / setting.max_shift_px,
     ]
-    if any(light.flicker or not is_still(light) for light in world.scene.lights):
+    if _lamps_change(world) or _shadows_move(world):
         asked.append(max(light_rate(world, t_ns, eye) for eye in watching) / setting.max_light_step)
     return max(asked)
+
+
+def _lamps_change(world: World) -> bool:
+    return any(light.flicker or not is_still(light) for light in world.scene.lights)
+
+
+def _shadows_move(world: World) -> bool:
+    """Whether any thing moves that lamps may throw a shadow of."""
+    casting = any(light.shadows and light.kind != "ambient" for light in world.scene.lights)
+    return casting and not all(map(is_still, world.scene.objects))
 
 
 def speed_px_s(world: World, t_ns: int, eye: Eye | None = None) -> float:
@@ -157,24 +168,51 @@ def speed_px_s(world: World, t_ns: int, eye: Eye | None = None) -> float:
 
 
 def light_rate(world: World, t_ns: int, eye: Eye | None = None) -> float:
-    """How fast lamps change the light of what a camera sees, everything else standing still [nat/s].
+    """How fast lamps change the light of what a camera sees, everything else standing still, and shadows of things that
+    move that of things which do not [nat/s].
 
     The fastest few pixels do not count: at the edge of a shadow light changes as fast as one looks closely.
     """
     lens, pose = eye or _reference(world)
-    coarse = _coarse(lens)
+    coarse, then_ns, changes = _coarse(lens), t_ns + STEP_NS, [0.0]
     # (with smooth edges, so that shadows that move change the light of the pixels at their edge)
-    pictures = [_seen(world, t_ns, coarse, pose, lamps_ns, SMOOTH) for lamps_ns in (t_ns, t_ns + STEP_NS)]
-    before, after = (picture.light.max(axis=-1) for picture in pictures)
-    change = np.abs(np.log((after + DARK) / (before + DARK)))
-    return MARGIN * float(np.quantile(change, 1 - FEW)) / (1e-9 * STEP_NS)
+    before = _seen(world, t_ns, coarse, pose, samples=SMOOTH)
+    if _lamps_change(world):
+        lit = _seen(world, t_ns, coarse, pose, world.snapshot(t_ns, then_ns), SMOOTH)
+        changes.append(_usual(_change(before, lit)))
+    if _shadows_move(world):
+        after = _seen(world, t_ns, coarse, pose, world.snapshot(then_ns), SMOOTH)
+        changes.append(_usual(np.where(_stands_still(world, before, after), _change(before, after), 0)))
+    return MARGIN * max(changes) / (1e-9 * STEP_NS)
+
+
+def _change(before: Picture, after: Picture) -> np.ndarray:
+    """By how much light is another [H, W, nat]."""
+    one, other = (picture.light.max(axis=-1) for picture in (before, after))
+    return np.abs(np.log((other + DARK) / (one + DARK)))
+
+
+def _usual(change: np.ndarray) -> float:
+    """The largest of changes, but for those of a few pixels."""
+    return float(np.quantile(change, 1 - FEW))
+
+
+def _stands_still(world: World, *pictures: Picture) -> np.ndarray:
+    """The pixels [H, W] that show, as do those around them, nothing that moves or flickers by itself."""
+    import cv2
+
+    things = world.scene.objects
+    moving = [number for number, thing in enumerate(things) if thing.flicker or not is_still(thing)]
+    shown = np.any([np.isin(picture.thing, moving) for picture in pictures], axis=0)
+    return cv2.dilate(shown.astype(np.uint8), np.ones((3, 3), np.uint8)) == 0
 
 
 def _seen(
-    world: World, t_ns: int, lens: Intrinsics, pose: Pose, lamps_ns: int | None = None, samples: int = 1
+    world: World, t_ns: int, lens: Intrinsics, pose: Pose, snapshot: Snapshot | None = None, samples: int = 1
 ) -> Picture:
-    snapshot = world.snapshot(t_ns, lamps_ns)
-    return render(snapshot, lens, world.camera_pose(t_ns) @ pose, samples=samples, threads=world.threads)
+    """What a camera sees from where it is at an instant, then or, of a snapshot, at another."""
+    there = world.camera_pose(t_ns) @ pose
+    return render(snapshot or world.snapshot(t_ns), lens, there, samples=samples, threads=world.threads)
 
 
 def _fastest_corner(world: World, t_ns: int, lens: Intrinsics, pose: Pose) -> float:
