@@ -70,6 +70,26 @@ def test_a_shadow_that_moves_goes_in_small_steps_though_what_casts_it_is_not_see
         assert 0.1 < np.radians(360 * 0.1 / steps) * 160 < 1  # px at the border
 
 
+@pytest.mark.parametrize("phase_deg", [45, 90, 135, 270])
+@pytest.mark.parametrize("kind", ["spin", "orbit"])
+def test_what_comes_into_view_once_a_round_is_met_each_time(tmp_path: Path, kind: str, phase_deg: int) -> None:
+    # (in step with knots 16 ms apart, which would see it each time, or never)
+    turn = f'kind = "{kind}", axis = [0, 0, 1], phase_deg = {phase_deg}'
+    turn += ", rate_deg_s = 22500" if kind == "spin" else ", period_s = 0.016, radius_m = 1.2"
+    file = tmp_path / "blade.toml"
+    file.write_text(
+        f"[scene]\nduration_s = 0.08\n[camera]\nsize = [64, 48]\n{STILL}"
+        '[[objects]]\nname = "blade"\nkind = "sphere"\nsize_m = 0.8\n'
+        f'trajectory = [{{ kind = "fixed", position_m = [0, 1.4, 1.9] }}, {{ {turn} }},'
+        f'{{ kind = "fixed", position_m = [{1.2 if kind == "spin" else 0}, 0, 0] }}]\n'
+    )
+    instants = Instants(World.of(file))
+    times_s = 1e-9 * np.array([instants[k] for k in range(len(instants))])
+    highest_s = 0.016 * (np.arange(5) + (270 - phase_deg) % 360 / 360)
+    after = np.searchsorted(times_s, highest_s).clip(1)
+    assert (times_s[after] - times_s[after - 1]).max() < 5e-4  # (of passes of 3 ms)
+
+
 def test_nothing_happens_at_the_least_rate(tmp_path: Path) -> None:
     file = tmp_path / "still.toml"
     file.write_text(f"[scene]\nduration_s = 2\nmin_fps = 10\n{STILL}")
