@@ -132,11 +132,11 @@ def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
 
 def _coarsest_ns(world: World) -> float:
     """How far knots may be apart."""
-    scene = world.scene
+    things: list[Object | LightSource] = [*world.scene.objects, *world.scene.lights]
     rounds_hz = [
         abs(motion.rate_deg_s) / 360 if isinstance(motion, Spin) else 1 / motion.period_s
-        for one in (scene.camera, *scene.objects, *scene.lights)
-        for motion in one.trajectory
+        for trajectory in (world.scene.camera.trajectory, *(thing.trajectory for thing in things))
+        for motion in trajectory
         if isinstance(motion, Spin | Orbit)
     ]
     return max(FINEST_NS, 1e9 / max(1e9 / COARSEST_NS, ROUND_PARTS * max(rounds_hz, default=0.0)))
