@@ -84,5 +84,6 @@ def clause(message: str) -> str:
     message = message.removeprefix("Value error, ").rstrip(".").replace("\n", " ")
     message = re.sub(r", (unable|got) .*", "", message)
     message = re.sub(r"^Tuple should have at (least|most) (\d+) items?.*", r"it must have at \1 \2 entries", message)
+    message = re.sub(r"^String should have at least 1 character$", "it must not be empty", message)
     message = re.sub(r"^Input should (be|have)", r"it must \1", message)
     return message.replace("a valid tuple", "a list").replace("valid dictionary", "table")

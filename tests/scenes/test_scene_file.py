@@ -131,6 +131,7 @@ def test_files_are_found_beside_the_scene_file(tmp_path: Path) -> None:
     [
         ("foo=1", "key 'scene.foo' is unknown"),
         ("duration=1", "did you mean duration_s?"),
+        ("lights.lamp.name=''", "lights.0.name = '' is impossible: it must not be empty"),
         ("objects.bx.count=2", "no 'bx' (did you mean box?)"),
         ("objects.box.colour=red", "objects.box-1.colour = 'red'"),
         ("objects.box.count=1.5", "objects.box.count = 1.5: expected a whole number"),
@@ -166,6 +167,17 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(path: Path, setting: st
     with pytest.raises(UsageError) as refused:
         read_scene(path, [setting])
     assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_key_of_another_table_is_no_hint_at_itself(path: Path) -> None:
+    with pytest.raises(UsageError, match=r"key 'scene.colour' is unknown(?! \(did you mean colour\?\))"):
+        read_scene(path, ["colour=1"])
+
+
+def test_a_scene_without_lamps_says_so_where_one_is_to_be_changed(tmp_path: Path) -> None:
+    (tmp_path / "dark.toml").write_text("[scene]\nambient = 1\n")
+    with pytest.raises(UsageError, match=r"no 'lamp'; the scene has no lights$"):
+        read_scene(tmp_path / "dark.toml", ["lights.lamp.shadows=true"])
 
 
 def test_files_that_are_no_scene(tmp_path: Path) -> None:

@@ -23,7 +23,8 @@ def sentence(error: ValidationError, tables: Mapping[str, Any], name: str, scene
     path = _path(complaint["loc"], tables)
     kind, value = complaint["type"], reprlib.repr(complaint["input"])
     if kind == "extra_forbidden":
-        hint = nearest(path.rpartition(".")[2], all_keys(scene))
+        last = path.rpartition(".")[2]
+        hint = nearest(last, all_keys(scene) - {last})
         return f"{name}: key '{path}' is unknown{hint}"
     if kind == "missing":
         return f"{name}: {path} is missing; give it a value"
@@ -57,7 +58,7 @@ def _path(loc: tuple[int | str, ...], tables: Any) -> str:
     for step in loc:
         if isinstance(node, list) and isinstance(step, int):
             node = node[step] if step < len(node) else None
-            words.append(str(node["name"]) if isinstance(node, Mapping) and "name" in node else str(step))
+            words.append(str((node.get("name") if isinstance(node, Mapping) else None) or step))
         elif isinstance(node, Mapping) and step in node:
             node = node[step]
             words.append(str(step))

@@ -211,7 +211,8 @@ def _entered(node: Any, step: str, before: Sequence[str], where: str) -> Any:
         names = [str(thing.get("name", k)) if isinstance(thing, dict) else str(k) for k, thing in enumerate(node)]
         if step in names:
             return node[names.index(step)]
-        raise UsageError(f"{where}: no '{step}'{nearest(step, names)}; {'.'.join(before)} are {', '.join(names)}")
+        there = f"{'.'.join(before)} are {', '.join(names)}" if names else f"the scene has no {'.'.join(before)}"
+        raise UsageError(f"{where}: no '{step}'{nearest(step, names)}; {there}")
     if not isinstance(node, dict):
         raise UsageError(f"{where}: {'.'.join(before)} is no table; set it as a whole")
     return node.setdefault(step, [] if not before and step in LISTS else {})
