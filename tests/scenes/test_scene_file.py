@@ -169,6 +169,28 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(path: Path, setting: st
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+def test_a_kind_left_to_chance_has_no_part_in_other_draws(tmp_path: Path) -> None:
+    sizes = set()
+    for kinds in ('["box"]', '["box", "sphere"]', '["sphere", "cylinder", "box"]'):
+        file = tmp_path / "any.toml"
+        file.write_text(f"[[objects]]\nkind = {{ choice = {kinds} }}\nsize_m = {{ uniform = [1, 2] }}\n")
+        sizes.add(read_scene(file).resolved(3).objects[0].size_m)
+    assert len(sizes) == 1
+
+
+def test_no_name_is_that_of_one_of_several(tmp_path: Path) -> None:
+    file = tmp_path / "boxes.toml"
+    for count, name, taken in ((2, "box-2", True), (1, "box-2", False), (2, "box-3", False)):
+        file.write_text(
+            f'[[objects]]\nname = "box"\nkind = "box"\ncount = {count}\n[[objects]]\nname = "{name}"\nkind = "box"\n'
+        )
+        if taken:
+            with pytest.raises(UsageError, match=r"objects\.box-2: one of several of a count has this name"):
+                read_scene(file)
+        else:
+            assert len({thing.name for thing in read_scene(file).resolved(0).objects}) == count + 1
+
+
 def test_a_key_of_another_table_is_no_hint_at_itself(path: Path) -> None:
     with pytest.raises(UsageError, match=r"key 'scene.colour' is unknown(?! \(did you mean colour\?\))"):
         read_scene(path, ["colour=1"])

@@ -70,8 +70,8 @@ class SceneFile:
         """Each of a list of objects or lights, as often as its count says."""
         if not isinstance(things, list) or not all(isinstance(thing, Mapping) for thing in things):
             raise UsageError(f"{kind} = {things!r}: expected tables, each under a line [[{kind}]]")
-        names = [str(thing.get("name", f"{thing.get('kind', kind)}-{index}")) for index, thing in enumerate(things)]
-        total = 0
+        names = [_name_of(thing, kind, index) for index, thing in enumerate(things)]
+        total, given = 0, set[str]()
         for name, thing in zip(names, things, strict=True):
             if names.count(name) > 1:
                 raise UsageError(f"{kind}.{name}: {names.count(name)} have this name; give each its own, or a count")
@@ -84,6 +84,9 @@ class SceneFile:
                 raise UsageError(f"{kind}: there are {total:,}; expected at most {MOST_OF_ALL:,} in all")
             for k in range(count):
                 numbered = f"{name}-{k + 1}" if "count" in thing else name
+                if numbered in given:
+                    raise UsageError(f"{kind}.{numbered}: one of several of a count has this name; give another")
+                given.add(numbered)
                 yield {"name": numbered} | drawn(content, chance, f"{path}#{k}", (k, count))
 
     def _find_files(self, tables: dict[str, Any], chance: Chance) -> None:
@@ -106,6 +109,12 @@ class SceneFile:
             hint = nearest(text, [*PHOTOGRAPHS, ANY]) if names else ""
             raise UsageError(f"{self.name}: {path} = '{text}'{hint}: no such file{names}")
         return str(file)
+
+
+def _name_of(thing: Mapping[str, Any], kind: str, index: int) -> str:
+    """The name of an object or a light; one without is called by its own kind, unless this is left to chance."""
+    own = thing.get("kind")
+    return str(thing.get("name", f"{own if isinstance(own, str) else kind}-{index}"))
 
 
 def files_named(tables: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
