@@ -110,6 +110,20 @@ def test_faces_show_their_picture_upright_and_unmirrored():
             assert light[14, 22].argmax() == 0 and light[14, 42].argmax() == 1 and light[34, 22].argmax() == 2
 
 
+@pytest.mark.parametrize("kind", ["plane", "box"])
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_picture_that_is_repeated_less_than_no_time_is_mirrored(kind, times):
+    picture = Texture(np.random.default_rng(0).random((8, 8, 3)))
+    one, across, down = (
+        seen(thing(kind, (2, 2, 2), way=(0, 0, 3), texture=picture, repeat=repeat)).light
+        for repeat in ((times, times), (-times, times), (times, -times))
+    )
+    assert one.std() > 0.1
+    inner = np.s_[10:-10, 18:-18]  # (its border's colour is held by pictures that are there once)
+    np.testing.assert_allclose(across[inner], one[inner][:, ::-1], atol=2e-5)
+    np.testing.assert_allclose(down[inner], one[inner][::-1], atol=2e-5)
+
+
 def test_a_pixel_does_not_depend_on_threads_or_on_other_frames():
     box = thing("box", (1, 1, 1), (10, 20, 30), texture=Texture(np.random.default_rng(1).random((32, 32, 3))))
     world = Snapshot([box], [AMBIENT, Lamp("point", shadows=True)])

@@ -135,7 +135,7 @@ class Object(Part):
     texture: Picture | None = Field(default=None, description="a bundled photograph, a file, a folder or a pattern")
     colour: Annotated[Colour, Even] = Field(default=(1.0, 1.0, 1.0), description="times the texture")
     repeat: tuple[float, float] = Field(
-        default=(1.0, 1.0), description="how often the texture stands on it, across and down"
+        default=(1.0, 1.0), description="how often the texture stands on it, across and down; below 0 mirrored"
     )
     specular: Light = Field(default=0.0, description="height of the highlight")
     shininess: float = Field(default=32.0, ge=1, le=1e5, description="exponent of the highlight")

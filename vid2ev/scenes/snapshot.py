@@ -18,7 +18,7 @@ of a world may be those of a camera (x right, y down, z forwards): then what fac
     environment  u = 1/2 + atan2(x, z) / 2 pi,  v = acos(-y) / pi, of the direction in which one looks
 
 A picture is repeated where (u, v) leaves 0 ... 1; on planes, boxes and along v of spheres and cylinders, a `repeat` of
-1 or less holds its border's colour instead.
+0 to 1 holds its border's colour instead.  A negative `repeat` shows the picture mirrored.
 
 Source of the law of light: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH 1977,
 with the highlight weighted by cos(turn), so that it fades where the lamp sets.
