@@ -31,6 +31,7 @@ from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream.events import Events
 from vid2ev.stream.frames import Frame
+from vid2ev.tracks import parts
 from vid2ev.tracks.parts import Replayed
 
 pytestmark = pytest.mark.long
@@ -84,15 +85,20 @@ def test_parts_together_have_the_bytes_of_the_whole(
     assert again == whole
 
 
-def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(tmp_path: Path) -> None:
-    """Frames have the events of (t0, t1], of all parts in the order of the pixels; and so has who goes on between."""
+@pytest.mark.parametrize("block", [1, 2, parts.BLOCK])
+def test_what_was_sent_at_the_instant_of_a_frame_comes_with_that_frame(
+    tmp_path: Path, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames have the events of (t0, t1], of all parts in the order of the pixels; and so has who goes on between,
+    however many events are read at a time."""
+    monkeypatch.setattr(parts, "BLOCK", block)
     texts = ["t,x,y,p\n10,0,0,1\n20,3,0,1\n20,3,1,0\n21,0,0,1\n", "t,x,y,p\n20,5,0,1\n30,5,0,0\n"]
-    parts = [tmp_path / "0.csv", tmp_path / "1.csv"]
-    for part, text in zip(parts, texts, strict=True):
-        part.write_text(text)
+    files = [tmp_path / "0.csv", tmp_path / "1.csv"]
+    for file, text in zip(files, texts, strict=True):
+        file.write_text(text)
     mount: Any = SimpleNamespace(size=(8, 2), within="", sensor=SimpleNamespace(spec=DvsSpec()))
     frames = [Frame(np.empty((2, 8)), t_us * 1000) for t_us in (10, 20, 25, 30)]
-    first, second = Replayed(mount, parts, False), Replayed(mount, parts, False)
+    first, second = Replayed(mount, files, False), Replayed(mount, files, False)
     sent = [(events.t.tolist(), events.x.tolist()) for events in first.see_all(frames[:2])]
     second.restore(first.state())
     sent += [(events.t.tolist(), events.x.tolist()) for events in second.see_all(frames[2:])]
