@@ -308,16 +308,18 @@ def test_bounds_add_up(name: str) -> None:
 
 
 def test_an_exposure_costs_as_many_frames_of_light_as_are_in_it_and_one_at_least() -> None:
-    """Of 1000 frames a second, whenever the first of them was."""
-    light = [Frame(np.full((4, 4), 0.5, np.float32), 7 * 10**9 + k * 10**6) for k in range(101)]
+    """Of 1000 frames a second, whenever the first of them was, and however few there are."""
 
-    def cost_ns(exposure_us: float) -> float:
+    def cost_ns(exposure_us: float, frames: int) -> float:
         spec = PLAIN.model_copy(update={"exposure_us": exposure_us})
+        light = [Frame(np.full((4, 4), 0.5, np.float32), 7 * 10**9 + k * 10**6) for k in range(frames)]
         rows = frame_plan_of(exposed(spec, (4, 4), light), spec).rows
         return next(row.ns_per_pixel for row in rows if row.effect == "exposure")
 
-    assert cost_ns(9000) == pytest.approx(9 * cost_ns(1000), rel=0.05)
-    assert cost_ns(100) == FRAME_EFFECTS["exposure"].ns
+    for frames in (2, 4, 101):
+        for exposure_us, each in ((9000, 9), (1000, 1), (100, 1)):
+            assert cost_ns(exposure_us, frames) == pytest.approx(each * FRAME_EFFECTS["exposure"].ns, abs=0.006), frames
+    assert cost_ns(9000, 1) == FRAME_EFFECTS["exposure"].ns
 
 
 def test_light_is_measured_before_a_lens_and_behind_it_and_wells_by_the_most_sensitive_pixel() -> None:

@@ -89,7 +89,7 @@ class Expose:
             rows=self._rows[0],
             exposures=self._exposures,
             frames=self._frames,
-            frames_each=self._frames * self._window_s / seconds if seconds else 1.0,
+            frames_each=(self._frames - 1) * self._window_s / seconds if seconds else 1.0,
             light_min=float(sums[LEAST].min()) if self._exposures else 0.0,
             light_max=float(sums[MOST].max()),
             light_mean=float(sums[SUM].sum()) / draws,
