@@ -131,9 +131,13 @@ def test_who_goes_on_keeps_to_the_clock_of_the_readout(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rounding", ["nearest", "causal"])
-def test_tiles_keep_to_the_clock_of_the_readout(clip: str, tmp_path: Path, rounding: str) -> None:
+@pytest.mark.parametrize("light", [{"upsample": "none"}, {"upsample": "linear", "subframes": 5}], ids=str)
+def test_tiles_keep_to_the_clock_of_the_readout(
+    clip: str, tmp_path: Path, rounding: str, light: dict[str, Any]
+) -> None:
+    """In the preview, too, where events of an event frame that is nearest are shown when it is complete."""
     overrides = ("frame_rate_hz=130", f"rounding={rounding}")
-    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "overrides": overrides}
+    options: dict[str, Any] = {"fps": 20, "threads": 1, "overrides": overrides} | light
     convert(clip, tmp_path / "whole", **options)
     convert_split(clip, tmp_path / "made", "tiles", 2, here, **options)
     for name in FILES[:2]:

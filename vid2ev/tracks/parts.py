@@ -49,9 +49,12 @@ class Made:
         tables = [table for table in tables if table.exists()]
         return one_after_the_other(tables) if self.in_time else merged(tables, pixels)
 
-    def seen(self, recipe: Recipe) -> Recipe:
-        """The recipe for the frames that the recording still needs: those of the source, but for frame cameras."""
-        if recipe.source.dense or any(mount.kind == "cis" for mount in recipe.mounts):
+    def seen(self, recipe: Recipe, preview: bool) -> Recipe:
+        """The recipe for the frames that the recording still needs: those of the source, but for frame cameras, and for
+        a preview of event frames, which shows them once a frame has completed them."""
+        specs = [mount.sensor.spec for mount in recipe.mounts]
+        by_clock = preview and any(isinstance(spec, DvsSpec) and spec.frame_rate_hz > 0 for spec in specs)
+        if recipe.source.dense or by_clock or not all(isinstance(spec, DvsSpec) for spec in specs):
             return recipe
         return replace(recipe, upsample="none", subframes="auto")
 

@@ -131,7 +131,7 @@ class Recorder:
     @property
     def seen(self) -> Recipe:
         """The recipe by whose light the recording is made."""
-        return self.recipe if self._made is None else self._made.seen(self.recipe)
+        return self.recipe if self._made is None else self._made.seen(self.recipe, self.outputs.preview)
 
     def take_up(self) -> None:
         """Bring everything to the point of the folder's last checkpoint, if there is one."""
