@@ -126,7 +126,8 @@ def footprint_over(counts: EventCounts, size: tuple[int, int]) -> int:
 
 
 def _footprint(across: float) -> int:
-    return max(1, round(1 / max(across, 1e-9)))
+    # (places in float32 are off in their last digits, which must not decide what is halfway)
+    return max(1, round(round(1 / max(across, 1e-9), 3)))
 
 
 def _seen(places: torch.Tensor, size: tuple[int, ...]) -> torch.Tensor:

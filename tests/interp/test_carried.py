@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from pairs import counts
+from scipy.ndimage import map_coordinates
 
-from interp.representation.carried import carried, over, places_of
+from interp.representation.carried import at_places, carried, footprint_of, footprint_over, over, places_of, places_over
 from interp.representation.event_counts import EventCounts
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
@@ -59,6 +62,53 @@ def test_nine_pixels_of_a_frame_share_one_of_the_sensor() -> None:
 def test_a_coarser_frame_takes_means() -> None:
     some = counts(1, (12, 18))
     torch.testing.assert_close(over(some, (4, 6)).off_on, some.pooled(3).off_on)
+
+
+def by_the_book(plane: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """A plane of counts at places [H, W, 2] px: means over as many pixels as those of the frame are wide, in the middle
+    of all, then between four of these; 0 beyond the sensor, and where a place is not known."""
+    height, width = plane.shape
+    with np.errstate(invalid="ignore"):
+        seen = ((places > -0.5) & (places < np.array([width, height]) - 0.5)).all(-1)
+    both = seen[:, 1:] & seen[:, :-1]
+    steps = np.hypot(*np.moveaxis(np.diff(places, axis=1), -1, 0))[both]
+    k = max(1, round(float(np.quantile(steps, 0.5, method="lower")))) if steps.size else 1
+    means = np.array([[plane[y : y + k, x : x + k].mean() for x in range(0, width, k)] for y in range(0, height, k)])
+    x, y = np.moveaxis((np.where(seen[..., None], places, 0) + 0.5) / k - 0.5, -1, 0)
+    return np.where(seen, map_coordinates(means, [y, x], order=1, mode="nearest"), 0)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.floats(0.2, 4.3), st.floats(-3, 3))
+def test_counts_are_means_between_pixels_as_large_as_the_frame_s(seed: int, wide: float, turned: float) -> None:
+    """Of a frame that is turned, hangs over the sensor, and whose pixels are not all as wide as each other."""
+    assume(abs(wide % 1 - 0.5) > 1e-3)  # (halfway either number will do)
+    draw = np.random.default_rng(seed)
+    rows, columns = draw.integers(5, 12, 2)
+    plane, (y, x) = draw.poisson(1.0, (11, 14)).astype(np.float64), np.mgrid[:rows, :columns]
+    x = x + 2.0 * (x > columns - 2)  # (the last column is far off)
+    way = np.stack([x * np.cos(turned) - y * np.sin(turned), x * np.sin(turned) + y * np.cos(turned)], -1)
+    places = (wide * way + draw.uniform(0, 9, 2)).astype(np.float32)
+    places[draw.random((rows, columns)) < 0.1] = np.nan
+    some = EventCounts(torch.from_numpy(plane).expand(1, 2, 3, -1, -1), torch.full((1, 2), 0.15))
+    found = carried(some, torch.from_numpy(places))
+    np.testing.assert_allclose(found.off_on[0, 1, 2], by_the_book(plane, places), atol=1e-4)
+    part = slice(1, 4), slice(2, 5)
+    several = at_places(some, torch.from_numpy(places)[None])
+    for cut in (carried(some, torch.from_numpy(places), part), over(several, (int(rows), int(columns)), part)):
+        torch.testing.assert_close(cut.off_on, found.off_on[..., 1:4, 2:5], atol=1e-5, rtol=0)
+    assert over(several, (int(rows), int(columns))).footprint == footprint_over(several, (int(rows), int(columns)))
+
+
+@settings(max_examples=60)
+@given(st.integers(2, 700), st.sampled_from([0.4, 0.9, 1.0, 1.4, 1.5, 2.4, 2.5, 3.5, 3.9]))
+def test_a_pixel_of_the_sensor_is_as_many_of_the_frame_s_wide_as_is_nearest(columns: int, times: float) -> None:
+    """However that is found: by the sizes, of counts laid over frames, and of places; halfway, too."""
+    some, size = counts(1, (1, 2 * columns), steps=1), (1, round(2 * columns * times))
+    wide = max(1, round(size[1] / (2 * columns)))
+    laid, looked = over(some, size), at_places(some, places_over(some, size)[None])
+    assert laid.footprint == footprint_of((size[1], 1), (2 * columns, 1)) == wide
+    assert [footprint_over(each, size) for each in (some, laid, looked)] == [wide] * 3
 
 
 def test_events_of_a_calibrated_sensor_are_where_the_frame_sees_them() -> None:
