@@ -130,6 +130,37 @@ def test_a_dry_run_says_all_and_does_nothing() -> None:
     refused(2, "threshold_onn", "convert", CLIP, "--dry-run", "--set", "threshold_onn=1")
 
 
+@pytest.mark.parametrize("effects", ["all", "none", "mismatch"])
+def test_a_dry_run_has_the_sensor_and_the_plan_of_the_manifest(effects: str) -> None:
+    arguments = ["convert", CLIP, "-o", "out", "--sensor", "v2e-clean", "--effects", effects, *QUICK]
+    foretold = json.loads(vid2ev(*arguments, "--dry-run", "--json").stdout)
+    said = vid2ev(*arguments, "--dry-run").stdout
+    assert vid2ev(*arguments, "-q").exit_code == 0
+    manifest = json.loads(Path("out/manifest.json").read_text())
+    assert foretold == {key: manifest[key] for key in foretold}
+    assert f"effects   {', '.join(manifest['sensor']['effects']) or 'none'}" in said
+
+
+@pytest.mark.parametrize(
+    ("sentence", "video", "arguments"),
+    [
+        ("cannot do --cuts keep", CLIP, ["--split", "cuts", "--cuts", "keep"]),
+        ("cannot do a scene", "scene:room", ["--split", "cuts"]),
+        ("cannot do --probe", CLIP, ["--split", "approximate", "--probe", "1,1"]),
+    ],
+)
+def test_a_dry_run_refuses_what_workers_would(sentence: str, video: str, arguments: list[str]) -> None:
+    for more in ([], ["--dry-run"]):
+        result = vid2ev("convert", video, "--jobs", "2", *arguments, *QUICK, *more)
+        assert result.exit_code == 2 and sentence in result.stderr and left() == set()
+    result = vid2ev("convert", CLIP, "camera:0", "--jobs", "2", *QUICK, "--dry-run")
+    assert result.exit_code == 2 and "camera:0 passes once" in result.stderr and left() == set()
+
+
+def test_a_dry_run_says_that_effects_are_left_to_the_light() -> None:
+    assert "those that the light calls for" in vid2ev("convert", CLIP, "--effects", "auto", "--dry-run").stdout
+
+
 @pytest.mark.parametrize(
     "more",
     [
@@ -275,6 +306,7 @@ def test_an_upsampling_that_nobody_has(source: str) -> None:
         ("at least 1e-09", ["--set", "frame_rate_hz=1e-30"]),
         ("from 1e-06", ["--fps", "1e-300"]),
         ("loop is a link", ["-o", "loop"]),
+        ("add hdf5, npz or csv", ["--labels", "--format", "evt3,dat"]),
     ],
 )
 def test_values_that_cannot_be(sentence: str, arguments: list[str]) -> None:

@@ -24,7 +24,7 @@ from vid2ev.cluster.task import Task
 from vid2ev.commands import main
 from vid2ev.formats import read_events
 from vid2ev.making.conversion import Paused
-from vid2ev.making.split import convert_split
+from vid2ev.making.split import check_split, convert_split
 from vid2ev.making.stretches import warm_up_us, with_warm_up
 from vid2ev.recording.held import Held
 from vid2ev.seen.recipe import Recipe
@@ -291,6 +291,8 @@ def test_what_cannot_be_split_is_refused(
 ) -> None:
     with pytest.raises(UsageError, match=sentence):
         convert_split(clip, tmp_path / "made", kind, 2, here, fps=50, **options)
+    with pytest.raises(UsageError, match=sentence):  # (and what is only to be checked)
+        check_split(clip, tmp_path / "made", kind, overwrite=False, resume=False, fps=50, **options)
     assert not list(tmp_path.iterdir())
 
 

@@ -183,7 +183,7 @@ def convert(
     from vid2ev.commands import batch
     from vid2ev.commands.converting import check_shared, chosen_for, convert_on_worker, convert_one
     from vid2ev.commands.progress import given
-    from vid2ev.commands.splitting import split_among, split_of
+    from vid2ev.commands.splitting import checked_for, split_among, split_of
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.making import conversion
     from vid2ev.sources.many import sources_in
@@ -211,6 +211,8 @@ def convert(
         if split and in_parts and not dry_run:
             chosen = chosen_for(video, directory, quiet, dict(options), given())
             return split_among(workers, video, directory, split, quiet, chosen)
+        if dry_run:
+            checked_for(workers, video, directory, split if in_parts else None, options)
         return convert_one(video, directory, dry_run, verbose, quiet, dict(options))
 
     directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))

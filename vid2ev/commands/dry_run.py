@@ -16,7 +16,7 @@ def planned(
     from vid2ev.commands import summary
     from vid2ev.cores import usable_cores
     from vid2ev.making import conversion
-    from vid2ev.plan.recordings import check_effects
+    from vid2ev.plan import recordings
     from vid2ev.recording.folder import check_free
     from vid2ev.seen.recipe import Recipe
     from vid2ev.sensors.devices import device_for
@@ -32,14 +32,18 @@ def planned(
     recipe = Recipe.of(video, seed=seed or 0, **options)
     if budget is not None:
         budget.check({mount.kind for mount in recipe.mounts})
-    check_effects(effects, tolerance)
+    recordings.check_effects(effects, tolerance)
     conversion.check_outputs(recipe, outputs)
     check_free(directory, overwrite, resume)
-    described = recipe.describe() | {"seed": "drawn at random" if seed is None else seed}
+    recipe, plans = (recipe, {}) if effects == "auto" else recordings.planned(recipe, effects, tolerance)
+    described = recipe.describe() | recordings.described(plans) | {"seed": "drawn at random" if seed is None else seed}
     truth = ["truth"] * (recipe.truth is not None)
     files = [f"{mount.within}{name}" for mount in recipe.mounts for name in [*outputs.names(mount.kind), *truth]]
     files += [] if recipe.alone else [*recorder.rig_files(recipe), "manifest.json"]
-    facts = [*summary.recipe_facts(described), ("output", f"{directory}: {', '.join(files)}")]
+    facts = summary.recipe_facts(described)
+    if effects == "auto":
+        facts.append(("plan", f"of all effects those that the light calls for, within {tolerance:g}"))
+    facts.append(("output", f"{directory}: {', '.join(files)}"))
     facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
     text = lines([*facts, *([("threads", str(threads))] if threads else [])])
     return described | {"outputs": outputs.describe()}, text

@@ -67,6 +67,17 @@ def split_among(
         )
 
 
+def checked_for(workers: Workers, video: str, directory: Path, split: Split | None, options: dict[str, Any]) -> None:
+    """Raise UsageError for what workers, or the parts of a video for them, refuse before anything is converted."""
+    from vid2ev.commands.converting import check_shared
+    from vid2ev.making.split import check_split
+
+    if split is not None:
+        check_split(video, directory, split.kind, **{key: options[key] for key in options.keys() - {"budget"}})
+    elif not workers.alone:
+        check_shared(video, directory, options["overwrite"], options["resume"])
+
+
 def _minutes(said: str, text: str) -> float:
     minutes = number_of(said)
     if not 0 < minutes < 1e6:

@@ -82,6 +82,12 @@ def convert_split(
     return manifest
 
 
+def check_split(video: str, directory: Path, kind: str, *, overwrite: bool, resume: bool, **options: Any) -> None:
+    """Raise UsageError for what `convert_split` refuses before it looks at the light."""
+    check_parts_free(directory, overwrite, resume)
+    _checked(video, kind, options | {"seed": options.get("seed") or 0})
+
+
 def check_parts_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
     """`recording.folder.check_free` of a recording and of its parts."""
     check_free(directory, overwrite, resume)
@@ -162,6 +168,20 @@ def _parts(
     video: str, kind: str, count: int, options: dict[str, Any], look: Look | None
 ) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """The parts, as what their conversions are told, and what the manifest is to say of them.  Raises UsageError."""
+    recipe = _checked(video, kind, options)
+    if kind == "tiles":
+        sizes = [mount.size for mount in recipe.mounts if mount.kind == "dvs"]
+        count = min(count, *(-(-width * height // BLOCK) for width, height in sizes))
+        return [{"part": Part(number, count)} for number in range(count)], {}
+    if kind == "cuts":
+        return [stretch._asdict() for stretch in at_cuts(recipe, count, options, look)], {}
+    stretches = with_warm_up(recipe, count, options, look)
+    return [stretch._asdict() for stretch in stretches], {"split": _seams(recipe, stretches)}
+
+
+def _checked(video: str, kind: str, options: dict[str, Any]) -> Recipe:
+    """The recipe of a video that can be parted so; takes out of the options what its light does not hang on.  Raises
+    UsageError."""
     for name in ("threads", "skip", "piece", "notes", "tolerance"):
         options.pop(name, None)
     effects, device = options.pop("effects", "all"), options.pop("device", "cpu")
@@ -175,18 +195,13 @@ def _parts(
         (bool(outputs.probe) and kind == "approximate", "--probe", "take --split cuts or tiles"),
         (not recipe.source.rewindable, video, "keep it in a file first"),
         (not specs, "a rig without event cameras", "convert it at once"),
+        (kind == "cuts" and recipe.source.dense, "a scene, which is a single shot", "take --split chain or tiles"),
+        (kind == "cuts" and recipe.cuts != "restart", f"--cuts {recipe.cuts}", "take --split chain or tiles"),
         (kind != "tiles" and any(spec.frame_rate_hz > 0 for spec in specs), "frame_rate_hz", "take --split tiles"),
     ):
         if wrong:
             raise UsageError(f"--split {kind} cannot do {what}; {instead}, or leave --split out")
-    if kind == "tiles":
-        sizes = [mount.size for mount in recipe.mounts if mount.kind == "dvs"]
-        count = min(count, *(-(-width * height // BLOCK) for width, height in sizes))
-        return [{"part": Part(number, count)} for number in range(count)], {}
-    if kind == "cuts":
-        return [stretch._asdict() for stretch in at_cuts(recipe, count, options, look)], {}
-    stretches = with_warm_up(recipe, count, options, look)
-    return [stretch._asdict() for stretch in stretches], {"split": _seams(recipe, stretches)}
+    return recipe
 
 
 def _seams(recipe: Recipe, stretches: Sequence[Stretch]) -> dict[str, Any]:

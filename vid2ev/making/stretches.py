@@ -19,7 +19,6 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from vid2ev.errors import UsageError
 from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample.cuts import CutDetector
@@ -39,13 +38,7 @@ class Stretch(NamedTuple):
 
 
 def at_cuts(recipe: Recipe, count: int, options: dict[str, Any], look: Look | None = None) -> list[Stretch]:
-    """At most so many stretches, all but the first of which begin with a shot, about as long as each other.
-
-    Raises UsageError for a scene, and where cuts do not count.
-    """
-    if recipe.source.dense or recipe.cuts != "restart":
-        what = "a scene, which is a single shot" if recipe.source.dense else f"--cuts {recipe.cuts}"
-        raise UsageError(f"--split cuts cannot do {what}; take --split chain or tiles, or leave --split out")
+    """At most so many stretches, all but the first of which begin with a shot, about as long as each other."""
     times_ns, cuts = _looked_at(recipe, look, cuts=True)
     wanted = [len(times_ns) * k / count for k in range(1, count)]
     chosen = sorted({min(cuts, key=lambda cut: abs(cut - place)) for place in wanted}) if cuts else []
