@@ -162,6 +162,11 @@ def default_directory(video: str | Path) -> Path:
 def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
     """Raise UsageError where a format cannot hold what a camera may send, or a probed pixel is not there."""
     source = recipe.source
+    if recipe.labels and all("labels" not in kind.keeps for kind in outputs.kinds()):
+        raise UsageError(
+            f"labels with format {', '.join(outputs.formats)}: expected one that holds them; add hdf5, npz or csv, or"
+            " leave them out"
+        )
     if outputs.pictures != Outputs().pictures and all(mount.kind == "dvs" for mount in recipe.mounts):
         raise UsageError(f"pictures as {', '.join(outputs.pictures)}: expected a frame camera; add --frames or --cis")
     # (To ask for its first instant opens a source once more; those that pass once are asked when they begin.)
