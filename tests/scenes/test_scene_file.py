@@ -129,7 +129,13 @@ def test_files_are_found_beside_the_scene_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        ("foo=1", "key 'scene.foo' is unknown"),
+        ("foo=1", "key 'scene.foo' is unknown; the keys are duration_s, background, environment"),
+        ("camera.foo=1", "key 'camera.foo' is unknown; the keys are size, fov_deg"),
+        ("objects.box.foo=1", "foo' is unknown; the keys are name, kind, file, size_m"),
+        ("lights.lamp.flicker.foo=1", "foo' is unknown; the keys are frequency_hz, depth, phase_deg"),
+        ('objects.box.texture={ pattern = "checker", foo = 1 }', "foo' is unknown; the keys are pattern, colours"),
+        ('environment={ pattern = "sky", foo = 1 }', "foo' is unknown; the keys are pattern, colours"),
+        ('environment={ pattern = "sky", count = 0 }', "environment.count = 0 is impossible"),
         ("duration=1", "did you mean duration_s?"),
         ("lights.lamp.name=''", "lights.0.name = '' is impossible: it must not be empty"),
         ("objects.bx.count=2", "no 'bx' (did you mean box?)"),
@@ -142,7 +148,10 @@ def test_files_are_found_beside_the_scene_file(tmp_path: Path) -> None:
         ('objects.box.trajectory={ kind = "fly" }', "must be one of fixed, straight"),
         ("objects.box.trajectory={ a = 1 }", "has no kind"),
         ('objects.box.trajectory={ kind = "spin" }', "rate_deg_s is missing"),
-        ('objects.box.trajectory={ kind = "spin", rate_deg_s = 1, wobble = 3 }', "wobble' is unknown"),
+        (
+            'objects.box.trajectory={ kind = "spin", rate_deg_s = 1, wobble = 3 }',
+            "the keys are axis, phase_deg, kind, rate",
+        ),
         ('objects.box.texture={ pattern = "dots" }', "it must be 'checker', 'stripes'"),
         ("objects.box.texture=catt", "did you mean cat?"),
         ("camera.fov_deg={ uniform = [50, 500] }", "camera.fov_deg"),
