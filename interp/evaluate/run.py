@@ -138,7 +138,8 @@ def _unscored(name: str, about: Mapping[str, Any], protocol: Protocol) -> str:
     if reasons := left_out({"sequences": {name: about}}):
         return f"{name}: " + ", ".join(f"{count} x {reason}" for reason, count in reasons.items())
     remedy = "give a smaller --skip" if about["frames"] >= FEWEST else "give more of it"
-    return f"{name}: {about['frames']} frames, expected {protocol.multiple + 1} or more; {remedy}"
+    frames = f"{about['frames']} frame{'s' * (about['frames'] != 1)}"
+    return f"{name}: {frames}, expected {protocol.multiple + 1} or more; {remedy}"
 
 
 def _check(methods: Sequence[Rebuilder]) -> None:
