@@ -234,6 +234,12 @@ def test_one_frame_makes_a_recording_without_events(tmp_path: Path, labels: bool
         assert file["ms_to_idx"][:].tolist() == [0, 0] and ("label" in file["events"]) == labels
 
 
+def test_that_one_frame_has_no_events_is_not_said_of_a_frame_camera(tmp_path: Path) -> None:
+    np.save(tmp_path / "still.npy", np.full((1, 3, 5), 0.5, np.float32))
+    convert(tmp_path / "still.npy", tmp_path / "out", "ideal", fps=30, cis="ideal", pictures="png")
+    assert [len(manifest_of(tmp_path / "out" / camera)["warnings"]) for camera in ("dvs", "cis")] == [1, 0]
+
+
 def test_the_manifest_says_what_is_left_of_a_mismatch_that_is_clipped(tmp_path: Path) -> None:
     np.save(tmp_path / "still.npy", np.full((1, 3, 5), 0.5, np.float32))
     manifest = convert(tmp_path / "still.npy", tmp_path / "out", "paper", ["mismatch=0.15"], fps=30)

@@ -101,6 +101,8 @@ def test_a_recording_has_no_events_of_a_cut_and_lists_it(tmp_path: Path) -> None
     made = convert(film(tmp_path), tmp_path / "restart", **OPTIONS)
     assert made["cuts_us"] == [50_000] and made["counts"]["events"] == 0
     assert any("1 cut" in warning for warning in made["warnings"])
+    beside = convert(film(tmp_path), tmp_path / "beside", frame_camera=True, **OPTIONS)["results"]
+    assert [any("1 cut" in text for text in beside[camera]["warnings"]) for camera in ("dvs", "cis")] == [True, False]
     kept = convert(film(tmp_path), tmp_path / "keep", cuts="keep", **OPTIONS)
     assert kept["cuts_us"] == [] and kept["counts"]["events"] > 10_000
     times = np.concatenate([events.t for events in read_events(tmp_path / "keep")])

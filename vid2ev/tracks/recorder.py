@@ -257,7 +257,7 @@ class Recorder:
 
     def outcome(self, number: int) -> dict[str, Any]:
         """What came out of a camera, for its manifest."""
-        done, track = self.done, self.tracks[number]
+        done, track, kind = self.done, self.tracks[number], self.recipe.mounts[number].kind
         start_us, duration_us = self.span_us(number)
         counts = {"frames": done.frames, "subframes": done.subframes, "limited_intervals": done.limited}
         return {
@@ -265,7 +265,7 @@ class Recorder:
             "duration_us": duration_us,
             "counts": counts | track.counts(),
             "cuts_us": done.cuts_us,
-            "warnings": done.warnings + _remarks(done) + self._unseen(number) + track.remarks(),
+            "warnings": done.warnings + _remarks(done, kind) + self._unseen(number) + track.remarks(),
         }
 
     def _unseen(self, number: int) -> list[str]:
@@ -279,12 +279,12 @@ class Recorder:
         ]
 
 
-def _remarks(done: Progress) -> list[str]:
-    """What a person should know about the light of the recording."""
-    remarks = []
-    if done.frames == 1:
+def _remarks(done: Progress, kind: str) -> list[str]:
+    """What a person should know about the light of the recording, of a camera of a kind."""
+    remarks, events = [], kind == "dvs"
+    if events and done.frames == 1:
         remarks.append("one frame only: nothing changes, so there are no events")
-    if done.cuts_us:
+    if events and done.cuts_us:
         remarks.append(
             f"{len(done.cuts_us)} cut{'s' * (len(done.cuts_us) > 1)}: the sensor starts afresh there; --cuts keep takes"
             " a cut for a step of light"
