@@ -275,7 +275,7 @@ def walk_pixel(
         elif knots[piece] >= 1.0:
             break
         else:
-            piece += 1
+            piece, solved = piece + 1, 0
     if blind_until > 1.0:  # the levels are not known before the blind time ends: look at every interval until then
         block[HIGH * PITCH + i], block[LOW * PITCH + i] = -np.inf, np.inf
     return out, n
