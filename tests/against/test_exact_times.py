@@ -274,3 +274,16 @@ def test_a_pulse_that_dies_away_within_one_long_interval(filter_at: str, dark_ns
     sent = play(sensor(pixel), t_ns, light)
     judge_clip(pixel, t_ns, light, sent)
     assert len(sent) > 0  # (where the second pole is slow and after the log, only one, of the last interval)
+
+
+@pytest.mark.parametrize("filter_at", ["after", "before"])
+@pytest.mark.parametrize("light_ns", [3 * 10**5, 10**6, 10**9])
+@pytest.mark.parametrize("follower_us", [31.6, 5.0, 300.0])
+def test_a_gap_of_light_that_is_made_up_for_within_one_long_interval(filter_at, light_ns, follower_us) -> None:
+    """The signal goes on falling after the light is back, turns, and has settled long before the next frame."""
+    pixel = Pixel(0.02, 0.006, 31.6, follower_us, filter=filter_at, dark_level=1e-5)
+    t_ns = np.array([0, 3, 4, 10_004, 10_004 + light_ns])
+    light = np.array([1, 1, 0.1, 1, 1], np.float32).reshape(5, 1, 1)
+    sent = play(sensor(pixel), t_ns, light)
+    judge_clip(pixel, t_ns, light, sent)
+    assert len(sent) > 0

@@ -12,10 +12,10 @@ from .reference import Pixel
 poles = pytest.mark.parametrize("taus_s", [(9.0, 0.0), (9.0, 2.0)], ids=["one", "two"])
 
 
-def judged(pixel: Pixel, span_s: float, light: np.ndarray, **keys) -> None:
+def judged(pixel: Pixel, spans_s: float | list[float], light: np.ndarray, **keys) -> None:
     """Judge the sensor on frames of light [F, 1, W], so long after each other."""
     light = np.asarray(light, np.float32)
-    t_ns = np.arange(len(light)) * int(span_s * 1e9)
+    t_ns = np.cumsum([0, *np.broadcast_to(np.array(spans_s) * 1e9, len(light) - 1).astype(np.int64)])
     verdict = judge_clip(pixel, t_ns, light, play(sensor(pixel, **keys), t_ns, light))
     assert verdict.events > 100
     assert verdict.marginal <= 1e-3 * verdict.events + 1
@@ -27,6 +27,19 @@ def test_a_flash_after_rest(taus_s):
     pixel = Pixel(0.15, 0.15, *(tau * 1e6 for tau in taus_s))
     dark = np.geomspace(1e-3, 1, 16)
     judged(pixel, 8.7, np.stack([dark, dark, np.geomspace(1e5, 1e3, 16)])[:, None])
+
+
+def test_a_flash_of_which_a_second_pole_lets_little_through():
+    """The first pole has hardly any lag; that of the second is a thousand times as large as the signal."""
+    pixel = Pixel(0.05, 0.05, 100.0, 900e6)
+    dark, flash = np.geomspace(1e-3, 1, 16), np.geomspace(1e5, 1e3, 16)
+    judged(pixel, 0.87, np.stack([dark, dark, flash, flash, 1.1 * flash])[:, None])
+
+
+def test_a_flash_that_lasts():
+    """The lag is a thousand times as large as the signal when a long interval begins in which it catches up."""
+    dark, flash = np.geomspace(0.1, 1, 16), np.geomspace(3e3, 1e2, 16)
+    judged(Pixel(0.03, 0.03, 900e6), [1.0, 900.0], np.stack([dark, flash, flash])[:, None])
 
 
 @poles
