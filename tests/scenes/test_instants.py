@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import UsageError
-from vid2ev.scenes.instants import MARGIN, Instants, speed_px_s
+from vid2ev.scenes.instants import MARGIN, Instants, rate_hz, speed_px_s
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 
@@ -120,15 +121,38 @@ def test_the_first_instant_after_another_is_found(fps: float | None) -> None:
         instants[len(instants)]
 
 
-def test_small_things_between_the_pixels_of_the_grid_count(tmp_path: Path) -> None:
-    file = tmp_path / "fly.toml"
-    file.write_text(
+def fly(path: Path, shape: str, motion: str) -> int:
+    """How many steps there are in a tenth of a second of a thing smaller than the grid's pixels, 500 px wide at 1 m."""
+    path.write_text(
         f"[scene]\nduration_s = 0.1\nmin_fps = 1\n[camera]\nsize = [640, 480]\nfocal_px = [500, 500]\n{STILL}"
-        '[[objects]]\nname = "fly"\nkind = "sphere"\nsize_m = 0.006\n'
-        'trajectory = { kind = "straight", position_m = [0, 0.003, 1], velocity_m_s = [1, 0, 0] }\n'
+        f'[[objects]]\nname = "fly"\n{shape}\ntrajectory = {motion}\n'
     )
-    instants = Instants(World.of(file))
-    assert (len(instants) - 1) / 0.1 == pytest.approx(1.15 * 500 / 0.5, rel=0.03)
+    return len(Instants(World.of(path))) - 1
+
+
+@pytest.mark.parametrize("x_m", [0, -0.62, 0.53])  # (in the middle, and beside the left and the right border)
+def test_small_things_between_the_pixels_of_the_grid_count(tmp_path: Path, x_m: float) -> None:
+    motion = f'{{ kind = "straight", position_m = [{x_m}, 0.003, 1], velocity_m_s = [1, 0, 0] }}'
+    steps = fly(tmp_path / "fly.toml", 'kind = "sphere"\nsize_m = 0.006', motion)
+    assert steps / 0.1 == pytest.approx(1.15 * 500 / 0.5, rel=0.03)
+
+
+def test_small_meshes_count_where_their_vertices_are(tmp_path: Path) -> None:
+    # (0.2 m from the axis about which it turns a radian a second, as its file has it)
+    (tmp_path / "wing.obj").write_text("v 0.2 0 0\nv 0.203 0 0\nv 0.2 0.003 0\nf 1 2 3\nf 1 3 2\n")
+    turn = f'{{ kind = "spin", axis = [0, 0, 1], rate_deg_s = {math.degrees(1)} }}'
+    motion = f'[{{ kind = "fixed", position_m = [0, 0.003, 1] }}, {turn}]'
+    steps = fly(tmp_path / "fly.toml", 'kind = "mesh"\nfile = "wing.obj"', motion)
+    assert steps / 0.1 == pytest.approx(1.15 * 0.2 * 500 / 0.5, rel=0.05)  # (whole steps)
+
+
+@pytest.mark.parametrize("name", ["parallax", "room", "flying-shapes"])
+def test_instants_are_as_dense_as_is_asked_for_at_both_ends_of_a_step(name: str) -> None:
+    world = World.of(name, 1, [*SMALL, "duration_s=0.5"])
+    instants = Instants(world)
+    for k in range(0, len(instants) - 1, max(1, len(instants) // 12)):
+        ends = instants[k], instants[k + 1]
+        assert 1e-9 * (ends[1] - ends[0]) * max(rate_hz(world, t_ns) for t_ns in ends) < 1.05
 
 
 def test_small_things_count_where_a_lens_has_them(tmp_path: Path) -> None:
