@@ -71,7 +71,24 @@ def test_a_shadow_that_moves_goes_in_small_steps_though_what_casts_it_is_not_see
         assert 0.1 < np.radians(360 * 0.1 / steps) * 160 < 1  # px at the border
 
 
-@pytest.mark.parametrize("phase_deg", [45, 90, 135, 270])
+@pytest.mark.parametrize("glow", ["", "emission = 1\nflicker = { frequency_hz = 1 }\n"])
+def test_a_shadow_that_is_not_seen_asks_for_nothing(tmp_path: Path, glow: str) -> None:
+    # (a blade turns before a wall, which may glow and fade by itself, and the lamp is between the two)
+    file, steps = tmp_path / "blade.toml", []
+    for shadows in ("false", "true"):
+        file.write_text(
+            "[scene]\nduration_s = 2\nmin_fps = 1\nambient = 0.2\nsamples_per_period = 2\n"
+            f"[camera]\nsize = [64, 48]\n{STILL}{glow}"
+            '[[objects]]\nname = "blade"\nkind = "plane"\nsize_m = [0.1, 0.6, 0]\n'
+            'trajectory = [{ kind = "fixed", position_m = [0, 0, 1] }, { kind = "spin", rate_deg_s = 5 }]\n'
+            f'[[lights]]\nname = "lamp"\nkind = "point"\nshadows = {shadows}\n'
+            'trajectory = { kind = "fixed", position_m = [0, 0, 1.9] }\n'
+        )
+        steps.append(len(Instants(World.of(file))) - 1)
+    assert steps[0] == steps[1] > 4
+
+
+@pytest.mark.parametrize("phase_deg", [0, 45, 90, 180])
 @pytest.mark.parametrize("kind", ["spin", "orbit"])
 def test_what_comes_into_view_once_a_round_is_met_each_time(tmp_path: Path, kind: str, phase_deg: int) -> None:
     # (in step with knots 16 ms apart, which would see it each time, or never)
@@ -79,9 +96,9 @@ def test_what_comes_into_view_once_a_round_is_met_each_time(tmp_path: Path, kind
     turn += ", rate_deg_s = 22500" if kind == "spin" else ", period_s = 0.016, radius_m = 1.2"
     file = tmp_path / "blade.toml"
     file.write_text(
-        f"[scene]\nduration_s = 0.08\n[camera]\nsize = [64, 48]\n{STILL}"
-        '[[objects]]\nname = "blade"\nkind = "sphere"\nsize_m = 0.8\n'
-        f'trajectory = [{{ kind = "fixed", position_m = [0, 1.4, 1.9] }}, {{ {turn} }},'
+        f"[scene]\nduration_s = 0.08\n[camera]\nsize = [320, 240]\n{STILL}"
+        '[[objects]]\nname = "blade"\nkind = "sphere"\nsize_m = 0.3\n'
+        f'trajectory = [{{ kind = "fixed", position_m = [0, 1.9, 1.9] }}, {{ {turn} }},'
         f'{{ kind = "fixed", position_m = [{1.2 if kind == "spin" else 0}, 0, 0] }}]\n'
     )
     instants = Instants(World.of(file))
