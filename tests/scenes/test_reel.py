@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -168,11 +169,16 @@ def test_shadows_of_what_moves_fall_where_they_fell(lamps, seed):
 def test_all_that_a_ball_may_hide_from_a_lamp_is_in_the_balls_of_its_shadow(near, seed):
     rng = np.random.default_rng(seed)
     centre, radius, lamp = rng.normal(0, 1, 3), rng.uniform(0.05, 0.5), rng.normal(0, 1, 3)
-    lamp = centre + radius * rng.uniform(1.2, 9) * lamp / np.linalg.norm(lamp) if near else lamp / np.linalg.norm(lamp)
+    lamp /= np.linalg.norm(lamp)
+    lamp = centre + radius * 1.2 * 40 ** rng.random() * lamp if near else lamp
     way = (centre - lamp) / np.linalg.norm(centre - lamp) if near else -lamp
     things = np.column_stack([centre + rng.uniform(1, 5, (3, 1)) * way + rng.normal(0, 0.3, (3, 3)), [0.3, 1, 3]])
     rims = rng.normal(0, 1, (4000, 3))
-    rims = centre + radius * rims / np.linalg.norm(rims, axis=1, keepdims=True)
+    rims[::2] -= np.outer(rims[::2] @ way, way)  # (every other one is where light grazes the ball)
+    rims /= np.linalg.norm(rims, axis=1, keepdims=True)
+    towards = radius / np.linalg.norm(centre - lamp) if near else 0.0
+    rims[::2] = math.sqrt(1 - towards**2) * rims[::2] - towards * way
+    rims = centre + radius * rims
     behind = rims + rng.uniform(0, 8, (4000, 1)) * (rims - lamp if near else -lamp)
     gaps = np.linalg.norm(behind[:, None] - things[:, :3], axis=2) - things[:, 3]
     behind = behind[(gaps <= 0).any(axis=1)]
