@@ -181,7 +181,7 @@ def _placed(
     scale, offset = [], []
     for length, times, around in zip((width, height), repeat, wraps, strict=True):
         inside = 1.0 if around else length / (length + 2)
-        scale.append(inside * (times if around else max(times, 0.0)))
+        scale.append(inside * times)
         offset.append((1 - inside) / 2)
     return [scale[0], -scale[1]], [offset[0], 1 - offset[1]]
 
