@@ -96,6 +96,24 @@ def test_what_another_thing_covers_then_is_not_covisible():
     np.testing.assert_array_equal(covisible[still], second.thing[still] == 0)
 
 
+@pytest.mark.parametrize("turn_deg", [5, 60, 150])
+def test_what_a_thing_turns_away_from_the_camera_is_not_covisible(turn_deg):
+    def scene(turn_deg: float) -> Snapshot:
+        return Snapshot([Thing("ball", Shape("sphere", (0.4,) * 3), pose=Pose.of((0, turn_deg, 0), (0, 0, 3)))])
+
+    picture = render(scene(0), CAMERA, IDENTITY, samples=1)
+    _, covisible = flow(scene(0), IDENTITY, scene(turn_deg), IDENTITY, CAMERA, picture)
+    x, y = np.meshgrid(np.arange(320) - CAMERA.centre_px[0], np.arange(240) - CAMERA.centre_px[1])
+    points = np.stack([x / CAMERA.focal_px[0], y / CAMERA.focal_px[1], np.ones_like(x)], -1) * picture.depth[..., None]
+    ball = picture.thing == 0
+    there = (points[ball] - (0, 0, 3)) @ Pose.of((0, turn_deg, 0)).rotation.T
+    seen = np.array([0, 0, 3]) + there
+    facing = -np.einsum("ni,ni->n", there, seen) / (0.2 * np.linalg.norm(seen, axis=1))
+    sure = np.abs(facing) > 0.02  # (at the outline rounding says on which side a point is)
+    assert sure.sum() > 1000
+    np.testing.assert_array_equal(covisible[ball][sure], facing[sure] > 0)
+
+
 def test_points_behind_the_second_camera_have_no_flow():
     wall = Snapshot([Thing("wall", Shape("plane", (9, 9, 0)), pose=Pose.of((0, 0, 0), (0, 0, 2)))])
     picture = render(wall, CAMERA, IDENTITY)
