@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ from interp.candidates.ramps import in_doubt, ramps, risen
 from interp.light import luminance, to_light
 from interp.methods import Gap, open_method
 from interp.networks import make
+from interp.networks.gate import gate_of
+from interp.networks.guide import Guide
 from interp.representation.event_counts import EventCounts
 
 SIDE, MARGIN, STEPS, C = 64, 16, 32, 0.15
@@ -195,6 +198,33 @@ def test_what_is_off_and_what_is_believed_is_as_the_docstring_has_it(k: int) -> 
     np.testing.assert_allclose(carried_off_by(found, said[1], k)[0, 0, 0], off, atol=1e-6)
     share = part_of(said[0], carried_off_by(found, said[1], k))[0, 0, 0]
     np.testing.assert_allclose(share, wrong / (wrong + off + 0.003**2), atol=1e-3)
+
+
+def test_a_network_says_how_much_to_believe_and_what_is_missing_where_events_are() -> None:
+    """I = C' + m (J - C') + 3 s tanh(r), m = c^2 / (c^2 + j^2 e^-n), 1/s^2 = 1/c^2 + 1/j^2; elsewhere r and n are 0."""
+    c2, j2 = 1e-4 + torch.rand(2, 1, 2, 1, 7, 9)
+    n, near = 4 * torch.randn(1, 2, 1, 7, 9), torch.rand(1, 1, 1, 7, 9).round()
+    start, carried, r = torch.rand(3, 1, 2, 3, 7, 9)
+    unused = torch.zeros(0)
+    guide = Guide(
+        "srgb", unused, risen(EventCounts.none(1, (7, 9)), torch.tensor([[0.5, 0.6]])), unused, c2, near, near
+    )
+    made = guide.image(start, carried, j2, torch.cat([r, n], 2))
+    m = c2 / (c2 + j2 * torch.exp(-(n * near).clamp(-10, 10)) + 0.003**2)
+    s = (c2 * j2 / (c2 + j2 + 0.003**2)).sqrt()
+    torch.testing.assert_close(made, start + m * (carried - start) + 3 * s * torch.tanh(r * near))
+    torch.testing.assert_close(guide.offs(j2), SHARP * torch.cat([c2, j2], 2).sqrt())
+
+
+def test_a_gate_opens_with_the_mean_of_events_around() -> None:
+    """1 - exp(-4 mean), over 5 x 5 pixels; of what was not seen nothing is held back."""
+    some, frame = counts(1, (9, 12), steps=3, rate=0.05), torch.rand(1, 3, 9, 12)
+    network = make("rrin_events_guided")
+    pair = replace(network.padded(frame, frame, some), events=some, frame_0=frame)
+    number = np.pad(some.off_on.float().sum((0, 1, 2)).numpy(), 2)
+    mean = np.lib.stride_tricks.sliding_window_view(number, (5, 5)).mean((2, 3))
+    np.testing.assert_allclose(gate_of(pair)[0, 0], 1 - np.exp(-4 * mean), atol=1e-6)
+    assert (gate_of(network.padded(frame, frame)) == 1).all()
 
 
 def test_motion_of_coarse_light_is_that_of_means() -> None:

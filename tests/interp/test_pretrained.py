@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import pytest
+import torch
 
 from interp import pretrained
+from interp.light import luminance, to_light
+from interp.networks.event_fed import EventFed
+from interp.networks.frame_fed import FrameFed
+from interp.representation.event_counts import EventCounts
 from interp.weights import load
 from vid2ev.errors import UsageError
 
@@ -19,6 +26,62 @@ def test_weights_are_what_their_name_says(path: Path) -> None:
     network = load(path)
     assert network.spec.size == size  # type: ignore[union-attr]
     assert path.with_suffix(".md").read_text().startswith(f"# {name}, {size}\n")
+
+
+def shown(shift_px: float, lit: float = 0.0) -> torch.Tensor:
+    """Waves of three colours that move, [1, 3, 48, 64]; a corner of them is lit."""
+    y, x = torch.meshgrid(torch.arange(48.0), torch.arange(64.0), indexing="ij")
+    x = x + shift_px
+    waves = [0.5 + 0.2 * torch.sin(0.35 * x + k) + 0.15 * torch.cos(0.21 * y + 0.13 * x + 2 * k) for k in range(3)]
+    return torch.stack(waves)[None] * (1 + lit * (x - shift_px > 30) * (y < 30))
+
+
+def events(steps: int = 32, nats: float = 0.2) -> EventCounts:
+    """Those of an ideal sensor while the waves move by 4 px and the corner lights up and fades."""
+    level, off_on = torch.zeros(0), list[torch.Tensor]()
+    for k in range(steps + 1):
+        light = to_light(shown(4 * k / steps, 0.25 * math.sin(math.pi * k / steps)), "srgb")
+        logs = torch.log(luminance(light) + 1e-3)[0, 0]
+        if k:
+            net = ((logs - level) / nats).round()
+            level = level + nats * net
+            off_on.append(torch.stack([(-net).clamp(min=0), net.clamp(min=0)]))
+        else:
+            level = logs
+    return EventCounts(torch.stack(off_on, 1)[None], torch.full((1, 2), nats))
+
+
+def made_of_waves(network: Any) -> torch.Tensor:
+    """What a network makes of these, [C, 48, 64]: the image at 0.4 of the time, or the last of some in a row."""
+    some, state = events(), None
+    if isinstance(network, FrameFed):
+        return network(shown(0), shown(4), [0.4], some).images[0, 0]
+    for k in range(4):
+        voxels = some.voxels(torch.tensor([[k / 4]]), torch.tensor([[(k + 1) / 4]]), network.spec.bins)[:, 0]
+        if isinstance(network, EventFed):
+            image, state = network(voxels, state or ())
+        else:  # (light of which much is beyond the range)
+            image, state = network((1.6 * shown(k)).clamp(0.3, 1), voxels, state, torch.tensor([[0.3, 1.0]]))
+    return image[0]
+
+
+# Of eight pixels, as when the weights were scored: of channel k, row 5 + 9 (k mod 5), column 9 (k mod 7).
+AS_SCORED = {
+    "firenet-paper": [0.5432, 0.5177, 0.5139, 0.5163, 0.5352, 0.4975, 0.5242, 0.5521],
+    "hdr-tiny": [1.0353, 0.7444, 0.9505, 0.4323, 0.8428, 0.8458, 0.9482, 1.3021],
+    "rrin_events_guided-tiny": [0.6773, 0.4533, 0.6544, 0.3069, 0.5501, 0.4641, 0.643, 0.7706],
+    "rrin_light-tiny": [0.6665, 0.4526, 0.6614, 0.312, 0.5509, 0.4156, 0.503, 0.7689],
+    "rrin_slomo_events-tiny": [0.6758, 0.4533, 0.6544, 0.3059, 0.5501, 0.458, 0.6387, 0.7706],
+}
+
+
+@pytest.mark.parametrize("path", COME, ids=lambda path: path.stem)
+def test_weights_are_given_what_they_have_learnt_from(path: Path) -> None:
+    """In other units or another order they would make something else of it, which no training undoes."""
+    with torch.no_grad():
+        image = made_of_waves(load(path).eval())
+    found = [float(image[k % len(image), 5 + 9 * (k % 5), 9 * (k % 7)]) for k in range(8)]
+    assert found == pytest.approx(AS_SCORED[path.stem], abs=1e-3)
 
 
 def test_all_together_are_within_forty_megabytes() -> None:
