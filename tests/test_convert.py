@@ -94,6 +94,7 @@ def test_what_is_counted_goes_on_where_a_conversion_was_paused(tmp_path: Path) -
     clip, options = tmp_path / "pan.npy", {"fps": 30, "max_subframes": 2, "piece": 1}
     whole = convert(clip, tmp_path / "whole", **options)
     assert whole["counts"]["limited_intervals"] == whole["counts"]["subframes"] == 9
+    assert "9 of 9 intervals asked for more sub-frames than --max-subframes allows" in whole["warnings"]
     asked = iter([False, False, False, True])
     with pytest.raises(Paused):
         convert(clip, tmp_path / "paused", pause=lambda: next(asked), **options)
