@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import sys
@@ -23,9 +24,10 @@ from vid2ev import DataError, UsageError, convert
 from vid2ev.cluster.task import Task
 from vid2ev.commands import main
 from vid2ev.formats import read_events
+from vid2ev.making import stretches
 from vid2ev.making.conversion import Paused
 from vid2ev.making.split import check_split, convert_split
-from vid2ev.making.stretches import warm_up_us, with_warm_up
+from vid2ev.making.stretches import at_cuts, warm_up_us, with_warm_up
 from vid2ev.recording.held import Held
 from vid2ev.seen.recipe import Recipe
 from vid2ev.sensors.spec import DvsSpec
@@ -359,6 +361,31 @@ def test_a_part_is_shown_what_is_before_it_for_its_warm_up_and_up_to_a_frame_mor
         last = max(k for k in range(50) if k < 10 * before.stop)
         assert stretch.since_ns == last * frame_ns  # (the last frame of one is the first of the next)
     assert [round(stretch.since_ns / frame_ns) for stretch in later] == [12, 24, 36]
+
+
+@pytest.mark.parametrize("slowdown", [1.0, 2.5])
+@pytest.mark.parametrize(
+    ("shots", "count", "begin"),
+    [
+        ([10, 21, 33], 4, [10, 21, 33]),
+        ([10, 21, 33], 2, [21]),
+        ([2, 4, 12], 3, [12]),
+        ([2, 4, 37], 3, [4, 37]),
+        ([19, 23], 8, [19, 23]),
+        ([], 5, []),
+    ],
+)
+def test_parts_begin_with_the_shots_that_are_nearest_to_even_parts(
+    tmp_path: Path, shots: list[int], count: int, begin: list[int], slowdown: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 40 frames; each part ends with the frame before the next one begins."""
+    np.save(tmp_path / "clip.npy", np.arange(40, dtype=np.float32)[:, None, None] * np.ones((1, 4, 4), np.float32))
+    monkeypatch.setattr(stretches.CutDetector, "begins_shot", lambda _, a, b: int(b.light[0, 0]) in shots)
+    recipe = Recipe.of(tmp_path / "clip.npy", "ideal", fps=10.0, slowdown=slowdown)
+    parts = at_cuts(recipe, count, {"slowdown": slowdown})
+    assert [part.start and math.ceil(10 * part.start) for part in parts] == [None, *begin]
+    assert [part.stop and math.floor(10 * part.stop) for part in parts] == [*(first - 1 for first in begin), None]
+    assert all(part.since_ns is None for part in parts)
 
 
 def test_of_few_frames_there_are_few_parts(tmp_path: Path) -> None:
