@@ -151,6 +151,16 @@ def test_light_is_within_what_frames_can_show_or_as_bright_as_they_are(brightest
     assert torch.isfinite(dark.forward).all()  # noise below black counts as black
 
 
+def test_nothing_is_darker_than_black() -> None:
+    """Neither what gets so dark in between that both frames know of it, nor a colour that black has none of."""
+    grey, off_on = torch.full((1, 1, 2, 2), 0.1), torch.zeros(1, 2, STEPS, 2, 2)
+    off_on[:, 0, : STEPS // 2], off_on[:, 1, STEPS // 2 :] = 1e3, 1e3
+    found = integrated(grey, grey, EventCounts(off_on, torch.full((1, 2), C)), torch.tensor([[0.5]]))
+    assert (found.forward == DARKEST).all() and (found.backward == DARKEST).all() and (found.light() == 0).all()
+    red = ratios_of(torch.tensor([1.0, 0.0, 0.0]).reshape(3, 1, 1))
+    assert coloured(torch.zeros(1, 1, 1), red).flatten().tolist() == [pytest.approx(float(0.01 * red[0] - 0.01)), 0, 0]
+
+
 @pytest.mark.parametrize("level", [0.0, 1e-8, 0.5, 1.0, 1e4])
 def test_gradients_are_finite_on_light_of_any_level(level: float) -> None:
     first, second = (torch.full((1, 3, 8, 8), level, requires_grad=True) for _ in range(2))
