@@ -40,6 +40,7 @@ PRESETS = ("ideal", "v2e-clean", "paper", "v2e-noisy")
 FRAME_NS = 1_000_000
 WAYS = ("told", "looks", "walks")
 TURN = 10  # frames; the first ones warm up
+FEWEST = TURN + 2  # the second turn's first frame is not timed
 
 
 def moving_band(count: int, width: int, height: int, moving: float, part: float) -> tuple[np.ndarray, np.ndarray]:
@@ -101,12 +102,14 @@ def measure(preset: str, frames: np.ndarray, t_ns: np.ndarray, settings: tuple[s
 @click.option("--size", default="1280x720", show_default=True, metavar="WIDTHxHEIGHT")
 @click.option("--moving", type=click.FloatRange(0, 1), default=0.05, show_default=True, help="Share of strips.")
 @click.option("--width", "part", type=click.FloatRange(0, 1), default=1.0, show_default=True, help="Of the band.")
-@click.option("--count", type=click.IntRange(10), default=80, show_default=True, help="Frames.")
+@click.option("--count", type=click.IntRange(FEWEST), default=80, show_default=True, help="Frames.")
 @click.option("--clip", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="Take its first frames.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change the sensors.")
 def main(presets, size, moving, part, count, clip, settings) -> None:
     width, height = (int(word) for word in size.split("x"))
     frames, t_ns = clip_frames(clip, count) if clip else moving_band(count, width, height, moving, part)
+    if len(frames) < FEWEST:
+        raise click.UsageError(f"{clip}: {len(frames)} frames, expected at least {FEWEST}; give a longer clip")
     changed = share_changed(frames)
     click.echo(
         f"{frames.shape[2]}x{frames.shape[1]}, {len(frames)} frames, {100 * changed:.1f} % of the strips change\n"

@@ -69,9 +69,11 @@ TILE = (32, 64)  # rows, columns
 
 def share_changed(source: str) -> float:
     """The share of tiles that change from one frame to the next."""
-    lights = (frame.light for frame in open_source(source).frames())
+    film = open_source(source)
+    first = max(0, min(100, (film.frames_expected or 0) - 25))
+    lights = (frame.light for frame in itertools.islice(film.frames(), first, first + 25))
     shares = []
-    for before, after in itertools.pairwise(itertools.islice(lights, 100, 125)):
+    for before, after in itertools.pairwise(lights):
         rows, columns = (after.shape[k] // TILE[k] for k in range(2))
         differ = (before != after)[: rows * TILE[0], : columns * TILE[1]]
         shares.append(differ.reshape(rows, TILE[0], columns, TILE[1]).any(axis=(1, 3)).mean())

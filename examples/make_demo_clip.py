@@ -10,11 +10,11 @@ libraries give the same file; nothing is random.
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import av
+import click
 import cv2
 import numpy as np
 from skimage import data
@@ -35,6 +35,8 @@ class Print(NamedTuple):
     distance: float
 
 
+@click.command(help=__doc__.split("\n\n")[0] if __doc__ else None)
+@click.argument("output", type=click.Path(dir_okay=False, path_type=Path), default=Path(__file__).with_name("demo.mp4"))
 def main(output: Path) -> None:
     prints = scene()
     with av.open(str(output), "w", options={"movflags": "+faststart"}) as container:
@@ -120,4 +122,4 @@ def coded(light: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("demo.mp4"))
+    main()

@@ -53,10 +53,15 @@ def measured(against_v2e: ModuleType) -> list[dict]:
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "examples").glob("*.py")))
-def test_each_example_finds_what_it_imports(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_example_finds_what_it_imports_and_says_what_it_is(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "examples")
     monkeypatch.delitem(sys.modules, name, raising=False)
-    importlib.import_module(name)
+    module = importlib.import_module(name)
+    commands = [value for value in vars(module).values() if isinstance(value, click.Command)]
+    assert len(commands) == ("__main__" in Path(module.__file__ or "").read_text())  # (one is imported by another)
+    for command in commands:
+        told = CliRunner().invoke(command, ["--help"])
+        assert told.exit_code == 0 and told.output.startswith("Usage:")
 
 
 def test_the_presets_obey_the_laws(measured: list[dict]) -> None:
@@ -243,6 +248,17 @@ def test_the_benchmark_of_clips_measures_each_part(monkeypatch: pytest.MonkeyPat
     rows = [line.strip("| ").split(" | ") for line in done.output.splitlines()[2:]]
     assert done.exit_code == 0 and [row[1] for row in rows] == ["paper", "ideal"]
     assert all(float(row[2]) > 0.1 for row in rows)
+
+
+def test_how_much_of_a_scene_changes_is_known_of_short_ones() -> None:
+    share = example("benchmark_still").share_changed("scene:spinning-shapes,size=128x96,duration_s=0.05")
+    assert 0 < share <= 1
+
+
+def test_too_few_frames_to_time_sleep_by_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "short.npz", frames=np.ones((3, 4, 4), np.float32), t=np.arange(3) / 100)
+    done = CliRunner().invoke(example("benchmark_skip").main, ["--clip", str(tmp_path / "short.npz")])
+    assert done.exit_code == 2 and "3 frames, expected at least 12" in done.output
 
 
 @pytest.mark.long
