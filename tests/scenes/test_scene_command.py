@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import tomllib
 from pathlib import Path
 
 import click
@@ -358,6 +359,8 @@ def test_a_dry_run_prints_the_scene_and_does_nothing() -> None:
     Path("again.toml").write_text(result.stdout)
     assert read_scene("again.toml").resolved(0) == read_scene("parallax").resolved(4)
     assert [path.name for path in Path().iterdir()] == ["again.toml"]
+    printed = vid2ev("scene", "parallax", "--dry-run", "--seed", "4", "--json").stdout
+    assert json.loads(printed) == tomllib.loads(result.stdout)
     for wrong in (["--truth", "banana"], ["--samples", "4"], ["--renderer", "blender", "--blender", "no-such-program"]):
         assert vid2ev("scene", "parallax", "--dry-run", *wrong).exit_code == 2
 

@@ -85,7 +85,8 @@ def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) 
     if dry_run:
         from vid2ev.scenes.own_files import named_from
 
-        click.echo(toml_text(named_from(file.resolved(options["seed"]).tables(), Path())), nl=False)
+        tables = named_from(file.resolved(options["seed"]).tables(), Path())
+        click.echo(json.dumps(tables, indent=2) + "\n" if as_json else toml_text(tables), nl=False)
         return
     made = list(_render(file, contents, options, quiet or as_json))
     if as_json:
