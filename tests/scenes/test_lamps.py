@@ -26,6 +26,9 @@ def test_a_point_lamp_falls_with_the_square_of_distance_and_the_cosine():
     assert middle_of(Lamp("point", position_m=(0, 0, 2))) == pytest.approx(1 / 4, rel=1e-5)
     assert middle_of(Lamp("point", position_m=(0, 0, 2), reach_m=2)) == pytest.approx(1, rel=1e-5)
     assert middle_of(Lamp("point", position_m=(1, 0, 3))) == pytest.approx(1 / 2 / np.sqrt(2), rel=1e-5)
+    assert middle_of(Lamp("point", position_m=(0, 0, 3.98))) == pytest.approx(1 / 0.02**2, rel=1e-5)
+    for nearer_m in (0.009, 1e-4):  # than 1 % of the reach
+        assert middle_of(Lamp("point", position_m=(0, 0, 4 - nearer_m))) == pytest.approx(1e4, rel=1e-2)
     assert middle_of(Lamp("point", position_m=(0, 0, 5))) == pytest.approx(0)  # behind the wall
     assert np.isfinite(middle_of(Lamp("point", position_m=(0, 0, 4)))).all()
 
@@ -119,6 +122,20 @@ def test_the_environment_is_seen_where_one_looks():
         assert light[channel] == pytest.approx(1, abs=1e-3) and light.sum() == pytest.approx(1, abs=1e-3)
     turned = Snapshot(environment=Texture(colours), environment_pose=Pose.of((0, 90, 0)))
     assert render(turned, MIDDLE, Pose.of((0, 90, 0))).light[1, 1].argmax() == 0
+
+
+def test_an_environment_is_not_blurred_where_its_pixels_are_as_large_as_the_picture_s():
+    # (at the border of 120 degrees, where a pixel takes up half the angle across and down that it does in the middle)
+    camera, sky = Intrinsics.of_field((64, 5), 120), np.random.default_rng(0).random((104, 128, 3)).astype(np.float32)
+    light = render(Snapshot(environment=Texture(sky)), camera, IDENTITY).light
+    for column, line in ((0, 0), (0, 2), (63, 3), (63, 4)):
+        x, y = (np.array([column, line]) - camera.centre_px) / camera.focal_px
+        length = np.sqrt(x * x + y * y + 1)
+        u, v = 128 * (0.5 + np.arctan2(x, 1) / (2 * np.pi)) - 0.5, 104 * np.arccos(-y / length) / np.pi - 0.5
+        left, top = int(u), int(v)
+        right, down = u - left, v - top
+        rows = sky[[top, top + 1], left] * (1 - right) + sky[[top, top + 1], left + 1] * right
+        np.testing.assert_allclose(light[line, column], rows[0] * (1 - down) + rows[1] * down, atol=1e-5)
 
 
 def test_what_cannot_be_meant_is_refused():
