@@ -5,7 +5,7 @@
                    within a pixel or beside it, the light of each weighted with its area in the pixel
 
 A picture is a function of its arguments alone, and light changes smoothly while things move.  What is narrower than
-a sixth of a pixel may be missed.
+a sixth of a pixel may be missed; spikes of meshes and gaps between things, if they are narrower than a pixel.
 """
 
 from __future__ import annotations
