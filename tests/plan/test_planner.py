@@ -164,16 +164,25 @@ def test_the_time_it_took_is_that_of_all_plans(
 
 
 def test_light_that_trembles_more_and_more_makes_it_begin_again_once(
-    clip: Path, tmp_path: Path, held: Callable[[int], None]
+    clip: Path, tmp_path: Path, held: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is left out the second time is within a smaller share of the tolerance."""
+    """What is left out at first is within half of the tolerance, and the second time within a quarter."""
     draws, growing = np.random.default_rng(5), np.maximum(0, np.linspace(-0.01, 0.1, 160))[:, None, None]
     ramp = 0.2 + 0.01 * np.arange(160)[:, None, None]
     np.save(clip, (ramp * np.exp(draws.normal(0, 1, (160, *SIZE[::-1])) * growing)).astype(np.float32))
     held(SOME)
     reports: list[int] = []
+    asked, plans = list[float](), planning.Look.plans
+
+    def noted(look: Any, effects: str, tolerance: float, among: Any = None) -> Any:
+        asked.append(tolerance)
+        return plans(look, effects, tolerance, among)
+
+    monkeypatch.setattr(planning.Look, "plans", noted)
     manifest = made(clip, tmp_path / "auto", tolerance=0.02, report=lambda _, done: reports.append(done.frames))
     assert reports.count(10) == 2 and manifest["plan"][""]["distance"] <= 0.02
+    assert sorted({*asked}) == [0.005, 0.01, 0.02] and asked.index(0.01) < asked.index(0.005)
+    assert manifest["plan"][""]["tolerance"] == 0.02  # (what was asked for, whatever was spared)
 
 
 def test_a_recording_ended_by_hand_ends_there_by_other_plans_too(
