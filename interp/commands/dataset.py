@@ -41,7 +41,7 @@ SCENES = "{percentage:3.0f}% {bar} scene {n_fmt}/{total_fmt}, {elapsed} gone, {r
     "--layout", type=click.Choice(["own", "hsergb", "bsergb"]), default="own", show_default=True,
     help="Recordings of vid2ev, or the files of HS-ERGB or BS-ERGB.",
 )  # fmt: skip
-@click.option("--size", show_default="640x480", metavar="WxH", help="Pixels of rendered scenes.")
+@click.option("--size", metavar="WxH", help="Pixels of rendered scenes.  [default: 640x480]")
 @click.option(
     "--seed", type=click.IntRange(0, 1 << 61), default=0, show_default=True, help="Another seed, other scenes."
 )

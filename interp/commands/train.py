@@ -28,13 +28,13 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
 
 @click.command(short_help="Train a network that rebuilds video from slow frames and events.")
 @click.option(
-    "--network", metavar="NAME", show_default="rrin-events-guided, or that of --start",
+    "--network", metavar="NAME",
     help="superslomo, slomo-events, rrin, rrin-light, rrin-events, rrin-events-light, rrin-events-guided,"
-    " rrin-slomo-events, timelens, flow, e2vid, firenet, hdr.",
+    " rrin-slomo-events, timelens, flow, e2vid, firenet, hdr.  [default: rrin-events-guided, or that of --start]",
 )  # fmt: skip
 @click.option(
-    "--size", type=click.Choice(["tiny", "small", "paper"]), show_default="tiny, or that of --start", help="Width.",
-)  # fmt: skip
+    "--size", type=click.Choice(["tiny", "small", "paper"]), help="Width.  [default: tiny, or that of --start]"
+)
 @click.option(
     "--start", "starts", multiple=True, metavar="[PART=]WEIGHTS",
     help="Begin with these weights: of a file, a run, or the name of some that come with vid2ev; for a part such as"
