@@ -50,6 +50,14 @@ def test_colour_is_luminance_or_rgb() -> None:
     assert rgb.light.shape == (36, 48, 3) and np.allclose(rgb.luminance, grey.light, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "edits", [{}, {"stop": 0.02}, {"start": 0.01, "stop": 0.02}, {"slowdown": 4}, {"size": "20x15"}]
+)
+def test_its_description_says_how_long_what_is_left_of_it_lasts(edits: dict[str, object]) -> None:
+    source = open_source(TEXT, **edits)  # type: ignore[arg-type]
+    assert source.describe()["duration_expected_s"] == source.duration_expected_s
+
+
 def test_parts_and_sizes_are_those_of_any_source() -> None:
     whole = list(open_source(TEXT, fps=1000).frames())
     part = open_source(TEXT, fps=1000, start=0.0105, stop=0.02)

@@ -72,6 +72,8 @@ class Edit:
         about = self.source.describe()
         edits = {**about.get("edits", {}), **self.edits()}
         about |= {"size": list(self.size), "frames_expected": self.frames_expected}
+        if "duration_expected_s" in about:
+            about["duration_expected_s"] = self.duration_expected_s
         return about | {"edits": edits} if edits else about
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
