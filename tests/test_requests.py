@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -17,7 +19,8 @@ from interp.interpolate.take import Options
 from vid2ev import UsageError
 from vid2ev.commands.auto import Auto
 from vid2ev.commands.convert import convert
-from vid2ev.commands.options import FiniteRange
+from vid2ev.commands.info import info
+from vid2ev.commands.options import FiniteRange, Rate
 from vid2ev.cost.front import Budget
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.requests import number_of, setting
@@ -84,6 +87,21 @@ def test_seconds_and_microseconds_of_commands_are_finite_numbers(
     for option in options:
         said = CliRunner().invoke(command, ["anything", option, text])
         assert said.exit_code == 2 and f"'{text}': expected a finite number" in said.output
+
+
+def test_a_rate_is_a_number_or_one_over_another_and_stays_exact(tmp_path: Path) -> None:
+    assert [Rate().convert(text, None, None) for text in ("30000/1001", "1e3/.5", "29.97")] == [
+        Fraction(30000, 1001),
+        2000,
+        29.97,
+    ]
+    for text in ("30000/", "/1001", "1/0", "0/1", "-1/2", "1/2/3", "nan/1", "1_0/1", "2000001/2", "0", "1e7"):
+        with pytest.raises(click.BadParameter, match=r"expected a number|is not in the range"):
+            Rate(1e6).convert(text, None, None)
+    np.save(tmp_path / "stack.npy", np.arange(31 * 16, dtype=np.uint8).reshape(31, 4, 4))
+    arguments = [str(tmp_path / "stack.npy"), "--transfer", "srgb", "--fps", "30000/1001", "--json"]
+    said = CliRunner().invoke(info, arguments)
+    assert said.exit_code == 0 and '"fps": "30000/1001"' in said.output, said.output
 
 
 @pytest.mark.parametrize("seconds", [math.nan, math.inf])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import click
@@ -34,6 +35,23 @@ class Finite(click.types.FloatParamType):
 
 class FiniteRange(Finite, click.FloatRange):
     """A finite number within a range; click's own takes NaN, which is neither too small nor too large."""
+
+
+class Rate(FiniteRange):
+    """Frames a second: a number, or one over another (30000/1001), which stays exact."""
+
+    def __init__(self, most: float | None = None) -> None:
+        super().__init__(0, most, min_open=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        above, slash, below = value.partition("/") if isinstance(value, str) else ("", "", "")
+        if not slash:
+            return super().convert(value, param, ctx)
+        if not number_of(above) > 0 or not number_of(below) > 0:
+            self.fail(f"'{value}': expected a number, or one over another, such as 30000/1001", param, ctx)
+        exact = Fraction(above) / Fraction(below)
+        super().convert(float(exact), param, ctx)
+        return exact
 
 
 SECONDS = FiniteRange(0, 1e9)  # of a recording

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vid2ev.commands import tidy
-from vid2ev.commands.options import FiniteRange
+from vid2ev.commands.options import FiniteRange, Rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +36,7 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
 @click.option("--duration", type=FiniteRange(0, 1e5, min_open=True), metavar="S", help="Seconds of the scene.")
 @click.option(
     "--fps",
-    type=FiniteRange(0, 1e6, min_open=True),
+    type=Rate(1e6),
     metavar="RATE",
     help="Frames per second.  [default: as many as motion and light ask for]",
 )
@@ -142,7 +142,8 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
     for seed, directory in directories.items():
         with _renderer(directory, options) as renderer, counting(quiet, FRAMES, desc=str(directory)) as report:
             source = SceneSource(World(file, seed, renderer=renderer), file.name, seed=seed, fps=options["fps"])
-            how = f"{file.name}, seed {seed}, " + (f"{options['fps']:g} fps" if options["fps"] else "all instants")
+            often = f"{float(options['fps']):g} fps" if options["fps"] else "all instants"
+            how = f"{file.name}, seed {seed}, {often}"
             how += f", Cycles with {renderer.samples} samples" if renderer else ""
             new = write_scene(directory, source, contents, how, report=report, **keep)
         frames, seconds = len(source.instants), source.duration_expected_s

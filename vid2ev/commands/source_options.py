@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from vid2ev.commands.options import Finite, FiniteRange, adding
+from vid2ev.commands.options import Finite, FiniteRange, Rate, adding
 
 source_options = adding(  # those of `open_source`
     click.option(
@@ -17,9 +17,9 @@ source_options = adding(  # those of `open_source`
     ),
     click.option(
         "--fps",
-        type=FiniteRange(0, min_open=True),
+        type=Rate(),
         metavar="RATE",
-        help="Frames per second, instead of the source's own times.",
+        help="Frames per second, instead of the source's own times: 25, 30000/1001.",
     ),
     click.option("--start", type=Finite(), metavar="S", help="Begin at this second of the source's own clock."),
     click.option("--stop", type=Finite(), metavar="S", help="End there."),
