@@ -112,7 +112,7 @@ def together() -> Rig:
     "changed",
     [
         {"overrides": NOISY}, {"probe": ["20,16"]}, {"upsample": "none", "subframes": "auto"}, {"bayer": "RGGB"},
-        {"rig": together()}, {"effects": "auto", **PLAIN}, {"formats": ["aedat4", "evt3"], "frames": "npz"},
+        {"rig": together()}, {"effects": "auto", **PLAIN}, {"formats": ["aedat4", "evt3", "csv"], "frames": "npz"},
     ],
     ids=lambda changed: next(iter(changed)),
 )  # fmt: skip

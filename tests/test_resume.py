@@ -169,7 +169,14 @@ set = { frame_rate_hz = 90, exposure_us = 15000, line_us = 50 }
 def test_a_rig_killed_here_and_there_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(RIG)
     rig = {"rig": str(tmp_path / "rig.toml"), "depth": "plane:1", "truth": "depth,poses", "truth_rate_hz": 50}
-    rig |= {"probe": [], "formats": ["evt3"], "pictures": ["raw", "png", "mp4"], "frames": None, "piece": 9 << 18}
+    rig |= {
+        "probe": [],
+        "labels": False,
+        "formats": ["evt3"],
+        "pictures": ["raw", "png", "mp4"],
+        "frames": None,
+        "piece": 9 << 18,
+    }
     done = run(tmp_path / "whole", **rig)
     assert done.returncode == 0, done.stderr
     steps = int(done.stdout)

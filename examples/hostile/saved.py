@@ -12,7 +12,7 @@ import numpy as np
 Seeds = Callable[[Path], list[Path]]
 CLIP = "synthetic:moving-edge,size=16x12,fps=100,duration_s=0.08"
 OPTIONS: dict[str, Any] = {
-    "overrides": ["shot_rate_hz=20", "frame_rate_hz=900"], "threads": 1, "piece": 3 << 18, "formats": ["evt3"],
+    "overrides": ["shot_rate_hz=20", "frame_rate_hz=900"], "threads": 1, "piece": 3 << 18, "formats": ["evt3", "csv"],
     "labels": True, "probe": ["5,5"],
 }  # fmt: skip
 RIG = """
