@@ -217,6 +217,17 @@ def test_the_page_is_served_to_this_machine_alone(address: Any) -> None:
             assert link.recv(64).split()[1] == status, origin
 
 
+def test_who_leaves_while_a_page_is_sent_leaves_no_traceback(address: Any) -> None:
+    host, port = address[0].removeprefix("http://").split(":")
+    for k in range(30):
+        for path in ("/", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
+            with socket.create_connection((host, int(port))) as link:
+                link.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())
+                time.sleep(0.002 * (k % 3))
+    time.sleep(1)
+    assert "Traceback" not in (address[1] / "log").read_text()
+
+
 def test_each_control_moves_a_value_that_reaches_files_and_the_manifest(browser: Any, address: Any) -> None:
     page, wrong = opened(browser, address)
     expected = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import shlex
 import shutil
@@ -30,6 +31,7 @@ from vid2ev.gui.scene_edit import moved, pose_at, thing_named, things_of, value_
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.tasks import gathered
+from vid2ev.gui.unanswered import Unanswered
 from vid2ev.gui.why import why_not
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import read_scene, scene_names
@@ -396,6 +398,16 @@ def test_pages_of_others_are_not_served(host: str, origin: str, status: int) -> 
     for served in ("127.0.0.1", "localhost", "127.0.0.2", "::1"):
         asyncio.run(Guard(page, served)({"type": "http", "headers": headers}, None, send))
     assert [message["status"] for message in sent if "status" in message] == 4 * [status]
+
+
+@pytest.mark.parametrize("error", [RuntimeError("No response returned."), KeyError("REQUEST_METHOD")])
+def test_an_answer_to_nobody_is_no_error_of_the_program(error: Exception) -> None:
+    def told(what: Exception | None) -> bool:
+        info = None if what is None else (type(what), what, None)
+        return Unanswered().filter(logging.LogRecord("uvicorn.error", logging.ERROR, "", 0, "", (), info))
+
+    assert not told(error)
+    assert told(None) and told(RuntimeError("anything else")) and told(KeyError("name"))
 
 
 def test_a_page_for_the_network_is_served_under_any_name() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 from threading import Thread
 from typing import Any
@@ -63,6 +64,7 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
     from nicegui import app
 
     from vid2ev.gui.guard import Guard
+    from vid2ev.gui.unanswered import Unanswered
 
     warming = Warming()
 
@@ -82,6 +84,7 @@ def serve(setup: Setup, host: str, port: int, show: bool) -> None:
         session.on("setup", lambda changed: kept.update(setup=changed))
 
     app.add_middleware(Guard, host=host)
+    logging.getLogger("uvicorn.error").addFilter(Unanswered())
     where: dict[str, Any] = {"host": host, "port": port, "show": show, "language": "en-US"}
     ui.run(title="vid2ev", reload=False, show_welcome_message=False, reconnect_timeout=GONE_S, **where)
 
