@@ -47,7 +47,7 @@ def recognise(path: Path) -> Kind:
         return "array"
     if head.startswith(b"PK\x03\x04") and _holds_arrays(path):
         return "arrays"
-    if is_animated_png(path):
+    if head.startswith(PNG) and is_animated_png(path):
         return "video"
     if head.startswith(JPEG) and path.suffix.lower() in MOTION_JPEG_SUFFIXES:
         return "video"
