@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from itertools import pairwise
 from typing import Any
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 from vid2ev.bounds.distance import (
+    EVEN,
     PIXELS_DIFFER,
+    Left,
     added,
     bare,
     delayed,
@@ -23,6 +26,7 @@ from vid2ev.bounds.distance import (
 )
 from vid2ev.bounds.scene import DISTANCE_TAU_S, OF_BARE, OF_TILES, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.compare.comparison import compare
+from vid2ev.physics.photoreceptor_omission import _reach_s, _second_reach_s
 from vid2ev.stream import Events
 
 THETA = 0.25
@@ -48,6 +52,13 @@ def spread(*parts: tuple[float, float]) -> np.ndarray:
     made = np.zeros((2, len(QUARTER_EDGES) - 1))
     for k, (travel, by) in enumerate(parts):
         made[:, 10 * k] = travel, travel * by
+    return made
+
+
+def near(events: float) -> np.ndarray:
+    """Travel that has so many events near it."""
+    made = np.zeros((2, len(QUARTER_EDGES) - 1))
+    made[:, 20] = TRAVEL, TRAVEL * events
     return made
 
 
@@ -108,15 +119,59 @@ def test_bends_are_left_in_memories_that_jump() -> None:
     """Of events at other times, of those at turns, and of those after these: by r slope / theta [nat/ms^2]."""
     stir_s2 = 2e-8  # s^2: 0.02 ms^2
     apart, turns, before = spread((0.4, 3e-3)), spread((0.6, 0.5)), spread((0.2, 2.0))
-    seen = scene(by_stirs=apart, by_stirs_at_turns=turns, by_stirs_before=before)
     none = np.zeros_like(apart)
+    strays = {"by_strays": apart, "by_strays_at_turns": turns, "by_strays_before": before}
+    seen = scene(by_stirs=apart, by_stirs_at_turns=turns, by_stirs_before=before, **strays)
     stir_ms2 = 0.02
     at_times = 0.4 * 3e-3 * stir_ms2 / DISTANCE_TAU_S
     at_turns, after = 0.6 * 0.5 * stir_ms2 / THETA, 0.2 * 2.0 * stir_ms2 / THETA
     share = 0.5 * stir_ms2 / THETA
     wanted = ((1 + 2 * share) * (at_times + at_turns) + after) / TRAVEL
-    found = delayed(seen, np.zeros(1), np.zeros(1), none, stir_s2=stir_s2)
+    for left in (Left(stir_s2, 1e9, 0.0), Left(0.0, 0.0, stir_s2)):
+        assert delayed(seen, np.zeros(1), np.zeros(1), none, left=left) == pytest.approx(wanted)
+    both = delayed(seen, np.zeros(1), np.zeros(1), none, left=Left(stir_s2, 1e9, stir_s2))
+    assert both == pytest.approx(2 * wanted)
+
+
+def test_what_many_bends_leave_goes_no_farther_than_the_root_of_their_squares() -> None:
+    """Of numbers by the root of r^2 slope / theta [nat/ms^1.5]; or the sum of all, if that is less."""
+    variance_s2, reach_s = 2e-8, 5e-5  # 0.02 ms^2 and 0.05 ms
+    stirs, apart, turns, before = spread((9.0, 9.0)), spread((0.4, 3e-3)), spread((0.6, 0.5)), spread((0.2, 2.0))
+    strays = {"by_strays": apart, "by_strays_at_turns": turns, "by_strays_before": before}
+    seen = scene(by_stirs=stirs, by_stirs_at_turns=stirs, by_stirs_before=stirs, **strays)
+    nat = math.sqrt(EVEN * 0.02 * 0.05)
+    at_times, at_turns, after = 0.4 * 3e-3 * nat / DISTANCE_TAU_S, 0.6 * 0.5 * nat / THETA, 0.2 * 2.0 * nat / THETA
+    wanted = ((1 + 2 * 0.5 * nat / THETA) * (at_times + at_turns) + after) / TRAVEL
+    none = np.zeros_like(apart)
+    found = delayed(seen, np.zeros(1), np.zeros(1), none, left=Left(variance_s2, reach_s, 0.0))
     assert found == pytest.approx(wanted)
+    seen = scene(by_stirs=0.1 * apart, by_stirs_at_turns=none, by_stirs_before=none, **strays)
+    found = delayed(seen, np.zeros(1), np.zeros(1), none, left=Left(variance_s2, 1e9, 0.0))
+    assert found == delayed(seen, np.zeros(1), np.zeros(1), none, left=Left(0.0, 0.0, variance_s2))
+
+
+def ramp(t: np.ndarray, *poles: float) -> np.ndarray:
+    """What poles, none or two that differ, make of light that goes up by t from 0 on; delayed by others before."""
+    if not poles:
+        return np.maximum(t, 0.0)
+    first, second = poles
+    after = np.maximum(t, 0.0)
+    left = first**2 * np.exp(-after / first) - second**2 * np.exp(-after / second)
+    return np.where(t > 0.0, after - first - second + left / (first - second), 0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.3, 0.999, 3.0, 20.0])
+def test_what_a_bend_leaves_is_narrow(ratio: float) -> None:
+    """Of both poles beside their mean delay, and of the second behind the first beside its own: the integral of its
+    square is no more than `EVEN` of reach times its integral, variance / 2."""
+    t, step = np.linspace(0.0, 40 * max(1.0, ratio), 400_001, retstep=True)
+    both = ramp(t, 1.0, ratio) - ramp(t - 1.0 - ratio)
+    second = ramp(t, 1.0, ratio) - ramp(t - ratio, 1.0, 1e-9)
+    reaches = _reach_s(1.0, ratio), _second_reach_s(np.array(1.0), ratio)
+    for left, variance, reach in zip((both, second), (1 + ratio**2, ratio**2), reaches, strict=True):
+        assert left.min() > -1e-6 and left.max() <= 1.001 * reach
+        assert left.sum() * step == pytest.approx(variance / 2, rel=0.01)
+        assert (left**2).sum() * step <= EVEN * reach * variance / 2
 
 
 @pytest.mark.parametrize("share", [0.31, 1.0, 1.9, 17.0])
@@ -137,16 +192,17 @@ def test_events_that_are_late_cost_as_much_of_tau() -> None:
         wanted = (1 + min(1, 2 * often)) * late_s / DISTANCE_TAU_S
         assert later(seen, late_s, np.ones(2)) == pytest.approx(wanted)
     assert later(seen, 1e-9, np.array([3.0, 9.0])) == pytest.approx(1e-6, rel=0.01)  # (no denser than `bunched`)
-    dense = scene(2, dense=7.0 * TRAVEL * THETA)
+    dense = scene(2, by_slope=near(7.0))
     assert later(dense, 1e-9, np.array([3.0, 9.0])) == pytest.approx(3e-6, rel=0.01)
     assert later(dense, 1e-9, np.array([20.0, 9.0])) == pytest.approx(8e-6, rel=0.01)
 
 
 def test_recordings_with_nothing_in_common_are_as_far_apart_as_their_events_are_dense() -> None:
-    seen = scene(2, dense=0.6 * TRAVEL * THETA, bend_at_turns=50.0)
-    assert unlike(seen, 0.0) == pytest.approx(1.6) and unlike(seen) == pytest.approx(3.2)
-    assert unlike(seen, 0.01) == pytest.approx(1.6 * (1 + 50.0 * 0.01 / TRAVEL))
-    assert unlike(seen, np.array([0.01, 5.0])) == pytest.approx(1.6 * (1 + 50.0 * 0.01 / TRAVEL))
+    seen = scene(2, by_slope=near(0.6), bend_at_turns=50.0)
+    assert seen.bunched == pytest.approx(1.6)
+    assert unlike(seen, 1.6, 0.0) == pytest.approx(1.6) and unlike(seen, 1.6) == pytest.approx(3.2)
+    assert unlike(seen, 1.5, 0.01) == pytest.approx(1.5 * (1 + 50.0 * 0.01 / TRAVEL))
+    assert unlike(seen, 1.6, np.array([0.01, 5.0])) == pytest.approx(1.6 * (1 + 50.0 * 0.01 / TRAVEL))
 
 
 def test_light_without_a_shading_is_apart_for_a_while_and_from_turns_on() -> None:
@@ -165,8 +221,12 @@ def test_light_without_a_shading_is_apart_for_a_while_and_from_turns_on() -> Non
 
 def test_of_scenes_in_which_nothing_moves_nothing_is_changed() -> None:
     still, error = scene(2, travel=0.0), np.ones(2)
-    assert off_by(still, error, echoes=True) == delayed(still, error, error, still.by_turns, stir_s2=1.0) == 0.0
-    assert later(still, 1.0, error) == unlike(still) == elsewhere(still) == 0.0
+    assert (
+        off_by(still, error, echoes=True)
+        == delayed(still, error, error, still.by_turns, left=Left(1.0, 1.0, 1.0))
+        == 0.0
+    )
+    assert later(still, 1.0, error) == unlike(still, 9.0) == elsewhere(still) == 0.0
 
 
 def test_noise_that_comes_or_goes_costs_half_an_event_each() -> None:

@@ -14,8 +14,9 @@ from against.clips import clean
 from vid2ev import load_sensor
 from vid2ev.bounds.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.errors import UsageError
+from vid2ev.physics.omission import crossings
 from vid2ev.plan.measure import Measure
-from vid2ev.stream import Frame
+from vid2ev.stream import Events, Frame
 from vid2ev.stream.still import Still, strip_count
 from vid2ev.upsample.stillness import still_strips
 
@@ -113,10 +114,66 @@ def test_no_more_travel_is_steep_than_is_said(dark: float, falls: bool) -> None:
 
 
 def test_dense_events_are_counted() -> None:
-    """On a ramp each event has 2 tau slope / theta others around it, as they weigh."""
-    frames = [Frame(np.full(SIZE[::-1], np.exp(30e-9 * t), np.float32), t) for t in range(0, 40_000_000, 1_000_000)]
-    scene = scene_of(clean(filter="after", dark_level=1e-12, threshold_on=0.02, threshold_off=0.02), SIZE, frames)
-    assert scene.bunched == pytest.approx(1 + 2 * 1e-3 * 30 / 0.02, rel=0.02)
+    """On a ramp events are a gap g apart, and D of them by itself is n / 2 coth(g / (2 tau))."""
+    frames = [
+        Frame(np.full(SIZE[::-1], np.exp(30e-9 * t - 8), np.float32), t) for t in range(0, 400_000_000, 1_000_000)
+    ]
+    plain = clean(filter="after", dark_level=1e-12, threshold_on=0.02, threshold_off=0.02)
+    blind = {"refractory": "track", "refractory_us": 500.0}
+    for more, gap_s in (({}, 0.02 / 30), (blind, 0.02 / 30 + 5e-4)):
+        bunched = scene_of(plain.model_copy(update=more), SIZE, frames).bunched
+        assert bunched == pytest.approx(1 / np.tanh(gap_s / 2e-3), rel=0.005), more  # (the first have none before)
+
+
+def near_each_other(events: Events, tau_us: float = 1000.0) -> float:
+    """The sum over all pairs of a pixel of exp(-|t - t'| / tau), for each event."""
+    pixels = events.y.astype(np.int64) * SIZE[0] + events.x
+    order = np.lexsort((events.t, pixels))
+    total = trace = 0.0
+    last, at = -1, 0
+    for t, pixel in zip(events.t[order].tolist(), pixels[order].tolist(), strict=True):
+        trace = trace * np.exp((at - t) / tau_us) if pixel == last else 0.0
+        total += 1.0 + 2.0 * trace
+        trace, last, at = trace + 1.0, pixel, t
+    return total / len(events)
+
+
+@pytest.mark.parametrize("way", ["before", "after"])
+@pytest.mark.parametrize("step", [0.05, 0.5])
+def test_events_are_as_near_each_other_as_those_of_a_sensor(way: str, step: float) -> None:
+    """Up and down, where several come in an interval and where few do."""
+    spec = clean(filter=way, random_phase=True, threshold_on=0.1, threshold_off=0.1)
+    frames = [Frame(frame.light, frame.t_ns // 8) for frame in walk(3, 60, step)]
+    found = near_each_other(sent(spec, SIZE, frames))
+    assert scene_of(spec, SIZE, frames).bunched == pytest.approx(found, rel=0.02) and found > 1.4
+
+
+def test_all_events_of_a_frame_are_at_its_end() -> None:
+    spec = clean(random_phase=True, threshold_on=0.1, threshold_off=0.1, timing="frame")
+    frames = walk(3, 60, 0.3)
+    found = near_each_other(sent(spec, SIZE, frames))
+    assert scene_of(spec, SIZE, frames).bunched == pytest.approx(found, rel=0.02) and found > 3
+
+
+@pytest.mark.parametrize("more", [{}, {"bandwidth": "light"}, {"follower_tau_us": 100.0}, {"filter": "after"}])
+def test_what_is_sent_at_least_is_that_of_the_signal_behind_the_poles(more: dict[str, Any]) -> None:
+    """Of poles that are much slower than the frames come it is not much less, either."""
+    spec = clean(random_phase=True, threshold_on=0.05, threshold_off=0.05, photoreceptor_tau_us=20_000, **more)
+    frames = walk(4, 100)
+    found, most = crossings(scene_of(spec, SIZE, frames)), scene_of(spec, SIZE, frames).events
+    assert 0.5 * len(sent(spec, SIZE, frames)) < found < len(sent(spec, SIZE, frames)) < 0.5 * most
+
+
+def test_times_are_those_since_a_shot_began() -> None:
+    """Light rises in two intervals of a shot, and the one after a cut; the ends of shots are turns, too."""
+    levels = [0.0, 0.0, 1.0, 1.0, 0.0, 2.0]
+    frames = [
+        Frame(np.full(SIZE[::-1], np.exp(y), np.float32), k * 10_000_000, cut=k == 4) for k, y in enumerate(levels)
+    ]
+    seen = scene_of(clean(filter="after"), SIZE, frames)
+    assert seen.longest_s == pytest.approx(0.03)
+    assert seen.pushed_when_s == pytest.approx((0.02 + 0.01) / 2, rel=0.15)  # (a shot begins in the midst of levels)
+    assert seen.turned_when_s == pytest.approx((0.03 + 0.01) / 2, rel=1e-6)
 
 
 def test_nothing_is_carried_across_a_cut() -> None:
@@ -180,7 +237,7 @@ def test_what_is_left_alone_while_it_is_still_is_measured_like_what_is_not(way: 
         both.append(scene_of(spec, SIZE, [Frame(light, f.t_ns) for light, f in zip(lights, still, strict=True)]))
     left, walked = map(fields, both)
     assert left["turns"].tobytes() == walked["turns"].tobytes() and left["turns"].sum() > 0
-    for name in ("travel", "pushed_s", "bend", "bend_at_turns", "dense", "by_pixel", "slope_max"):
+    for name in ("travel", "pushed_s", "bend", "bend_at_turns", "travel_at_least", "by_pixel", "slope_max"):
         assert left[name] == pytest.approx(walked[name], rel=2e-6), name
     for name in SPREAD:  # (what is beside an edge of two quarters may fall to either)
         assert left[name][1].sum() == pytest.approx(walked[name][1].sum(), rel=1e-5), name
@@ -255,7 +312,7 @@ def test_memories_that_jump_have_the_fewer_events() -> None:
     seen, plain = scene_of(spec, SIZE, frames), scene_of(spec.model_copy(update={"refractory_us": 0.0}), SIZE, frames)
     assert len(sent(spec, SIZE, frames)) == pytest.approx(seen.events, rel=0.02)
     assert seen.events == pytest.approx(plain.events * 0.2 / (0.2 + 0.005 * 30), rel=0.01)
-    assert not plain.by_stirs.any() and not plain.by_stirs_at_turns.any()
+    assert not plain.by_stirs.any() and not plain.by_strays_at_turns.any()
 
 
 def test_light_without_the_shading_is_measured_beside_that_with_it() -> None:

@@ -14,13 +14,14 @@ from vid2ev.bounds.chances import at_least, at_most, surely
 from vid2ev.bounds.distance import added, delayed, off_by, together, unlike
 from vid2ev.bounds.scene import Scene
 from vid2ev.errors import UsageError
-from vid2ev.physics.omission import light_events, noise_events
+from vid2ev.physics.leak import _off
+from vid2ev.physics.omission import by_itself, light_events, noise_events
 from vid2ev.physics.peaks import taken
 from vid2ev.physics.shading import shading_map
 from vid2ev.plan.plan import EFFECTS, Plan, plan_of
 from vid2ev.sensors.presets import load_sensor, preset_names
 from vid2ev.sensors.spec import DvsSpec
-from vid2ev.stream import Frame
+from vid2ev.stream import Events, Frame
 
 from .clips import clip, distance, sent, without
 from .measured import scene_of
@@ -242,8 +243,44 @@ def test_what_is_left_of_earlier_bends_is_counted_at_a_turn(left: float) -> None
 
 def test_recordings_with_nothing_in_common_are_no_further_apart_than_by_their_density() -> None:
     seen = scene("edge")
-    assert unlike(seen, 0.0) == pytest.approx(seen.bunched) and unlike(seen) == pytest.approx(2 * seen.bunched)
-    assert unlike(seen, 0.0) < unlike(seen, 1e-4) <= unlike(seen, 1.0) <= unlike(seen)
+    assert unlike(seen, 3.0, 0.0) == pytest.approx(3.0) and unlike(seen, 3.0) == pytest.approx(6.0)
+    assert unlike(seen, 3.0, 0.0) < unlike(seen, 3.0, 1e-4) <= unlike(seen, 3.0, 1.0) <= unlike(seen, 3.0)
+
+
+def test_a_recording_is_no_denser_than_light_and_blind_pixels_let_it_be() -> None:
+    """D of events that are each R after the last is n / 2 coth(R / (2 tau))."""
+    seen = scene("edge")
+    assert by_itself(seen, POLES) == seen.bunched > 1.2
+    for blind in ({"refractory_us": 3001.0}, {"frame_rate_hz": 1e6 / 3000}):
+        spec = POLES.model_copy(update=blind)
+        assert by_itself(seen, spec) == pytest.approx(1 / math.tanh(1.5)) and by_itself(seen, spec) < seen.bunched
+    events = Events(np.arange(0, 6_000_000, 3000), *(np.zeros(2000, kind) for kind in (np.uint16, np.uint16, np.uint8)))
+    assert distance(events, Events.empty(), (1, 1)) == pytest.approx(1 / math.tanh(1.5), rel=1e-3)
+
+
+def test_event_frames_bring_events_nearer_to_each_other() -> None:
+    """By times that are off by up to half a frame, at random."""
+    seen, rate_hz = scene("edge"), 10_000.0
+    x = np.random.default_rng(2).uniform(-0.5, 0.5, (2, 400_000)) / rate_hz * 1e3
+    nearer = np.exp(x[0] - x[1]).mean()
+    found = by_itself(seen, POLES.model_copy(update={"frame_rate_hz": rate_hz}))
+    assert found == pytest.approx(1 + nearer * (seen.bunched - 1), rel=1e-4) and nearer > 1.0005
+
+
+def test_a_leak_costs_by_the_time_that_levels_drift() -> None:
+    """Half of the clip if the light moves evenly, and no longer than to the next event of shot noise that is sure to
+    set both memories."""
+    size, frames = clip("sine")
+    bounds = {}
+    for rate_hz, blind_us in ((0.0, 0.0), (40.0, 0.0), (40.0, 100.0)):
+        spec = DvsSpec(**QUIET, leak_rate_hz=0.02, shot_rate_hz=rate_hz, refractory_us=blind_us)
+        bounds[rate_hz, blind_us] = _off(scene_of(spec, size, frames), spec)
+    seen = scene("sine")
+    plain = off_by(
+        seen, np.full(len(seen.travel), 0.02 * POLES.threshold_on * seen.seconds), echoes=False, one_way=True
+    )
+    assert bounds[0, 0] == pytest.approx(0.5 * plain, rel=0.1) and bounds[40, 100] == pytest.approx(bounds[0, 0])
+    assert bounds[40, 0] < 0.35 * bounds[0, 0]
 
 
 def test_laws_of_the_bounds() -> None:

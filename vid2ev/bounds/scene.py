@@ -44,11 +44,20 @@ still felt, twice (at t' and at t + R):
 
     2 (|dy/dt| / theta) integral |e| dt  =  r |dy/dt| variance / theta    (`by_stirs`: the sum over all bends so far)
 
+Where events are often felt by bends, what they leave goes both ways: it is 0 on average, as e is felt at t + R as it is
+at t', and so the sum of many goes no farther than the root of their squares.  Of poles by which a bend is rounded off
+within reach, that is  2 (|dy/dt| / theta) integral e^2 dt <= 0.54 r^2 |dy/dt| reach variance / theta   (`by_strays`:
+the root; 0.54 was found by trying all ratios of the poles).
+
 That phases are even is argued, not proven: from one event to the next their density changes by the slope at t' over
 that at t + R.  So what follows from it is an estimate, and nothing is left out by it.
 
-Of recordings that need have nothing in common D is at most that of either by itself (`unlike`): the events that are
-within tau of another in its pixel add up (`dense`), as many as |dy| there / theta.
+Of recordings that need have nothing in common D is at most that of either by itself (`unlike`): events that are near
+each other in a pixel add up,
+
+    2 D <= sum over all pairs exp(-|t - t'| / tau) = n + 2 sum of the traces that are left of the events before each
+
+which is counted of the events of one recording: the phases of its levels are spread evenly over the pixels (`bunched`).
 
 Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001; M. Krasnoselskii and A. Pokrovskii,
 *Systems with Hysteresis*, Springer 1989, for play and relays; the bounds are ours.
@@ -75,7 +84,6 @@ OF_TILES = (
     "bend",
     "bend_at_turns",
     "off_peaks",
-    "dense",
 )
 OF_BARE = ("bare_apart", "bare_frozen", "bare_travel")
 SPREAD = (
@@ -89,6 +97,9 @@ SPREAD = (
     "by_stirs",
     "by_stirs_before",
     "by_stirs_at_turns",
+    "by_strays",
+    "by_strays_before",
+    "by_strays_at_turns",
 )
 QUARTER_EDGES = np.arange(103 << 2, (143 << 2) + 1, dtype=np.int32)
 QUARTER_EDGES = np.left_shift(QUARTER_EDGES, 21).view(np.float32).astype(np.float64)
@@ -122,18 +133,20 @@ class Scene:
     """What a sensor sees of a clip: extremes and sums over all pixels, by tiles of 2048 pixels in row-major order.
 
     size, frames, seconds     width and height, and how much was measured; seconds without the intervals before cuts
-    shortest_s                the shortest of the intervals; infinite without any
+    shortest_s, longest_s     the shortest of the intervals, infinite without any; and the longest shot
     threshold                 that events are counted with [nat]: the lesser mean
     light_min, light_max      [tiles] of the light that arrives
     slope_max                 [tiles] greatest |dy/dt| of y = ln(light + dark) [nat/s]
     travel                    [tiles] sum |dp| [nat]: events expected, times the threshold
-    travel_at_least           [tiles] that of the play as wide as levels may be apart [nat]
+    travel_at_least           [tiles] that of the play as wide as levels may be apart, of the signal behind the first
+                              pole [nat]
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
+    pushed_when_s, turned_when_s   [tiles] the mean time of both since a shot began, 0 of none
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns and ends [nat/s]
     off_peaks                 [tiles] what the second pole takes from peaks, as often as there are levels in it [nat]
-    dense                     [tiles] travel x travel of the same pixel within tau [nat^2]
-    by_slope                  [2, quarters of octaves] travel, and travel x slope, by the slope there [nat/s]
+    by_slope                  [2, quarters of octaves] travel, and what its events have near them, by the slope there
+                              [nat/s]
     by_turns, by_bends, by_peaks   the same by the number of turns before it, by the sum of the bends at these, and of
                               what the second pole takes there [nat]; of travel that which counts if levels are no
                               longer the same
@@ -143,6 +156,7 @@ class Scene:
     by_stirs ...              of memories that jump to the signal, the same by what bends have left in them, the sum of
                               bend x slope / threshold [nat/ms^2]: by it times the time that a nat takes; of the travel
                               that counts by its sum at turns; and of the turns themselves
+    by_strays ...             the same by the root of the sum of bend^2 x slope / threshold [nat/ms^1.5]
     bare_apart, bare_frozen   [tiles] of light without the lens shading: |p_a - p_b| over the time that either is pushed
                               [nat s], and where either turns [nat]
     bare_travel               [tiles] its travel
@@ -157,6 +171,7 @@ class Scene:
     frames: int
     seconds: float
     shortest_s: float
+    longest_s: float
     threshold: float
     light_min: np.ndarray
     light_max: np.ndarray
@@ -165,10 +180,11 @@ class Scene:
     travel_at_least: np.ndarray
     pushed_s: np.ndarray
     turns: np.ndarray
+    pushed_when_s: np.ndarray
+    turned_when_s: np.ndarray
     bend: np.ndarray
     bend_at_turns: np.ndarray
     off_peaks: np.ndarray
-    dense: np.ndarray
     by_slope: np.ndarray
     by_turns: np.ndarray
     by_bends: np.ndarray
@@ -179,6 +195,9 @@ class Scene:
     by_stirs: np.ndarray
     by_stirs_before: np.ndarray
     by_stirs_at_turns: np.ndarray
+    by_strays: np.ndarray
+    by_strays_before: np.ndarray
+    by_strays_at_turns: np.ndarray
     bare_apart: np.ndarray
     bare_frozen: np.ndarray
     bare_travel: np.ndarray
@@ -207,7 +226,7 @@ class Scene:
     def bunched(self) -> float:
         """D of a recording by itself, for each half of an event: 1, and more where events follow each other within
         tau."""
-        return 1.0 + float(self.dense.sum()) / max(float(self.travel.sum()), 1e-300) / self.threshold
+        return 1.0 + float(self.by_slope[1].sum()) / max(float(self.travel.sum()), 1e-300)
 
     @property
     def still(self) -> bool:

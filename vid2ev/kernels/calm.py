@@ -12,7 +12,7 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
-from vid2ev.kernels.measured import BENDS, LIGHT, SEEN, SMOOTH, first_tau, left_of
+from vid2ev.kernels.measured import BEHIND, BENDS, LEVEL, LIGHT, SEEN, SMOOTH, TRACE, first_tau, left_of
 from vid2ev.kernels.scan import BRIGHTEST
 
 F = np.float32
@@ -62,12 +62,16 @@ def rest(light, told, shade, num, own, scratch, calm, owed):
 @inner
 def give(own, owed, num):
     """What the pixels of a strip are owed."""
-    left = left_of(owed[0], max(F(num.tau1_s), F(num.tau2_s)))
+    left1, left2 = left_of(owed[0], F(num.tau1_s)), left_of(owed[0], F(num.tau2_s))
+    traced = left_of(owed[0], F(num.tau_s))
     for i in range(STRIP):
         if len(num.by_light):
-            left = left_of(owed[0], max(first_tau(own[LIGHT * PITCH + i], num), F(num.tau2_s)))
-        own[BENDS * PITCH + i] *= left
+            left1 = left_of(owed[0], first_tau(own[LIGHT * PITCH + i], num))
+        here = own[LIGHT * PITCH + i] if num.before_log else own[LEVEL * PITCH + i]
+        own[BEHIND * PITCH + i] = here + (own[BEHIND * PITCH + i] - here) * left1
+        own[BENDS * PITCH + i] *= max(left1, left2)
         own[SMOOTH * PITCH + i] *= owed[1]
+        own[TRACE * PITCH + i] *= traced
     owed[0], owed[1] = F(0.0), F(1.0)
 
 

@@ -22,6 +22,7 @@ from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
 from vid2ev.kernels.measure_bare import Bare, beside, settle_bare
 from vid2ev.kernels.measured import (
     BEFORE,
+    BEHIND,
     BENDS,
     BENT,
     FELT,
@@ -29,6 +30,7 @@ from vid2ev.kernels.measured import (
     LEVEL,
     LIGHT,
     LIT,
+    PHASE,
     PLANES,
     PLAY,
     SEEN,
@@ -36,6 +38,8 @@ from vid2ev.kernels.measured import (
     SMOOTH,
     SMOOTHED,
     STEEPER,
+    TRACE,
+    TRACED,
     UNBENT,
     WAY,
     WIDE,
@@ -50,6 +54,7 @@ LEAST, MOST, STEEPEST = range(3)  # of a block; the rest are sums of `play`
 # A turn from slope r to -r' falls short by tau r' ln(1 + r/r') <= tau sqrt(r r'), where the reach is tau/e; and signals
 # are tau r exp(-t / tau) apart a time t after a bend.
 ROUNDED = F(2.7182818)
+GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over 0 ... 1
 
 
 class Pace(NamedTuple):
@@ -66,7 +71,7 @@ class Pace(NamedTuple):
     tracks       (0,) if pixels are blind for blind_s, and then their memories jump to the signal, else (): likewise
     smooth_s     time constant that slopes are smoothed with
     kept         what is left of a smoothed slope after the interval
-    tau_s        of the distance
+    tau_s        of the distance, and of the traces of events; traced: what is left of these after the interval
     at_once      whether all events of an interval come at its end
     """
 
@@ -87,6 +92,7 @@ class Pace(NamedTuple):
     smooth_s: float
     kept: float
     tau_s: float
+    traced: float
     at_once: bool
 
 
@@ -97,7 +103,7 @@ class Seen(NamedTuple):
     calm    uint8 [blocks, STRIPS]
     owed    float32 [blocks, STRIPS, 2], a time for bends [s], and a factor on smoothed slopes
     tiles   float64 [blocks, FIGURES]
-    spread  float64 [blocks, 5 or with memories that jump 8, QUARTERS, 2] (`measured`)
+    spread  float64 [blocks, BY_ALL or with memories that jump BY_JUMPS, QUARTERS, 2] (`measured`)
     bare    (Bare,) with a lens shading, else ()
     """
 
@@ -110,7 +116,7 @@ class Seen(NamedTuple):
 
 
 @compiled
-def settle_measure(light, shade, curve, halves, below, found):
+def settle_measure(light, shade, curve, halves, below, before_log, found):
     """Begin with a frame of light [float32, n]: the play of every pixel is pushed from below, and the wide one is so
     far below the signal [nat]."""
     state, tiles = found.state, found.tiles
@@ -122,8 +128,10 @@ def settle_measure(light, shade, curve, halves, below, found):
         at = (i // BLOCK) * PLANES * PITCH + i % BLOCK
         state[at + LIGHT * PITCH], state[at + LEVEL * PITCH] = seen, level
         state[at + PLAY * PITCH], state[at + WIDE * PITCH] = level - halves[i % BLOCK], level - F(below)
-        for plane in (SLOPE, WAY, BENDS, SMOOTH):
+        for plane in (SLOPE, WAY, BENDS, SMOOTH, TRACE):
             state[at + plane * PITCH] = F(0.0)
+        state[at + BEHIND * PITCH] = seen if before_log else level
+        state[at + PHASE * PITCH] = F(i * GOLDEN % 1.0)
     if len(found.bare):
         settle_bare(light, curve, halves, state, found.bare[0].state)
     found.calm[:] = CALM
@@ -166,7 +174,8 @@ def look(own, scratch, flagged, halves, n, curve, num):
     least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
     before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.kept)
     tau2, longest_back, longest_ahead = F(num.tau2_s), F(num.before_s), F(num.dt_s)
-    slow, keep = F(num.tau1_s), left_of(longest_ahead, max(F(num.tau1_s), tau2))
+    traced, slow, keep2 = F(num.traced), F(num.tau1_s), left_of(longest_ahead, tau2)
+    keep1 = left_of(longest_ahead, slow)
     for i in range(n):
         seen, old, slope0 = scratch[SEEN + i], own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
         level, level0 = log_level_32(seen, curve), own[LEVEL * PITCH + i]
@@ -178,7 +187,7 @@ def look(own, scratch, flagged, halves, n, curve, num):
             speed = abs(slope)
         if len(num.by_light):
             slow = first_tau(dimmer, num)
-            keep = left_of(longest_ahead, max(slow, tau2))
+            keep1 = left_of(longest_ahead, slow)
         back, ahead = min(slow + tau2, longest_back), min(F(4.0) * (slow + tau2), longest_ahead)
         near = max(min(old, min(old - slope0 * back, old + slope * ahead)), F(0.0))
         per = F(1.0) / light_per_nat_32(near, curve) if before_log else F(1.0)
@@ -186,10 +195,14 @@ def look(own, scratch, flagged, halves, n, curve, num):
         turned = min(bend, ROUNDED * np.sqrt(abs(slope * slope0)) * per)
         smooth, play, half = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i], halves[i]
         own[LIGHT * PITCH + i], own[SLOPE * PITCH + i] = seen, slope
-        own[BENDS * PITCH + i] = (bends + ROUNDED * bend) * keep
+        own[BENDS * PITCH + i] = (bends + ROUNDED * bend) * max(keep1, keep2)
+        ahead, late = (seen if before_log else level) - slope * slow, slow * slope - (old if before_log else level0)
+        own[BEHIND * PITCH + i] = ahead + (own[BEHIND * PITCH + i] + late) * keep1
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
         own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend
         scratch[UNBENT + i] = abs(slope0) * per
+        scratch[TRACED + i] = own[TRACE * PITCH + i]
+        own[TRACE * PITCH + i] = scratch[TRACED + i] * traced
         scratch[SMOOTHED + i] = smooth if num.smooth_s > 0.0 else slope
         scratch[LIT + i], scratch[IF_TURNED + i], scratch[FELT + i] = old, bends + turned, bends + bend
         if len(num.tracks):

@@ -10,28 +10,29 @@ from vid2ev.kernels.layout import PITCH
 from vid2ev.physics.elementary import expm1_32
 
 F = np.float32
-# Planes of the state of a block, in units of PITCH; the last two are of memories that jump to the signal.
+# Planes of the state of a block, in units of PITCH; the last four are of memories that jump to the signal.
 LIGHT, LEVEL, SLOPE, PLAY, WIDE, WAY, BENDS, TURNS, TURNED_BENDS, PEAKS, TRAVEL, SMOOTH = range(12)
-STIRS, STIRS_AT_TURNS = 12, 13
-PLANES = 14
+BEHIND, PHASE, TRACE, STIRS, STIRS_AT_TURNS, STRAYS, STRAYS_AT_TURNS = range(12, 19)
+PLANES = 19
 # Planes of the scratch: light now, light, level and smoothed slope before, bend, all bends as they count at a turn and
-# as they are felt, the slope before the bend, and the greater of those beside it.
-SEEN, LIT, BEFORE, SMOOTHED, BENT, IF_TURNED, FELT, UNBENT, STEEPER, BARE_BEFORE = (k * PITCH for k in range(10))
-SCRATCH = 10 * PITCH
+# as they are felt, the slope before the bend, the greater of those beside it, and the trace of the events before.
+SEEN, LIT, BEFORE, SMOOTHED, BENT, IF_TURNED, FELT, UNBENT, STEEPER, TRACED = (k * PITCH for k in range(10))
+BARE_BEFORE = 10 * PITCH
+SCRATCH = 11 * PITCH
 # Planes of the lanes: what is taken from a pixel, and what is found for it.
 AT_LEVEL, AT_PLAY, FROM, AT_SLOPE, AT_SMOOTH, AT_LIGHT, AT_LIT = (k * PITCH for k in range(7))
-AT_HALF, PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, BUNCHED = (k * PITCH for k in range(7, 16))
+AT_HALF, PUSHED, MOVED, GONE, SHARE, LOST, STEEP, DIMMEST, TOOK = (k * PITCH for k in range(7, 16))
 LANES = 16 * PITCH
 # Sums of a block, after its extremes.
-TRAVELLED, AT_LEAST, PUSHED_S, TURNED, BEND, TURN_BEND, OFF_PEAKS, DENSE = range(3, 11)
-FIGURES = 11
+TRAVELLED, AT_LEAST, PUSHED_S, TURNED, BEND, TURN_BEND, OFF_PEAKS = range(3, 10)
+FIGURES = 10
 # How travel is spread: sums of travel and of travel x number, by the number's quarter of an octave.
 BY_SLOPE, BY_TURNS, BY_BENDS, BY_PEAKS, BY_LIGHT, BY_FELT, BY_FELT_AT_TURNS = range(7)
-BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS = range(7, 10)
-BY_ALL, BY_JUMPS = 7, 10  # how many there are, without and with memories that jump
+BY_STIRS, BY_STIRS_BEFORE, BY_STIRS_AT_TURNS, BY_STRAYS, BY_STRAYS_BEFORE, BY_STRAYS_AT_TURNS = range(7, 13)
+BY_ALL, BY_JUMPS = 7, 13  # how many there are, without and with memories that jump
 QUARTERS, LOWEST = 160, (127 - 24) << 2  # from 2**-24, and all below, to 2**16, and all above; four to an octave
 OF_ONE = F(0.36787945)  # 1/e
-PER_MS2 = F(1e-6)  # of 1/s^2, so that sums are within the quarters
+PER_MS, PER_MS2 = F(1e-3), F(1e-6)  # of 1/s and 1/s^2, so that sums are within the quarters
 
 
 @inner
@@ -58,6 +59,12 @@ def reach_behind(tau1_s, tau2_s):
 def note(spread, of, number, counted):
     """Add a travel to the quarter of an octave that a number >= 0 has, of spread [..., QUARTERS, 2]: what is
     counted of it, and that times the number."""
+    note_both(spread, of, number, counted, counted * number)
+
+
+@inner
+def note_both(spread, of, number, counted, other):
+    """Add what is counted, and something other, to the quarter of an octave that a number >= 0 has."""
     quarter = np.uintp(min(max(np.int64(bits_32(number) >> np.int32(21)) - LOWEST, 0), QUARTERS - 1))
     spread[of, quarter, 0] += counted
-    spread[of, quarter, 1] += counted * number
+    spread[of, quarter, 1] += other

@@ -1,4 +1,4 @@
-"""How fast the signals of pixels go that are pushed, and how densely events come of it.
+"""How fast the signals of pixels go that are pushed.
 
 Behind one pole a signal is its light less `smooth_s` times the smoothed slope, exactly; that slope goes from what it
 was to the light's.  Of a short way the greatest slope is taken; a long one is cut into steps.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.kernels.bunched import sent_near
 from vid2ev.kernels.layout import PITCH
 from vid2ev.kernels.measured import (
     AT_HALF,
@@ -18,7 +19,6 @@ from vid2ev.kernels.measured import (
     AT_PLAY,
     AT_SLOPE,
     AT_SMOOTH,
-    BUNCHED,
     BY_LIGHT,
     BY_SLOPE,
     DIMMEST,
@@ -33,8 +33,10 @@ from vid2ev.kernels.measured import (
     SLOPE,
     SMOOTHED,
     STEEP,
+    TOOK,
     left_of,
     note,
+    note_both,
 )
 from vid2ev.physics.elementary import expm1_32, log32
 from vid2ev.physics.log_curve import light_per_nat_32
@@ -56,6 +58,7 @@ def push(count, curve, num, lanes):
         gone = abs(level - lanes[FROM + k])
         moved = abs(level - pushed * half - play) if pushed != F(0.0) else F(0.0)
         share = min(moved / max(gone, F(1e-30)), F(1.0))
+        lanes[TOOK + k] = share
         if len(num.tracks):
             sent = F(1.0) / (F(1.0) + gone * blind * weight)  # (events are theta + the blind time's way apart)
             moved, share = moved * sent, share * sent
@@ -67,7 +70,6 @@ def push(count, curve, num, lanes):
         near0, near = near_at(lit, fast0, curve, num), near_at(light, fast, curve, num)
         dimmest = min(lit, light)
         lanes[STEEP + k], lanes[DIMMEST + k] = steepest(fast0, near0, fast, near, dimmest, curve, num), dimmest
-        lanes[BUNCHED + k] = weight * bunched(gone, lanes[STEEP + k], slope, dimmest, curve, num)
 
 
 @inner
@@ -94,17 +96,6 @@ def steepest(fast0, near0, fast, near, dimmest, curve, num):
 
 
 @inner
-def bunched(gone, steep, slope, dimmest, curve, num):
-    """How far a signal goes within tau of an event at most [nat]: as the smoothed or the bare light does, the steeper
-    one, and no farther than it goes in the interval and those beside it."""
-    within = gone * F(1.0 + 2.0 * num.tau_s / num.dt_s)
-    if num.at_once:
-        return within
-    bare = abs(slope) / light_per_nat_32(dimmest, curve) if num.before_log else abs(slope)
-    return min(F(2.0 * num.tau_s) * max(steep, bare), within)
-
-
-@inner
 def apart(gone, half, num):
     """What two events that should be one cost at most, if between them there is a share of the gap from event to event
     and the rest to the next: 1 - exp(-gap / (2 tau)), at the least slope of an interval that goes so many nats."""
@@ -113,18 +104,18 @@ def apart(gone, half, num):
 
 
 @inner
-def paced(i, moved, gone, curve, num, own, spread, scratch):
+def paced(i, pushed, moved, gone, took_s, curve, num, own, spread, scratch):
     """Spread a long travel over the slopes of the smoothed signal in the interval, each as much as it goes at them: in
-    steps in each of which the bare light goes as many nats; returns the sum of travel x `bunched`."""
+    steps in each of which the bare light goes as many nats; its events come within a time."""
     slope, old, new = own[SLOPE * PITCH + i], scratch[LIT + i], own[LIGHT * PITCH + i]
     count = np.int64(min(gone / F(STEP_NAT), F(MOST_STEPS))) + 1
     per0, per1 = light_per_nat_32(old, curve), light_per_nat_32(new, curve)
     even = (num.before_log == False) | (abs(per1 - per0) < F(1e-3) * per0)  # noqa: E712
     times = F(1.0) + expm1_32(log32(per1 / per0) / F(count))
-    whole, dense = F(1e-30), 0.0
+    whole = F(1e-30)
     for turn in range(2):
         fast0, light0, per = scratch[SMOOTHED + i], old, per0
-        lit0, near0 = smoothed(old, fast0, num), near_at(old, fast0, curve, num)
+        lit0, near0, share0 = smoothed(old, fast0, num), near_at(old, fast0, curve, num), F(0.0)
         for step in range(1, count + 1):
             per *= times
             share = F(step) / F(count) if even else (per - per0) / (per1 - per0)
@@ -137,11 +128,10 @@ def paced(i, moved, gone, curve, num, own, spread, scratch):
             else:
                 part, dimmest = moved * way / whole, min(light, light0)
                 steep = steepest(fast0, near0, fast, near, dimmest, curve, num)
-                note(spread, BY_SLOPE, steep, part)
+                near_it = sent_near(i, pushed, part, (share - share0) * took_s, num, own, scratch)
+                note_both(spread, BY_SLOPE, steep, part, near_it)
                 note(spread, BY_LIGHT, dimmest, part)
-                dense += part * bunched(gone, steep, slope, dimmest, curve, num)
-            fast0, light0, lit0, near0 = fast, light, lit, near
-    return dense
+            fast0, light0, lit0, near0, share0 = fast, light, lit, near, share
 
 
 @inner

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import compiled, inner
+from vid2ev.kernels.bunched import left, sent_near
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measured import (
     AT_HALF,
@@ -21,10 +22,10 @@ from vid2ev.kernels.measured import (
     AT_SLOPE,
     AT_SMOOTH,
     BEFORE,
+    BEHIND,
     BEND,
     BENDS,
     BENT,
-    BUNCHED,
     BY_BENDS,
     BY_FELT,
     BY_FELT_AT_TURNS,
@@ -34,8 +35,10 @@ from vid2ev.kernels.measured import (
     BY_STIRS,
     BY_STIRS_AT_TURNS,
     BY_STIRS_BEFORE,
+    BY_STRAYS,
+    BY_STRAYS_AT_TURNS,
+    BY_STRAYS_BEFORE,
     BY_TURNS,
-    DENSE,
     DIMMEST,
     FELT,
     FROM,
@@ -48,6 +51,7 @@ from vid2ev.kernels.measured import (
     MOVED,
     OFF_PEAKS,
     PEAKS,
+    PER_MS,
     PER_MS2,
     PLANES,
     PLAY,
@@ -60,6 +64,10 @@ from vid2ev.kernels.measured import (
     STEEPER,
     STIRS,
     STIRS_AT_TURNS,
+    STRAYS,
+    STRAYS_AT_TURNS,
+    TOOK,
+    TRACED,
     TRAVEL,
     TRAVELLED,
     TURN_BEND,
@@ -71,9 +79,11 @@ from vid2ev.kernels.measured import (
     WIDE,
     first_tau,
     note,
+    note_both,
     reach_behind,
 )
 from vid2ev.kernels.pace import STEP_NAT, paced, push
+from vid2ev.physics.log_curve import log_level_32
 from vid2ev.physics.peaks import taken
 
 F = np.float32
@@ -95,7 +105,7 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     where it goes another way or none, a turn.
     """
     # (sums in numbers of their own: an entry of an array would go through memory each time)
-    travelled = at_least = pushed_s = turns = bends = turn_bends = off_peaks = dense = 0.0
+    travelled = at_least = pushed_s = turns = bends = turn_bends = off_peaks = 0.0
     mean, dt = F(num.half), num.dt_s
     for k in range(count):
         i, pushed, half = np.uintp(hits[k]), lanes[k + PUSHED], lanes[k + AT_HALF]
@@ -108,7 +118,9 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
         if felt > F(1.0):
             note(spread, BY_FELT, felt, weight * scratch[FELT + i])
         if len(num.tracks):
-            own[STIRS * PITCH + i] += PER_MS2 * bend * scratch[STEEPER + i] / (half + half)
+            stirs = PER_MS2 * bend * scratch[STEEPER + i] / (half + half)
+            own[STIRS * PITCH + i] += stirs
+            own[STRAYS * PITCH + i] += PER_MS * bend * stirs
         if way != F(0.0) and pushed != way:
             turned = weight * scratch[IF_TURNED + i]
             turns += weight
@@ -123,30 +135,38 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
             own[TURNED_BENDS * PITCH + i] += turned
             own[PEAKS * PITCH + i] += lower
             if len(num.tracks):
-                note(spread, BY_STIRS_AT_TURNS, own[STIRS * PITCH + i], mean + mean)
-                own[STIRS_AT_TURNS * PITCH + i] += own[STIRS * PITCH + i]
+                stirs, strays = own[STIRS * PITCH + i], np.sqrt(own[STRAYS * PITCH + i])
+                note(spread, BY_STIRS_AT_TURNS, stirs, mean + mean)
+                note(spread, BY_STRAYS_AT_TURNS, strays, mean + mean)
+                own[STIRS_AT_TURNS * PITCH + i] += stirs
+                own[STRAYS_AT_TURNS * PITCH + i] += strays
         own[WAY * PITCH + i] = pushed
+        at_least += widely(i, lanes[GONE + k], curve, num, own)
         if pushed == F(0.0):
             continue
         moved, gone, lost = lanes[MOVED + k], lanes[GONE + k], lanes[LOST + k]
         here_s = dt * lanes[SHARE + k]
         own[PLAY * PITCH + i] = own[LEVEL * PITCH + i] - pushed * half
         own[TRAVEL * PITCH + i] += moved
-        at_least += widely(i, half, gone, num, own)
         travelled += moved
         pushed_s += here_s
         note(spread, BY_TURNS, own[TURNS * PITCH + i], lost)
         note(spread, BY_BENDS, own[TURNED_BENDS * PITCH + i], lost)
         note(spread, BY_PEAKS, own[PEAKS * PITCH + i], lost)
         if len(num.tracks):
-            note(spread, BY_STIRS, F(own[STIRS * PITCH + i] * here_s / max(moved, F(1e-30))), moved)
+            per_nat = F(here_s / max(moved, F(1e-30)))
+            note(spread, BY_STIRS, own[STIRS * PITCH + i] * per_nat, moved)
+            note(spread, BY_STRAYS, np.sqrt(own[STRAYS * PITCH + i]) * per_nat, moved)
             note(spread, BY_STIRS_BEFORE, own[STIRS_AT_TURNS * PITCH + i], lost)
+            note(spread, BY_STRAYS_BEFORE, own[STRAYS_AT_TURNS * PITCH + i], lost)
+        took_s = F(0.0) if num.at_once else F(dt) if gone > F(STEP_NAT) else F(dt) * lanes[TOOK + k]
+        scratch[TRACED + i] = left(scratch[TRACED + i], F(dt) - took_s, num)
         if gone > F(STEP_NAT):
-            dense += weight * paced(i, moved, gone, curve, num, own, spread, scratch)
+            paced(i, pushed, moved, gone, took_s, curve, num, own, spread, scratch)
             continue
-        note(spread, BY_SLOPE, lanes[STEEP + k], moved)
+        near_it = sent_near(i, pushed, moved, took_s, num, own, scratch)
+        note_both(spread, BY_SLOPE, lanes[STEEP + k], moved, near_it)
         note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
-        dense += moved * lanes[BUNCHED + k]
     tile[TRAVELLED] += travelled
     tile[AT_LEAST] += at_least
     tile[PUSHED_S] += pushed_s
@@ -154,7 +174,6 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     tile[BEND] += bends
     tile[TURN_BEND] += turn_bends
     tile[OFF_PEAKS] += off_peaks
-    tile[DENSE] += dense
 
 
 @inner
@@ -199,16 +218,16 @@ def lowered(i, num, own, scratch):
 
 
 @inner
-def widely(i, half, gone, num, own):
-    """Push the wide play of a pixel by its play, as plays of plays are plays; returns by how much [nat]."""
-    wide = own[WIDE * PITCH + i]
-    ahead = own[PLAY * PITCH + i] - wide
-    pushed = F(max(abs(ahead) - (F(num.wide) - half), F(0.0)))
+def widely(i, gone, curve, num, own):
+    """Push the wide play of a pixel by the signal behind the first pole; returns by how much [nat]."""
+    wide, behind = own[WIDE * PITCH + i], own[BEHIND * PITCH + i]
+    ahead = (log_level_32(max(behind, F(0.0)), curve) if num.before_log else behind) - wide
+    pushed = F(max(abs(ahead) - F(num.wide), F(0.0)))
     own[WIDE * PITCH + i] = wide + (pushed if ahead > F(0.0) else -pushed)
-    pushed *= F(num.per_on) if ahead > F(0.0) else F(num.per_off)
+    sent = pushed * (F(num.per_on) if ahead > F(0.0) else F(num.per_off))
     if len(num.tracks):
-        pushed /= F(1.0) + gone * F(num.blind_s / (num.dt_s * 2.0 * num.half))
-    return pushed
+        sent /= F(1.0) + max(gone, pushed) * F(num.blind_s / (num.dt_s * 2.0 * num.half))
+    return sent
 
 
 @inner

@@ -25,7 +25,7 @@ from vid2ev.bounds.chances import at_most, surely
 from vid2ev.bounds.distance import added, together
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.compiling.compiler import compiled
-from vid2ev.physics.omission import kind_of, light_events, sent_share, trembling
+from vid2ev.physics.omission import by_itself, kind_of, light_events, noise_events, sent_share, trembling
 from vid2ev.physics.random import HOT_MAP, philox, unit
 
 
@@ -55,9 +55,10 @@ def omission_of_hot(scene: Scene, spec: Any) -> Omission:
     the other sign: the root of what both change is no more than the sum of the two.
     """
     extra = at_most(at_most(spec.hot_probability * scene.pixels) * spec.hot_rate_hz * scene.seconds)
-    share = added(light_events(scene, spec), extra, 0.0)
+    others = light_events(scene, spec) + noise_events(scene, spec.model_copy(update={"hot_probability": 0.0}))[0]
+    share = added(others, extra, 0.0)
     of_light = min(surely(scene, spec.hot_probability, sent_share(scene, spec), whole=True), 1.0)
-    of_light *= 0.0 if scene.still else 0.5 * scene.bunched
+    of_light *= 0.0 if scene.still else 0.5 * by_itself(scene, spec)
     distance = share + together(share * 2.0 * spec.hot_rate_hz * DISTANCE_TAU_S, of_light)
     figure = f"{spec.hot_probability * spec.hot_rate_hz:.3g} events/pixel/s"
     return Omission(distance, kind_of(spec), figure, f"{extra:.0f} events at most")
@@ -70,6 +71,6 @@ def omission_of_cold(scene: Scene, spec: Any) -> Omission:
     if noisy:
         share = max(share, at_most(spec.cold_probability * scene.pixels) / scene.pixels)
     share = min(share, 1.0)
-    bunched = max(scene.bunched, 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S, trembling(scene, spec)[1])
+    bunched = max(by_itself(scene, spec), 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S, trembling(scene, spec)[1])
     distance = 0.0 if scene.still and not noisy else share / (2.0 - share) * bunched
     return Omission(distance, "99.9 % bound", f"{spec.cold_probability:.3g} of the events", "silent pixels")

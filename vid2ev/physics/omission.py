@@ -107,12 +107,12 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def light_events(scene: Scene, spec: Any) -> float:
     """How many events of light there are at least, on average."""
-    return crossings(scene, spec) * (1.0 - unsent(scene, spec))
+    return crossings(scene) * (1.0 - unsent(scene, spec))
 
 
-def crossings(scene: Scene, spec: Any) -> float:
-    """How many crossings of light there are at least, on average."""
-    return max(float(scene.travel_at_least.sum()) / scene.threshold - _rounded(scene, spec), 0.0)
+def crossings(scene: Scene) -> float:
+    """How many crossings of light there are at least, on average; the second pole takes something from peaks."""
+    return max(float(scene.travel_at_least.sum() - 2.0 * scene.off_peaks.sum()) / scene.threshold, 0.0)
 
 
 def sent_share(scene: Scene, spec: Any) -> float:
@@ -134,8 +134,20 @@ def set_anew(scene: Scene, spec: Any, share: float) -> float:
     spread = spread_of(spec)
     in_step = max(_in_step(spec) - 1.0, 0.0) if spread > 0.0 else math.inf
     more = 1.0 + 0.5 * min(float(scene.turns.sum()) / scene.events, in_step)
-    each = unlike(scene) if unsent(scene, spec) > 0.0 else 1.0
-    return min(surely(scene, share * more * each, sent_share(scene, spec)), unlike(scene))
+    apart = unlike(scene, by_itself(scene, spec))
+    each = apart if unsent(scene, spec) > 0.0 else 1.0
+    return min(surely(scene, share * more * each, sent_share(scene, spec)), apart)
+
+
+def by_itself(scene: Scene, spec: Any) -> float:
+    """D of a recording by itself at most, for each half of an event: events are as dense as light makes them, and no
+    denser than a pixel that is blind for R after each, or sends one in each event frame: coth x, of x = R / (2 tau).
+    Times that are rounded to event frames are off by up to R / 2 each way: pairs are (sinh x / x)^2 times as near."""
+    frame_s = 1.0 / spec.frame_rate_hz if spec.frame_rate_hz > 0 else 0.0
+    blind, x = max(1e-6 * (spec.refractory_us - 1.0), frame_s) / DISTANCE_TAU_S, 0.5 * frame_s / DISTANCE_TAU_S
+    nearer = (math.sinh(x) / x) ** 2 if 0.0 < x < 100.0 else 1.0
+    dense = 1.0 + nearer * (scene.bunched - 1.0)
+    return min(dense, 1.0 / math.tanh(0.5 * blind)) if blind > 0.0 else dense
 
 
 def _in_step(spec: Any) -> float:
@@ -249,9 +261,11 @@ def omitted(
     why: str,
     replace: tuple[tuple[str, Any], ...] = (),
     lag_s: np.ndarray | float = 0.0,
+    dense: float | None = None,
 ) -> Omission:
     """The 99.9 % bound from one on the mean distance of events of light, which levels anywhere would make; infinite
-    where nothing is known but how dense events are.  Signals are no further apart than by lag_s.  Events of the leak
+    where nothing is known but how dense events are.  Signals are no further apart than by lag_s, and by themselves
+    recordings are as dense as the sensor's, or as is said.  Events of the leak
     and of the photoreceptor's noise are other ones, too, and those of noise that a pixel is blind to.
 
     Where memories jump to the signal, it is an estimate (`kind_of`), unless it is how dense events are that counts.
@@ -268,13 +282,15 @@ def omitted(
     if not many:  # (as of a single picture)
         return Omission(0.0, "99.9 % bound", figure, why, replace)
     share = many / (many + noise)
-    distance = max(unlike(scene, lag_s), trembling(scene, spec)[1]) * share
+    apart = unlike(scene, by_itself(scene, spec) if dense is None else dense, lag_s)
+    distance = max(apart, trembling(scene, spec)[1]) * share
     if not obstacle(spec) and math.isfinite(mean):
-        mean += 0.0 if spread else reset(scene, spec) * unlike(scene, lag_s)
+        mean += 0.0 if spread else reset(scene, spec) * apart
         sent = 1.0 - unsent(scene, spec)
         mean *= readout_shifts(scene, spec)
-        near = (mean + (1.0 - sent) * unlike(scene, lag_s)) * crowded
-        per_event = scene.events / max(sent * max(scene.events - _missing(scene, spec), 0.0) + noise, 1e-9)
+        near = (mean + (1.0 - sent) * apart) * crowded
+        least = max(scene.events - _missing(scene, spec), crossings(scene))
+        per_event = scene.events / max(sent * least + noise, 1e-9)
         if near * per_event < distance:
             return Omission(surely(scene, near) * per_event, kind_of(spec), figure, why, replace)
     return Omission(surely(scene, distance / share) * share, "99.9 % bound", figure, why, replace)

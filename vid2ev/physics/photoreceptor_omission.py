@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.bounds.chances import at_most
-from vid2ev.bounds.distance import PIXELS_DIFFER, delayed, later, steeper
+from vid2ev.bounds.distance import PIXELS_DIFFER, Left, delayed, later, steeper
 from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Omission, Scene
 from vid2ev.physics.log_curve import curve_of
 from vid2ev.physics.omission import echoes, late_noise, levels_between, omitted, tau_at, taus_of, tracks
@@ -44,7 +44,7 @@ def omission_of_follower(scene: Scene, spec: Any) -> Omission:
         scene.by_peaks,
         0.5 * tau2_s**2 * steeper(scene.by_felt, share),
         0.0,  # (of peaks that is counted)
-        tau2_s**2,
+        Left(tau2_s**2, _at_events(scene, _second_reach_s(1e-6 * tau_at(QUARTER_EDGES[:-1], spec), tau2_s)), 0.0),
     )
     return _delay_instead(scene, spec, left_out, 0.0, FOLLOWER_OFF)
 
@@ -53,6 +53,12 @@ def _reach_s(tau1_s: Any, tau2_s: float) -> Any:
     """E (D - E D)+ of two poles at most, or of one."""
     slower_s = np.maximum(tau1_s, tau2_s)
     return np.where(np.minimum(tau1_s, tau2_s) > 0.0, 0.5 * np.hypot(tau1_s, tau2_s), slower_s / math.e)
+
+
+def _second_reach_s(tau1_s: np.ndarray, tau2_s: float) -> np.ndarray:
+    """The same of the second pole behind the first (`peaks.second_reach`)."""
+    ratio = tau2_s / np.maximum(tau1_s, 1e-30)
+    return tau2_s * np.minimum(0.5 * ratio * np.maximum(1.0, 0.27 / np.sqrt(np.maximum(ratio, 1e-30))), 1.0 / math.e)
 
 
 def _rounded_off(scene: Scene, reach_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -70,14 +76,18 @@ def omission(scene: Scene, spec: Any) -> Omission:
     reach_s = _reach_s(slowest_s, tau2_s)
     usual_us, late_us = delay_at_events(scene, spec)
     late_us += _changing_us(scene, spec)
-    stir_s2 = float(variance_s2.max()) + _left_by_light(spec, slowest_s)
+    at_events_s = 1e-6 * tau_at(QUARTER_EDGES[:-1], spec)
     left_out = LeftOut(
         usual_us + spec.follower_tau_us,
         variance_s2,
         *_rounded_off(scene, reach_s),
         0.5 * float(variance_s2.max()) * steeper(scene.by_felt, 1.0),
         float(reach_s.max()) * steeper(scene.by_felt_at_turns, 1.0),
-        stir_s2,
+        Left(
+            _at_events(scene, at_events_s**2) + tau2_s**2,
+            _at_events(scene, _reach_s(at_events_s, tau2_s)),
+            _left_by_light(scene, spec),
+        ),
     )
     return _delay_instead(scene, spec, left_out, late_us, BOTH_OFF)
 
@@ -117,10 +127,10 @@ def _changing_us(scene: Scene, spec: Any) -> float:
 def _late(scene: Scene, spec: Any, late_us: float) -> float:
     """Bound on the mean distance where a first pole is faster or slower, by so much at the events on average."""
     _, slowest_s = (each * 1e-6 for each in taus_of(scene, spec))
-    stir_s2 = _left_by_light(spec, slowest_s)
+    left = Left(0.0, 0.0, _left_by_light(scene, spec))
     frozen_nat, after_turns = _rounded_off(scene, slowest_s / math.e)
     frozen_nat = frozen_nat * levels_between(2.0 * scene.slope_max * slowest_s / math.e, spec)
-    rounded = delayed(scene, 0.0 * slowest_s, frozen_nat, echoes(spec) * after_turns, stir_s2=stir_s2)
+    rounded = delayed(scene, 0.0 * slowest_s, frozen_nat, echoes(spec) * after_turns, left=left)
     return rounded + _at_other_times(scene, spec, late_us)
 
 
@@ -137,10 +147,17 @@ def lag_s(scene: Scene, spec: Any) -> np.ndarray:
     return np.asarray(4e-6 * (slowest_us + spec.follower_tau_us))
 
 
-def _left_by_light(spec: Any, slowest_s: np.ndarray) -> float:
+def _left_by_light(scene: Scene, spec: Any) -> float:
     """What a bend leaves in memories as the delay changes with light while the pixel is blind [s^2]."""
-    depends = spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0
-    return float(slowest_s.max()) * spec.refractory_us * 1e-6 if depends and tracks(spec) else 0.0
+    if spec.bandwidth != "light" or not tracks(spec):
+        return 0.0
+    return _at_events(scene, 1e-6 * tau_at(QUARTER_EDGES[:-1], spec)) * spec.refractory_us * 1e-6
+
+
+def _at_events(scene: Scene, at_light: np.ndarray) -> float:
+    """The mean, over all events of light, of what is so at each quarter of an octave of it."""
+    travel = scene.by_light[0]
+    return float(np.dot(at_light, travel)) / max(float(travel.sum()), 1e-300)
 
 
 def delay_at_events(scene: Scene, spec: Any, chosen_us: float | None = None) -> tuple[float, float]:
@@ -158,7 +175,7 @@ class LeftOut(NamedTuple):
     mean_us, variance_s2         of their delay, the variance [tiles]
     frozen_nat, after_turns      what signals differ by at turns, and the travel after that (`delayed`)
     steep_nat_s, steep_nat       likewise
-    stir_s2                      what a bend leaves in memories
+    left                         what a bend leaves in memories
     """
 
     mean_us: float
@@ -167,7 +184,7 @@ class LeftOut(NamedTuple):
     after_turns: np.ndarray
     steep_nat_s: float
     steep_nat: float
-    stir_s2: float
+    left: Left
 
 
 def _rounded_us(off_us: float, events: float) -> float:
@@ -191,7 +208,7 @@ def _delay_instead(scene: Scene, spec: Any, poles: LeftOut, late_us: float, off:
         echoes(spec) * poles.after_turns,
         steep_nat_s=poles.steep_nat_s,
         steep_nat=poles.steep_nat,
-        stir_s2=poles.stir_s2,
+        left=poles.left,
     )
     mean += _at_other_times(scene, spec, late_us) + 1e-6 * rounded_us / DISTANCE_TAU_S
     both = " of both poles" if off is BOTH_OFF and spec.follower_tau_us else ""

@@ -19,12 +19,13 @@ import math
 from dataclasses import replace
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.bounds.chances import at_most
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
-from vid2ev.physics.slopes import most_too_soon, slopes_of, steepest
+from vid2ev.physics.slopes import most_too_soon, slopes_at, slopes_of, steepest
 from vid2ev.physics.thresholds import soon
 
 
@@ -45,36 +46,47 @@ def omission(scene: Scene, spec: Any) -> Omission:
     slope = float(steepest(scene, spec).max())
     way = slope * spec.refractory_us * 1e-6
     figure = f"at most {way:.2g} nat in {spec.refractory_us:g} us"
+    any_other = omitted(scene, spec, math.inf, figure, "", dense=_always_open(scene, spec))
     if spec.refractory == "track":
-        return omitted(scene, spec, math.inf, figure, "the memory jumps to the signal when the period ends")
+        return replace(any_other, why="the memory jumps to the signal when the period ends")
     if spec.timing == "frame":
-        return omitted(scene, spec, math.inf, figure, "all events of a frame come at once")
+        return replace(any_other, why="all events of a frame come at once")
     if spec.photoreceptor_noise > 0:
-        return omitted(scene, spec, math.inf, figure, "events of noise may come at any time")
+        return replace(any_other, why="events of noise may come at any time")
     leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
-    most = 4.0 * (scene.bunched - 1.0) + 2.0  # others within tau
-    swallowed, cost = 0.0, 0.0  # travel [nat], and what it costs in units of an event that is missing
-    for slope, travel in zip(slopes_of(scene, spec), scene.by_slope[0], strict=True):
+    swallowed, costs = 0.0, np.zeros(2)  # travel [nat], and what it costs in units of an event that is missing
+    for slope, travel, near in zip(slopes_of(scene, spec), *scene.by_slope, strict=True):
         if travel > 0.0:
             chance, chance_again = soon(slope * spec.refractory_us * 1e-6 + leaked, spec)
             swallowed += chance * travel
-            cost += chance * travel * (1.0 + min(2.0 * DISTANCE_TAU_S * slope / scene.threshold, most) * chance_again)
+            evenly = 2.0 / math.expm1(min(scene.threshold / (slope * DISTANCE_TAU_S), 700.0))
+            costs += chance * (travel + chance_again * np.array([near, travel * evenly]))
     noise = _swallowed_with_noise(scene, spec)
     if noise == 0.0 and soon(way + leaked, spec)[0] == 0.0:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
     total = float(scene.travel.sum())
     why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
     why += f", and {noise:.2g} by noise" if noise else ""
-    together = cost / swallowed if swallowed else 1.0
+    together = float(costs.min()) / swallowed if swallowed else 1.0
     swallowed = min(swallowed, total * most_too_soon(scene, spec.refractory_us * 1e-6, spec))
     gone, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
     without = spec.model_copy(update={"refractory_us": 0.0})
-    both = crossings(scene, spec) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy
+    both = crossings(scene) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy
     rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
     dense = 1.0 + 2.0 * DISTANCE_TAU_S * rate_hz * min(rate_hz * spec.refractory_us * 1e-6, 1.0)
-    said = omitted(scene, spec, math.inf, figure, why)
     distance = (gone * together + noisy * dense) / max(both, 1e-9)
-    return replace(said, distance=float(min(distance, max(said.distance or 0.0, dense))))
+    return replace(any_other, distance=float(min(distance, max(any_other.distance or 0.0, dense))), why=why)
+
+
+def _always_open(scene: Scene, spec: Any) -> float:
+    """D of a recording by itself, for each half of an event, at most, of a pixel that is never blind: where memories
+    jump to the signal, `Scene.bunched` is for gaps of a threshold and the period, and there are fewer events by it."""
+    if spec.refractory != "track" or scene.still:
+        return scene.bunched
+    slopes = slopes_at(scene)
+    events = scene.by_slope[0] * (1.0 + spec.refractory_us * 1e-6 * slopes / scene.threshold)
+    near = 2.0 / np.expm1(np.minimum(scene.threshold / (slopes * DISTANCE_TAU_S), 700.0))
+    return max(1.0 + float(np.dot(events, near)) / float(events.sum()), scene.bunched)
 
 
 def _swallowed_with_noise(scene: Scene, spec: Any) -> float:

@@ -12,7 +12,19 @@ from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
 from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
-from vid2ev.kernels.measured import BY_ALL, BY_JUMPS, FIGURES, LANES, LIGHT, PLANES, QUARTERS, SCRATCH, TRAVEL
+from vid2ev.kernels.measured import (
+    BY_ALL,
+    BY_JUMPS,
+    FIGURES,
+    LANES,
+    LIGHT,
+    PLANES,
+    PUSHED_S,
+    QUARTERS,
+    SCRATCH,
+    TRAVEL,
+    TURNED,
+)
 from vid2ev.kernels.play import end_measure
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.log_curve import curve_of
@@ -25,14 +37,15 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import told_of
 
 BRIGHTNESS_EVERY = 8  # frames
+TIMED = [PUSHED_S, TURNED]
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 
 
 class Measure:
     """What a sensor of `size` (width, height) sees, measured while frames go by: `see` each, then ask for `scene`.
 
-    The light that is measured is that behind the sensor's lens shading.  Memory is 65 bytes a pixel, for a
-    shading 38 more, for memories that jump to the signal 4, and that of the last frame.  What frames say of what is
+    The light that is measured is that behind the sensor's lens shading.  Memory is 85 bytes a pixel, for a
+    shading 38 more, for memories that jump to the signal 8, and that of the last frame.  What frames say of what is
     still (`Frame.still`) is taken for granted where it is about the last one.  `threads` change nothing but the time it
     takes.
     """
@@ -62,6 +75,8 @@ class Measure:
         self._by_light = spec.bandwidth == "light" and self._tau1_s > 0
         self._blind_s = spec.refractory_us * 1e-6 if tracks(spec) else 0.0
         self._frames, self._ns, self._shortest_ns = 0, 0, math.inf
+        self._shot_ns, self._longest_ns = 0, 0
+        self._when = np.zeros((blocks, len(TIMED)))  # sums of figures times the time since the shot began [s]
         self._t_ns: int | None = None
         self._dt_s = math.inf
         self._pace: Pace | None = None  # of the last interval of a shot
@@ -76,13 +91,19 @@ class Measure:
             raise UsageError(f"frame time {frame.t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames")
         light = np.ascontiguousarray(frame.light, np.float32).reshape(-1)
         if self._t_ns is None or frame.cut:
-            self._end(self._found.tiles, self._found.spread)
+            self._when = self._end(self._found.tiles, self._found.spread)
             below = self._wide if self.spec.random_phase else 0.0
-            settle_measure(light, self._shade, self._curve, self._halves, below, self._found)
-            self._dt_s, self._pace = math.inf, None
+            settle_measure(
+                light, self._shade, self._curve, self._halves, below, self.spec.filter == "before", self._found
+            )
+            self._dt_s, self._pace, self._shot_ns = math.inf, None, 0
         else:
+            before = self._found.tiles[:, TIMED]
             self._advance(light, told_of([frame.still], [self._last])[0], (frame.t_ns - self._t_ns) * 1e-9)
             self._ns += frame.t_ns - self._t_ns
+            self._shot_ns += frame.t_ns - self._t_ns
+            self._longest_ns = max(self._longest_ns, self._shot_ns)
+            self._when += (self._found.tiles[:, TIMED] - before) * (self._shot_ns * 1e-9)
             self._shortest_ns = min(self._shortest_ns, frame.t_ns - self._t_ns)
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
@@ -91,13 +112,16 @@ class Measure:
     def scene(self) -> Scene:
         """What was seen so far."""
         travel, tiles, spread = self._plane(TRAVEL), self._found.tiles.copy(), self._found.spread.copy()
-        self._end(tiles, spread)
+        pushed_when_s, turned_when_s = (self._end(tiles, spread) / np.maximum(tiles[:, TIMED], 1e-300)).T
         bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
         return Scene(
             size=self.size,
             frames=self._frames,
             seconds=self._ns * 1e-9,
             shortest_s=self._shortest_ns * 1e-9,
+            longest_s=self._longest_ns * 1e-9,
+            pushed_when_s=pushed_when_s,
+            turned_when_s=turned_when_s,
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
@@ -109,10 +133,12 @@ class Measure:
             by_bare=_spread(bare.spread, 1)[0],
         )
 
-    def _end(self, tiles: np.ndarray, spread: np.ndarray) -> None:
-        """Add the end of a shot to the sums."""
+    def _end(self, tiles: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        """Add the end of a shot to the sums; returns those of figures and times."""
+        before = tiles[:, TIMED]
         if self._pace is not None:
             end_measure(self._pace, self._found.state, tiles, spread)
+        return self._when + (tiles[:, TIMED] - before) * (self._shot_ns * 1e-9)
 
     def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
@@ -134,6 +160,7 @@ class Measure:
             smooth_s=smooth_s,
             kept=math.exp(-dt_s / smooth_s) if smooth_s else 0.0,
             tau_s=DISTANCE_TAU_S,
+            traced=math.exp(-dt_s / DISTANCE_TAU_S),
             at_once=self.spec.timing == "frame",
         )
         self._cut.each_blocks(
