@@ -15,7 +15,7 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import PITCH
-from vid2ev.kernels.measured import PHASE, TRACE, TRACED
+from vid2ev.kernels.measured import PHASE, TRACED
 from vid2ev.physics.elementary import exp64
 
 F = np.float32
@@ -33,7 +33,7 @@ def left(trace, took_s, num):
 @inner
 def sent_near(i, pushed, moved, took_s, num, own, scratch):
     """Push a pixel one way, for a time, so that it travels `moved`; returns twice what its events come upon, in units
-    of travel [nat], and leaves the trace in the state, too."""
+    of travel [nat]."""
     per_event = 2.0 * num.half
     events, phase = np.float64(moved) / per_event, np.float64(own[PHASE * PITCH + i])
     at = phase + (events if pushed > F(0.0) else -events)
@@ -41,7 +41,6 @@ def sent_near(i, pushed, moved, took_s, num, own, scratch):
     own[PHASE * PITCH + i] = min(F(at - np.floor(at)), BELOW_1)
     if number < 1.0:
         scratch[TRACED + i] = left(scratch[TRACED + i], took_s, num)
-        own[TRACE * PITCH + i] = scratch[TRACED + i]
         return 0.0
     gap_s = np.float64(took_s) / events
     ahead_s = gap_s * ((1.0 - phase) if pushed > F(0.0) else phase)
@@ -56,5 +55,4 @@ def sent_near(i, pushed, moved, took_s, num, own, scratch):
         last = trace * exp64(-gap_s * (number - 1.0) / num.tau_s) + together
     rest_s = max(np.float64(took_s) - ahead_s - gap_s * (number - 1.0), 0.0)
     scratch[TRACED + i] = left(F(last), rest_s, num)
-    own[TRACE * PITCH + i] = scratch[TRACED + i]
     return 2.0 * per_event * found

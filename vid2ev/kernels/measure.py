@@ -71,7 +71,7 @@ class Pace(NamedTuple):
     tracks       (0,) if pixels are blind for blind_s, and then their memories jump to the signal, else (): likewise
     smooth_s     time constant that slopes are smoothed with
     kept         what is left of a smoothed slope after the interval
-    tau_s        of the distance, and of the traces of events; traced: what is left of these after the interval
+    tau_s        of the distance, and of the traces of events
     at_once      whether all events of an interval come at its end
     """
 
@@ -92,7 +92,6 @@ class Pace(NamedTuple):
     smooth_s: float
     kept: float
     tau_s: float
-    traced: float
     at_once: bool
 
 
@@ -174,8 +173,8 @@ def look(own, scratch, flagged, halves, n, curve, num):
     least, most, steepest = bits_32(F(1e30)), np.int32(0), np.int32(0)
     before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.kept)
     tau2, longest_back, longest_ahead = F(num.tau2_s), F(num.before_s), F(num.dt_s)
-    traced, slow, keep2 = F(num.traced), F(num.tau1_s), left_of(longest_ahead, tau2)
-    keep1 = left_of(longest_ahead, slow)
+    slow, traced = F(num.tau1_s), left_of(longest_ahead, F(num.tau_s))
+    keep1, keep2 = left_of(longest_ahead, slow), left_of(longest_ahead, tau2)
     for i in range(n):
         seen, old, slope0 = scratch[SEEN + i], own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
         level, level0 = log_level_32(seen, curve), own[LEVEL * PITCH + i]

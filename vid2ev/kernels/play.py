@@ -67,6 +67,7 @@ from vid2ev.kernels.measured import (
     STRAYS,
     STRAYS_AT_TURNS,
     TOOK,
+    TRACE,
     TRACED,
     TRAVEL,
     TRAVELLED,
@@ -163,10 +164,11 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
         scratch[TRACED + i] = left(scratch[TRACED + i], F(dt) - took_s, num)
         if gone > F(STEP_NAT):
             paced(i, pushed, moved, gone, took_s, curve, num, own, spread, scratch)
-            continue
-        near_it = sent_near(i, pushed, moved, took_s, num, own, scratch)
-        note_both(spread, BY_SLOPE, lanes[STEEP + k], moved, near_it)
-        note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
+        else:
+            near_it = sent_near(i, pushed, moved, took_s, num, own, scratch)
+            note_both(spread, BY_SLOPE, lanes[STEEP + k], moved, near_it)
+            note(spread, BY_LIGHT, lanes[DIMMEST + k], moved)
+        own[TRACE * PITCH + i] = scratch[TRACED + i]
     tile[TRAVELLED] += travelled
     tile[AT_LEAST] += at_least
     tile[PUSHED_S] += pushed_s

@@ -44,7 +44,7 @@ def omission_of_follower(scene: Scene, spec: Any) -> Omission:
         scene.by_peaks,
         0.5 * tau2_s**2 * steeper(scene.by_felt, share),
         0.0,  # (of peaks that is counted)
-        Left(tau2_s**2, _at_events(scene, _second_reach_s(1e-6 * tau_at(QUARTER_EDGES[:-1], spec), tau2_s)), 0.0),
+        Left(tau2_s**2, _at_events(scene, _second_reach_s(_taus_s(spec), tau2_s)), 0.0),
     )
     return _delay_instead(scene, spec, left_out, 0.0, FOLLOWER_OFF)
 
@@ -76,7 +76,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     reach_s = _reach_s(slowest_s, tau2_s)
     usual_us, late_us = delay_at_events(scene, spec)
     late_us += _changing_us(scene, spec)
-    at_events_s = 1e-6 * tau_at(QUARTER_EDGES[:-1], spec)
+    at_events_s = _taus_s(spec)
     left_out = LeftOut(
         usual_us + spec.follower_tau_us,
         variance_s2,
@@ -101,9 +101,8 @@ def omission_of_bandwidth(scene: Scene, spec: Any) -> Omission:
 
 def otherwise_late(scene: Scene, spec: Any, gains: tuple[float, ...]) -> float:
     """Bound on the mean distance where the first pole, whose bandwidth depends on light, sees light / gain."""
-    taus, edges, travel = tau_at(QUARTER_EDGES[:-1], spec), QUARTER_EDGES[:-1], scene.by_light[0]
-    changes = (np.dot(np.abs(tau_at(edges / gain, spec) - taus), travel) for gain in gains)
-    late_us = max(map(float, changes)) / max(float(travel.sum()), 1e-300)
+    taus, edges = tau_at(QUARTER_EDGES[:-1], spec), QUARTER_EDGES[:-1]
+    late_us = max(_at_events(scene, np.abs(tau_at(edges / gain, spec) - taus)) for gain in gains)
     return _late(scene, spec, late_us + _changing_us(scene, spec))
 
 
@@ -116,11 +115,11 @@ def _changing_us(scene: Scene, spec: Any) -> float:
     """
     if spec.bandwidth != "light" or scene.still:
         return 0.0
-    taus_s, light = 1e-6 * tau_at(QUARTER_EDGES[:-1], spec), scene.by_light[0]
-    seen = taus_s[light > 0.0]
+    taus_s = _taus_s(spec)
+    seen = taus_s[scene.by_light[0] > 0.0]
     floor = curve_of(spec.log_curve, spec.dark_level).floor
     slopes = np.minimum(slopes_at(scene) * max(floor / spec.bandwidth_dark, 1.0), 1.0 / seen.min())
-    fourth = float(np.dot(taus_s**4, light)) / float(light.sum())
+    fourth = _at_events(scene, taus_s**4)
     return 1e6 * math.sqrt(fourth * float(np.dot(slopes**2, scene.by_slope[0])) / float(scene.by_slope[0].sum()))
 
 
@@ -151,7 +150,12 @@ def _left_by_light(scene: Scene, spec: Any) -> float:
     """What a bend leaves in memories as the delay changes with light while the pixel is blind [s^2]."""
     if spec.bandwidth != "light" or not tracks(spec):
         return 0.0
-    return _at_events(scene, 1e-6 * tau_at(QUARTER_EDGES[:-1], spec)) * spec.refractory_us * 1e-6
+    return _at_events(scene, _taus_s(spec)) * spec.refractory_us * 1e-6
+
+
+def _taus_s(spec: Any) -> np.ndarray:
+    """Time constant of the first pole at each quarter of an octave of light [s]."""
+    return 1e-6 * tau_at(QUARTER_EDGES[:-1], spec)
 
 
 def _at_events(scene: Scene, at_light: np.ndarray) -> float:
@@ -166,7 +170,7 @@ def delay_at_events(scene: Scene, spec: Any, chosen_us: float | None = None) -> 
     taus, travel = tau_at(QUARTER_EDGES[:-1], spec), scene.by_light[0]
     if chosen_us is None:
         chosen_us = float(taus[np.searchsorted(np.cumsum(travel), 0.5 * travel.sum())])
-    return chosen_us, float(np.dot(np.abs(taus - chosen_us), travel)) / max(float(travel.sum()), 1e-300)
+    return chosen_us, _at_events(scene, np.abs(taus - chosen_us))
 
 
 class LeftOut(NamedTuple):

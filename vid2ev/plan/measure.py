@@ -103,7 +103,7 @@ class Measure:
             self._ns += frame.t_ns - self._t_ns
             self._shot_ns += frame.t_ns - self._t_ns
             self._longest_ns = max(self._longest_ns, self._shot_ns)
-            self._when += (self._found.tiles[:, TIMED] - before) * (self._shot_ns * 1e-9)
+            self._when += self._timed(self._found.tiles, before)
             self._shortest_ns = min(self._shortest_ns, frame.t_ns - self._t_ns)
         if self._frames % BRIGHTNESS_EVERY == 0:
             self._note_brightness(self._plane(LIGHT)[:, :BLOCK].reshape(-1)[: light.size : 16])
@@ -138,7 +138,11 @@ class Measure:
         before = tiles[:, TIMED]
         if self._pace is not None:
             end_measure(self._pace, self._found.state, tiles, spread)
-        return self._when + (tiles[:, TIMED] - before) * (self._shot_ns * 1e-9)
+        return self._when + self._timed(tiles, before)
+
+    def _timed(self, tiles: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """What came to figures since then, times the time since the shot began."""
+        return (tiles[:, TIMED] - before) * (self._shot_ns * 1e-9)
 
     def _advance(self, light: np.ndarray, told: np.ndarray, dt_s: float) -> None:
         smooth_s = 0.0 if self._by_light else max(self._tau1_s, self._tau2_s)
@@ -160,7 +164,6 @@ class Measure:
             smooth_s=smooth_s,
             kept=math.exp(-dt_s / smooth_s) if smooth_s else 0.0,
             tau_s=DISTANCE_TAU_S,
-            traced=math.exp(-dt_s / DISTANCE_TAU_S),
             at_once=self.spec.timing == "frame",
         )
         self._cut.each_blocks(
