@@ -52,7 +52,7 @@ trajectory = {{ kind = "fixed", position_m = [0, 0, 5] }}
 [[objects]]
 name = "ball"
 kind = "sphere"
-size_m = 0.42
+size_m = 0.6
 texture = "gravel"
 trajectory = [
     {{ kind = "straight", at_s = 0.25, position_m = [0, 0, 3.5], velocity_m_s = [0.8, 0.1, 0] }},

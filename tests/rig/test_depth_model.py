@@ -80,3 +80,24 @@ def test_what_a_model_needs_is_said(folder: Path, tmp_path: Path, monkeypatch) -
         with pytest.raises(DataError, match="cannot be loaded") as caught:
             open_depth(f"model:{name}", SOURCE, scale=1)
         assert "\n" not in str(caught.value)
+
+
+def test_a_name_that_nobody_has_is_asked_for_once(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    import huggingface_hub
+
+    asked = []
+
+    def model_info(_: object, name: str, timeout: float) -> None:
+        asked.append((name, timeout <= 10))
+        raise OSError("no network")
+
+    monkeypatch.setattr(huggingface_hub.HfApi, "model_info", model_info)
+    monkeypatch.setattr(transformers.AutoImageProcessor, "from_pretrained", _of_folders_alone)
+    with pytest.raises(DataError, match=r"model:nobody/nothing cannot be loaded \(no network\)"):
+        open_depth("model:nobody/nothing", SOURCE, scale=1)
+    assert asked == [("nobody/nothing", True)]
+
+
+def _of_folders_alone(name: str, local_files_only: bool, **_: object) -> None:
+    assert local_files_only, "asked the hub before it was known that it has the model"
+    raise OSError(f"{name} is not here")

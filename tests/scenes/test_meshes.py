@@ -14,6 +14,7 @@ from vid2ev.scenes.lens import rays_of_pixels
 from vid2ev.scenes.mesh_files import load_mesh
 from vid2ev.scenes.render import render
 from vid2ev.scenes.snapshot import Lamp, Mesh, Shape, Snapshot, Surface, Thing
+from vid2ev.scenes.world import World
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh reads meshes")
 CAMERA = Intrinsics.of_field((64, 48), 60)
@@ -49,6 +50,26 @@ def test_the_hierarchy_finds_the_nearest_triangle(count):
     for pose in (Pose.of((10, 20, 30), (0, 0, 5)), Pose.of((50, 0, 0), (0.1, 0, 0))):  # from outside and from within
         picture = seen(Thing("it", Shape("mesh", mesh=mesh), pose=pose))
         np.testing.assert_allclose(picture.depth, tried_all(mesh, pose, CAMERA), rtol=1e-5)
+
+
+def test_a_vertex_that_no_triangle_has_is_no_part_of_a_mesh(tmp_path):
+    spots = np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0], [50, 60, 70]], float)
+    lone, own = Mesh(spots, np.array([[0, 1, 2]])), Mesh(spots[:3], np.array([[0, 1, 2]]))
+    np.testing.assert_array_equal(lone.size_m, own.size_m)
+    np.testing.assert_array_equal(lone.ball[0], own.ball[0])
+    assert lone.ball[1] == own.ball[1]
+    places = []
+    for name, count in (("lone", 4), ("own", 3)):
+        lines = [f"v {x} {y} {z}" for x, y, z in spots[:count]] + ["f 1 2 3"]
+        (tmp_path / f"{name}.obj").write_text("\n".join(lines))
+        (tmp_path / f"{name}.toml").write_text(
+            f'[[objects]]\nname = "it"\nkind = "mesh"\nfile = "{name}.obj"\nsize_m = 3\n'
+            'trajectory = { kind = "fixed", position_m = [0, 0, 5] }\n'
+        )
+        shape = World.of(tmp_path / f"{name}.toml").snapshot(0).things[0].shape
+        places.append(shape.mesh.vertices[shape.mesh.triangles])
+    np.testing.assert_array_equal(*places)
+    assert np.ptp(places[0].reshape(-1, 3), axis=0).max() == 3
 
 
 def test_of_several_meshes_the_nearest_triangle_of_all_is_seen():

@@ -20,9 +20,8 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.bounds.chances import surely
-from vid2ev.bounds.distance import unlike
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
-from vid2ev.physics.omission import by_itself, late_noise, readout_shifts
+from vid2ev.physics.omission import apart_at_most, late_noise, readout_shifts
 from vid2ev.stream.events import Events
 from vid2ev.stream.saved import events_of
 
@@ -38,7 +37,7 @@ class Delay(BaseModel, frozen=True, extra="forbid"):
 def omission(scene: Scene, spec: Any) -> Omission:
     """The delay: that of a pair of events costs no more than its share of tau, and those near it as much again."""
     share = spec.delay_us * 1e-6 / DISTANCE_TAU_S * readout_shifts(scene, spec)
-    apart = unlike(scene, by_itself(scene, spec))
+    apart = apart_at_most(scene, spec)
     distance = surely(scene, min(1.0, share) * apart) + late_noise(scene, spec, spec.delay_us)
     why = "all times are later; never left out"
     return Omission(distance, "99.9 % bound", f"{spec.delay_us:g} us", why)

@@ -134,7 +134,7 @@ def set_anew(scene: Scene, spec: Any, share: float) -> float:
     spread = spread_of(spec)
     in_step = max(_in_step(spec) - 1.0, 0.0) if spread > 0.0 else math.inf
     more = 1.0 + 0.5 * min(float(scene.turns.sum()) / scene.events, in_step)
-    apart = unlike(scene, by_itself(scene, spec))
+    apart = apart_at_most(scene, spec)
     each = apart if unsent(scene, spec) > 0.0 else 1.0
     return min(surely(scene, share * more * each, sent_share(scene, spec)), apart)
 
@@ -148,6 +148,11 @@ def by_itself(scene: Scene, spec: Any) -> float:
     nearer = (math.sinh(x) / x) ** 2 if 0.0 < x < 100.0 else 1.0
     dense = 1.0 + nearer * (scene.bunched - 1.0)
     return min(dense, 1.0 / math.tanh(0.5 * blind)) if blind > 0.0 else dense
+
+
+def apart_at_most(scene: Scene, spec: Any, lag_s: np.ndarray | float = math.inf) -> float:
+    """Bound on the mean distance of two recordings of a sensor, whatever becomes of the levels (`unlike`)."""
+    return unlike(scene, by_itself(scene, spec), lag_s)
 
 
 def _in_step(spec: Any) -> float:
@@ -282,7 +287,7 @@ def omitted(
     if not many:  # (as of a single picture)
         return Omission(0.0, "99.9 % bound", figure, why, replace)
     share = many / (many + noise)
-    apart = unlike(scene, by_itself(scene, spec) if dense is None else dense, lag_s)
+    apart = apart_at_most(scene, spec, lag_s) if dense is None else unlike(scene, dense, lag_s)
     distance = max(apart, trembling(scene, spec)[1]) * share
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * apart

@@ -35,11 +35,11 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from vid2ev.bounds.chances import surely
-from vid2ev.bounds.distance import added, unlike
+from vid2ev.bounds.distance import added
 from vid2ev.bounds.scene import Omission, Scene
 from vid2ev.compiling.compiler import compiled, inlined
 from vid2ev.physics.elementary import exp64, log64
-from vid2ev.physics.omission import by_itself, light_events, trembling
+from vid2ev.physics.omission import apart_at_most, light_events, trembling
 from vid2ev.physics.photoreceptor import step_weights
 from vid2ev.physics.random import PHOTORECEPTOR, RICE, normal_pair, philox, unit
 
@@ -127,8 +127,6 @@ def omission(scene: Scene, spec: Any) -> Omission:
     """The noise: events come where it spans a threshold (`omission.trembling`); all others move."""
     extra, bunched = trembling(scene, spec)
     rate_hz = extra / max(scene.pixels * scene.seconds, 1e-9)
-    distance = (
-        surely(scene, unlike(scene, by_itself(scene, spec))) + added(light_events(scene, spec), extra, 0.0) * bunched
-    )
+    distance = surely(scene, apart_at_most(scene, spec)) + added(light_events(scene, spec), extra, 0.0) * bunched
     why = f"{extra:.0f} events at most, and all others move by noise over slope"
     return Omission(distance, "99.9 % bound", f"{rate_hz:.3g} events/pixel/s", why)

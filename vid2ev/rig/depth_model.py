@@ -17,6 +17,7 @@ Source: L. Yang et al., "Depth Anything V2", NeurIPS 2024; the checkpoint named 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from vid2ev.untrusted import first_line
 
 EXAMPLE = "depth-anything/Depth-Anything-V2-Small-hf"
 METRIC = ("zoedepth", "glpn", "depth_pro")
+PATIENCE_S = 10.0  # for the hub to say whether it has a model
 
 
 class ModelDepth:
@@ -82,16 +84,36 @@ def is_metric(config: Any) -> bool:
 
 
 def _loaded(name: str) -> tuple[Any, Any]:
+    """(processor, model): of a folder, of what was downloaded before, or of the hub, which is first asked for it once.
+
+    What transformers asks by itself it asks again and again, for minutes where there is no network.
+    """
     try:
-        from transformers import AutoImageProcessor, AutoModelForDepthEstimation
+        from huggingface_hub import HfApi
         from transformers.utils.logging import disable_progress_bar
     except ImportError as error:
         raise UsageError(f"model:{name} needs a package that is not installed; pip install 'vid2ev[depth]'") from error
     disable_progress_bar()  # (of weights that are read from disk within a second)
     try:
-        processor = AutoImageProcessor.from_pretrained(name, backend="pil")
-        model = AutoModelForDepthEstimation.from_pretrained(name, use_safetensors=True)  # (other files can run code)
+        try:
+            return _of_pretrained(name, local_files_only=True)
+        except Exception:
+            if Path(name).is_dir():
+                raise
+        HfApi().model_info(name, timeout=PATIENCE_S)
+        return _of_pretrained(name)
     except Exception as error:  # (of the hub, of JSON, of safetensors, of configurations)
         said = first_line(error, None)
         raise DataError(f"model:{name} cannot be loaded ({said}); give a folder or a name, as {EXAMPLE}") from error
+
+
+def _of_pretrained(name: str, local_files_only: bool = False) -> tuple[Any, Any]:
+    from transformers import AutoImageProcessor, AutoModelForDepthEstimation
+
+    processor = AutoImageProcessor.from_pretrained(name, backend="pil", local_files_only=local_files_only)
+    model = AutoModelForDepthEstimation.from_pretrained(
+        name,
+        local_files_only=local_files_only,
+        use_safetensors=True,  # (other files can run code)
+    )
     return processor, model.eval()

@@ -252,7 +252,7 @@ def _corners(thing: Thing) -> np.ndarray:
     mesh = thing.shape.mesh
     if mesh is None:
         return OUTERMOST[thing.shape.kind] * thing.shape.size_m
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    low, high = mesh.box
     return (low + high) / 2 + CORNERS * (high - low)
 
 

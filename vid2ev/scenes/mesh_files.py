@@ -48,7 +48,7 @@ def load_mesh(path: Path | str) -> Mesh:
         raise DataError(f"{path}: holds no triangles; export it anew as a mesh with faces")
     mesh = parts[0] if len(parts) == 1 else _joined(parts)
     if not mesh.size_m.max() > 0:
-        raise DataError(f"{path}: all vertices are in one place; export it anew with its size")
+        raise DataError(f"{path}: all its triangles are in one place; export it anew with its size")
     return mesh
 
 

@@ -118,15 +118,21 @@ class Mesh:
         if not np.isfinite(self.vertices).all():
             raise UsageError("vertices of a mesh must be finite numbers")
 
+    @cached_property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the greatest x, y, z [3] of its triangles; vertices of none do not count."""
+        spots = self.vertices[self.triangles.reshape(-1)]
+        return spots.min(axis=0), spots.max(axis=0)
+
     @property
     def size_m(self) -> np.ndarray:
         """The full extents [3]."""
-        return np.ptp(self.vertices, axis=0)
+        return self.box[1] - self.box[0]
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
         """The centre [3] and radius of a ball around it."""
-        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        low, high = self.box
         return (low + high) / 2, float(np.linalg.norm(high - low)) / 2
 
     @cached_property

@@ -173,7 +173,7 @@ def _lit(surface: Surface, emission: float) -> Surface:
 
 def _sized(mesh: Mesh, longest_m: float) -> Mesh:
     """The mesh around its middle, its longest side so long."""
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    low, high = mesh.box
     scale = longest_m / max(float((high - low).max()), 1e-12)
     vertices = (mesh.vertices - (low + high) / 2) * scale
     return Mesh(vertices, mesh.triangles, mesh.uv, mesh.normals, mesh.colours, mesh.texture)
