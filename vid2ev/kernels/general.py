@@ -37,8 +37,10 @@ from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import CAPPED, HIGH, INPUT, LOW, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.kernels.sink import put, room
-from vid2ev.physics.log_curve import Curve, log_level, log_slope
+from vid2ev.physics.elementary import expm1_64
+from vid2ev.physics.log_curve import Curve, light_at, log_level, log_slope
 from vid2ev.physics.photoreceptor import (
+    bracketed,
     response,
     response_slope,
     response_terms,
@@ -48,6 +50,7 @@ from vid2ev.physics.photoreceptor import (
 from vid2ev.physics.photoreceptor_noise import fresh_share, rice_expected, rice_gap, rice_words
 from vid2ev.physics.random import unit
 
+ENOUGH = 1e-4  # last step, in units of the faster time constant or of how the slope changes: what is left is its cube
 KNOTS = 8  # room for the ends of the pieces: three of the response, each cut once at most
 
 
@@ -108,13 +111,21 @@ def value(path, s):
 
 
 @inner
-def slope(path, s):
-    """dF/ds [nat per interval]."""
-    d = response_slope(s, path.rise, path.c1, path.c2, path.a, path.b)
-    if path.light:
-        y = response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
-        d *= log_slope(max(y, 0.0), path.curve)
-    return d + path.drift
+def response_and_bend(path, s):
+    """y(s) and its first two derivatives."""
+    m1, m2 = expm1_64(-path.a * s), expm1_64(-path.b * s)
+    k1, k2 = path.a * path.c1 * (1.0 + m1), path.b * path.c2 * (1.0 + m2)
+    y = path.y0 + (path.rise * s + (path.c1 * m1 + path.c2 * m2))
+    return y, path.rise - k1 - k2, path.a * k1 + path.b * k2
+
+
+@inner
+def slope_and_bend(path, s):
+    """dF/ds [nat per interval] of light, and the derivative of that."""
+    y, rate, bend = response_and_bend(path, s)
+    per_light = log_slope(max(y, 0.0), path.curve)
+    rate *= per_light
+    return rate + path.drift, bend * per_light - (0.0 if y < path.curve.knee else rate * rate)
 
 
 @inner
@@ -132,15 +143,9 @@ def knots_of(path, knots):
     n, start = 0, 0.0
     for end in (first, second, 1.0):
         if path.light and path.drift != 0.0:
-            lo, hi, rising = start, end, slope(path, start) > 0.0
-            if (slope(path, end) > 0.0) != rising:
-                for _ in range(50):
-                    middle = 0.5 * (lo + hi)
-                    if (slope(path, middle) > 0.0) == rising:
-                        lo = middle
-                    else:
-                        hi = middle
-                knots[n] = 0.5 * (lo + hi)
+            at_start, at_end = slope_and_bend(path, start)[0], slope_and_bend(path, end)[0]
+            if (at_end > 0.0) != (at_start > 0.0):
+                knots[n] = level_at(path, start, end, at_start, at_end)
                 n += 1
         knots[n] = end
         n += 1
@@ -150,23 +155,57 @@ def knots_of(path, knots):
 
 
 @inner
-def reach(path, level, lo, hi, up):
-    """Where F reaches a level between lo and hi, a monotone piece whose end is at or beyond it."""
-    if (value(path, lo) >= level) == up:
-        return lo
-    s = 0.5 * (lo + hi)
-    for k in range(80):
-        f = value(path, s) - level
-        if (f < 0.0) == up:
+def level_at(path, lo, hi, at_lo, at_hi):
+    """Where dF/ds, which has other signs at lo and at hi, is 0."""
+    s, step, enough = lo + (hi - lo) * at_lo / (at_lo - at_hi), hi - lo, 1e-8 / max(1.0, max(path.a, path.b))
+    for _ in range(60):
+        rate, bend = slope_and_bend(path, s)
+        if (rate > 0.0) == (at_lo > 0.0):
             lo = s
         else:
             hi = s
-        newton = s - f / slope(path, s)
-        here = newton if (newton > lo) & (newton < hi) & (k % 3 != 2) else 0.5 * (lo + hi)
-        if abs(here - s) < 1e-13 or hi - lo < 1e-13:
-            return here
-        s = here
+        here = bracketed(s - rate / bend, s, lo, hi, step)
+        step, s = abs(here - s), here
+        if step < enough:
+            break
     return s
+
+
+@inner
+def reach(path, level, lo, hi, begin, end, up):
+    """Where F reaches a level between lo and hi, a monotone piece: from `begin` to `end`, which is at or beyond it.
+
+    Bracketed steps of Halley's method from the chord's root, in the filter's domain: light is nearer to a straight
+    line and an exponential there than its log.
+    """
+    if (begin >= level) == up:
+        return lo
+    s, step, fastest = lo + (hi - lo) * min((level - begin) / (end - begin), 1.0), hi - lo, max(path.a, path.b)
+    for _ in range(80):
+        ahead, rate, bend = ahead_of(path, level, s)
+        if (ahead < 0.0) == up:
+            lo = s
+        else:
+            hi = s
+        there = s - (ahead * rate) / (rate * rate - 0.5 * ahead * bend)
+        here = bracketed(there, s, lo, hi, step)
+        step, s = abs(here - s), here
+        near = (here == there) & (step * max(max(1.0, abs(bend / rate)), fastest) < ENOUGH)
+        if near | (step < 1e-13):
+            return here
+    return s
+
+
+@inner
+def ahead_of(path, level, s):
+    """How far y(s) is above what makes a level [nat] of F there, and the first two derivatives of that; the drift is so
+    slow that it hardly bends."""
+    y, rate, bend = response_and_bend(path, s)
+    there, drift = level - path.base - path.drift * s, path.drift
+    if path.light:
+        there = light_at(there, path.curve)
+        drift /= log_slope(max(there, 0.0), path.curve)
+    return y - there, rate + drift, bend
 
 
 @inner
@@ -217,7 +256,7 @@ def walk_pixel(
     on = lanes[AT] + lanes[LEVEL_ON] if good else np.inf
     off = lanes[AT] - lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
-    piece, s, solved, candidate = 0, 0.0, 0, 0
+    piece, s, begin, solved, candidate = 0, 0.0, value(path, 0.0), 0, 0
     blind_until = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
     if len(flags.track) and good:
         blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
@@ -234,12 +273,12 @@ def walk_pixel(
         if not blind and (end >= on or end <= off):
             up = end >= on
             at = on if up else off
-            here = stop if num.frame_time else reach(path, at, s, stop, up)
+            here = stop if num.frame_time else reach(path, at, s, stop, begin, end, up)
             solved += 1
             if solved > num.max_crossings:
                 tally[CAPPED] += 1
                 here, at = stop, end
-            s = here
+            s, begin = here, at
             on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
             if len(flags.track):
                 blind_until = s + num.refractory_ns / iv.dt_ns
@@ -247,7 +286,7 @@ def walk_pixel(
                 candidate += 1
                 rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
             continue
-        s = stop
+        s, begin = stop, end
         if stop == blind_s:
             pixels[0], lanes[AT] = pixel, end
             fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)

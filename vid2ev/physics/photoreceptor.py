@@ -153,22 +153,42 @@ def response_slope(s, du, c1, c2, a, b):
 
 @compiled
 def slope_zero(lo, hi, slope_lo, du, c1, c2, a, b):
-    """Where the slope changes sign in [lo, hi]: bracketed Newton steps, to 1e-8 of the faster time constant."""
+    """Where the slope changes sign in [lo, hi]: bracketed Newton steps, to 1e-8 of the faster time constant, from where
+    two of its three parts cancel each other."""
     enough = 1e-8 / max(1.0, max(a, b))
-    s = 0.5 * (lo + hi)
-    for k in range(60):
+    first = (a < b) | (b == 0.0)  # (the only pole, or the slower one)
+    s = balance(a * c1 if first else b * c2, du, a if first else b, lo, hi)
+    s = s if s > lo else balance(b * c2, -a * c1, b - a, lo, hi)
+    s, step = s if s > lo else 0.5 * (lo + hi), hi - lo
+    for _ in range(60):
         k1, k2 = a * c1 * exp64(-a * s), b * c2 * exp64(-b * s)
         slope = du - k1 - k2
         if (slope > 0.0) == (slope_lo > 0.0):
             lo = s
         else:
             hi = s
-        newton = s - slope / (a * k1 + b * k2)
-        here = newton if (newton > lo) & (newton < hi) & (k % 4 != 3) else 0.5 * (lo + hi)
-        if abs(here - s) < enough:
+        here = bracketed(s - slope / (a * k1 + b * k2), s, lo, hi, step)
+        step = abs(here - s)
+        if step < enough:
             return here
         s = here
     return s
+
+
+@compiled
+def bracketed(there, s, lo, hi, step):
+    """Where to look next for a root in [lo, hi]: `there` if it is within and the step from s is half of the last one at
+    most, else the middle.  Either the steps or the bracket are halved, so this ends whatever the function."""
+    return there if (there >= lo) & (there <= hi) & (abs(there - s) <= 0.5 * step) else 0.5 * (lo + hi)
+
+
+@compiled
+def balance(k, other, rate, lo, hi):
+    """Where k exp(-rate s) has fallen to `other`, if that is between lo and hi; otherwise lo."""
+    ratio = k / other
+    usable = (ratio > 1e-300) & (ratio < 1e300)
+    s = log64(ratio if usable else 1.0) / rate
+    return s if usable & (s > lo) & (s < hi) else lo
 
 
 @compiled
