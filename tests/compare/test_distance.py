@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.compare.by_pixel import by_pixel
-from vid2ev.compare.comparison import compare
+from vid2ev.compare.comparison import BINS, compare
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.stream.events import Events
 
@@ -156,8 +156,33 @@ def test_the_parts_of_the_time_add_up() -> None:
     assert (quiet[:50] > 0).all() and quiet[55:].max() < 1e-3 * quiet[:45].min()
 
 
+@pytest.mark.parametrize("later_us", [0, 10**9, -(10**6)])
+def test_parts_are_of_the_time_compared_whenever_it_begins(later_us: int) -> None:
+    a, b = (busy(n, duration_us=200_000, seed=n) for n in (3000, 2000))
+    a, b = (Events(side.t + later_us, side.x, side.y, side.p) for side in (a, b))
+    t = np.concatenate([a.t, b.t])
+    edges = t.min() + np.arange(BINS + 1) * ((t.max() + 1 - t.min()) / BINS)
+    found = compare(a, b, SIZE)
+    np.testing.assert_array_equal(found.by_time[1], np.histogram(t, edges)[0])
+    assert found.by_time.shape == (2, BINS)
+
+
+def test_one_event_beside_none_is_all_that_can_differ() -> None:
+    assert distance(events_of([5]), Events.empty()) == pytest.approx(1, rel=1e-12)
+
+
 def test_what_is_no_stream_of_that_sensor_is_refused() -> None:
     good = busy(10)
     for bad in (events_of([1], x=3), events_of([1], y=2), good.select(np.argsort(-good.t))):
         with pytest.raises(ValueError, match="out"):
             compare(good, bad, SIZE)
+
+
+def test_blocks_out_of_order_are_refused() -> None:
+    events = events_of([1, 3, 3, 5])
+    for first, then in ((2, 4), (0, 2)):  # (which goes on at the instant of the last event, or before it)
+        blocks = [events.stretch(first, 4), events.stretch(0, then)]
+        with pytest.raises(ValueError, match="out of order of time"):
+            by_pixel(blocks, SIZE[0], range(SIZE[1]))
+    parts = by_pixel([events.stretch(0, 2), Events.empty(), events.stretch(2, 4)], SIZE[0], range(SIZE[1]))
+    np.testing.assert_array_equal(parts.moments >> 1, events.t)

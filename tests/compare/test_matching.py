@@ -104,6 +104,15 @@ def test_the_other_way_round_errors_have_the_other_sign(a: Events, b: Events) ->
     assert one.polarity_errors == other.polarity_errors and one.distances == other.distances
 
 
+@given(a=streams(), b=streams(), later_us=st.sampled_from([-(10**15), 86_400_000_000, 10**17]))
+@settings(max_examples=100)
+def test_clocks_of_any_beginning_give_the_same_pairs(a: Events, b: Events, later_us: int) -> None:
+    moved = [Events(side.t + later_us, side.x, side.y, side.p) for side in (a, b)]
+    one, other = compare(a, b, SIZE), compare(*moved, SIZE)
+    np.testing.assert_array_equal(one.timing_errors, other.timing_errors)
+    assert one.polarity_errors == other.polarity_errors
+
+
 def test_late_is_positive() -> None:
     events = isolated(101)
     found = compare(Events(events.t + 300, events.x, events.y, events.p), events, SIZE).as_dict()
@@ -146,6 +155,22 @@ def test_of_nothing_there_are_no_errors() -> None:
     assert "matched   nothing: the reference has no events" in str(invented) and "%" not in str(invented)
     assert "matched   nothing: it has no events" in str(missing)
     assert "polarity" not in f"{invented}{missing}" and "timing" not in f"{invented}{missing}"
+
+
+def test_percentiles_of_errors_are_of_their_sizes() -> None:
+    """Of 100 pairs 91 are 10 us late, 4 are 20 us early, and 5 are 30 us early."""
+    events = isolated(100)
+    late_us = np.repeat([10, -20, -30], [91, 4, 5])
+    found = compare(Events(events.t + late_us, events.x, events.y, events.p), events, SIZE)
+    assert (found.timing_error_us, found.absolute_timing_error_us) == (10, (10, 20))
+
+
+def test_the_text_says_which_share_is_of_which_and_how_long_was_compared() -> None:
+    events = isolated(100)
+    found = compare(events.select(np.arange(100) % 10 != 1), events, SIZE)
+    assert "matched   100 % of them, 90 % of the reference's, within 5 ms\n" in str(found)
+    assert str(found).endswith("compared  99 s from 1000000 us on, 3x2")
+    assert list(found.as_dict()["distance_by_tau_us"]) == ["1000", "100"]
 
 
 @given(st.lists(st.integers(-9, 9), min_size=1, max_size=50), st.integers(1, 100))
