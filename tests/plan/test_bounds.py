@@ -79,6 +79,22 @@ def test_signals_that_are_off_differ_while_they_are_pushed_and_from_their_turns_
     assert off_by(busy, np.full(tiles, 3.5 * THETA), echoes=False) == pytest.approx(4 * 4**2)
 
 
+def test_a_part_of_an_error_costs_a_part_where_it_is() -> None:
+    """Of what there is of it while pixels are pushed and at turns, on average; and of other numbers of levels."""
+    error = np.array([0.2, 0.1]) * THETA
+    seen = scene(2, by_turns=spread((0.5, 1)))
+    pushed, turned = 0.2 * THETA * PUSHED_S / DISTANCE_TAU_S / TRAVEL, 0.2 * THETA * TURNS / TRAVEL
+    for of_pushed, of_turned in ((1.0, 0.0), (0.0, 1.0), (0.3, 0.8)):
+        parts = np.array([of_pushed, 9.0]), of_turned  # (of each tile, or of all)
+        wanted = of_pushed * pushed + of_turned * turned
+        assert off_by(seen, error, echoes=False, one_way=True, parts=parts) == pytest.approx(wanted)
+        found = off_by(seen, error, echoes=True, one_way=True, parts=parts)
+        assert found == pytest.approx(wanted + 0.5 * 0.2 / TRAVEL)  # (what is frozen may be all of it)
+    for levels in (1.0, 1.3, 5.0):
+        found = off_by(seen, 7.5 * error, echoes=False, one_way=True, levels=levels)
+        assert found == pytest.approx(min(7.5 * levels * (pushed + turned), 4 * levels**2))
+
+
 def test_what_comes_after_a_disagreement_is_counted_once_for_each_that_may_have_been() -> None:
     """Of `by_turns`: travel, and that times the turns before it; never more than all of it."""
     seen = scene(2, by_turns=spread((0.5, 1), (0.3, 4), (0.2, 100)))

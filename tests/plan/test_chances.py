@@ -6,8 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import poisson
 
-from vid2ev.bounds.chances import _pixels, surely
+from vid2ev.bounds.chances import _chernoff, _counted, _pixels, at_least, at_most, surely
 from vid2ev.bounds.scene import Scene
 from vid2ev.physics.mismatch import clipped, fill_thresholds
 from vid2ev.physics.thresholds import chances_below
@@ -62,6 +63,30 @@ def test_what_is_often_is_bounded_too() -> None:
     bounds = [surely(seen, mean) for mean in np.geomspace(1e-5, 2.0, 60)]
     assert bounds == sorted(bounds)
     assert all(bound > mean for bound, mean in zip(bounds, np.geomspace(1e-5, 2.0, 60), strict=True))
+    assert surely(seen, 1e-12) == 1e-12  # (it would mostly be nothing, but all events may change so little)
+
+
+@pytest.mark.parametrize(("most", "means"), [([5], [0.3]), ([3, 7], [0.2, 0.5]), ([3, 1000], [2, 20])])
+def test_a_coarser_grid_makes_a_bound_no_smaller(most: list[float], means: list[float]) -> None:
+    """Numbers are rounded up to it, however much larger its cells are than they."""
+    pixels = np.array(most, float), np.array(means, float)
+    limit = _chernoff(*pixels, False)
+    bounds = [_counted(*pixels, limit * 4**k) for k in range(7)]
+    assert bounds == sorted(bounds) and bounds[2] < 1.01 * bounds[0] and bounds[-1] > 1.3 * bounds[0]
+
+
+def test_where_nothing_is_sent_a_mean_is_its_bound() -> None:
+    assert surely(dataclasses.replace(scene(np.array([0, 9])), travel=np.zeros(1), by_pixel=np.zeros(1)), 0.1) == 0.1
+
+
+def test_numbers_of_poisson_are_beyond_their_bounds_in_less_than_one_of_a_thousand_cases() -> None:
+    means = np.concatenate([np.geomspace(1e-9, 1.0, 200), np.geomspace(1.0, 1e5, 500)])
+    most, least = (np.array([bound(mean) for mean in means.tolist()]) for bound in (at_most, at_least))
+    assert (poisson.sf(most, means) < 1e-3).all()
+    assert (poisson.cdf(np.ceil(least) - 1, means) < 1e-3).all() and (least >= 0.0).all()
+    assert at_most(0.0) == at_least(0.0) == 0.0
+    deviations = np.sqrt(means[200:])
+    assert (most[200:] - means[200:] < 9 * deviations).all() and (means[200:] - least[200:] < 4 * deviations).all()
 
 
 @pytest.mark.parametrize("whole", [False, True])
