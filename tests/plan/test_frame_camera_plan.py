@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats import binom, norm, poisson
 
 from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
 from vid2ev.errors import UsageError
@@ -282,6 +283,19 @@ def test_laws_of_random_changes() -> None:
         assert np.mean(np.abs(shots).max(axis=1) > poisson_most(mean, number)) <= 0.003
         assert poisson_most(mean, number) < 4 * np.abs(shots).max()
     assert surely_square(1.0, 1.0, 0) == (0, 0, 1)
+
+
+def test_chances_of_random_changes_are_what_is_said() -> None:
+    """By exact distributions: of normal and Poisson's numbers, and of changes that are all or nothing, whose sum is
+    spread most."""
+    for number in (1, 3, 10, 50, 2000, 10**6):
+        assert number * 2 * norm.sf(normal_most(number)) < 1 / 2000
+        means, shares = np.geomspace(1e-6, 1e5, 300), np.geomspace(1e-8, 0.9, 200)
+        most = np.array([poisson_most(mean, number) for mean in means.tolist()])
+        beyond = poisson.sf(means + most, means) + poisson.cdf(np.ceil(means - most) - 1, means)
+        assert (number * beyond < 1 / 2000).all()
+        squares = np.array([surely_square(share, 1.0, number).square for share in shares.tolist()])
+        assert (binom.sf(np.floor(squares * number * (1 + 1e-12)), number, shares) < 1 / 2000).all()
 
 
 @pytest.mark.parametrize("name", ["edge", "sine"])
