@@ -5,6 +5,7 @@ Measured with an ADC of 16 bits and I16 as its codes, a 55th of an LSB of 10 bit
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections import defaultdict
@@ -14,7 +15,15 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm, poisson
 
-from vid2ev.bounds.exposed import Exposed, LevelChange, normal_most, poisson_most, surely_square
+from vid2ev.bounds.exposed import (
+    Change,
+    Exposed,
+    LevelChange,
+    level_change,
+    normal_most,
+    poisson_most,
+    surely_square,
+)
 from vid2ev.errors import UsageError
 from vid2ev.plan.expose import Expose
 from vid2ev.plan.exposure_sums import OVERFULL, SUMS, add_change, add_light
@@ -283,6 +292,21 @@ def test_laws_of_random_changes() -> None:
         assert np.mean(np.abs(shots).max(axis=1) > poisson_most(mean, number)) <= 0.003
         assert poisson_most(mean, number) < 4 * np.abs(shots).max()
     assert surely_square(1.0, 1.0, 0) == (0, 0, 1)
+
+
+def test_a_change_counts_by_its_greatest_against_that_of_rounding() -> None:
+    """In units of the mean square of rounding, which is 1/12."""
+    change = Change(0.1, 0.0004)
+    omission = level_change(change, "bound", "it is small")
+    assert omission.distance == pytest.approx(0.12) and omission.levels is change
+    assert omission.figure == "max 0.1, rms 0.02 LSB" and omission.sure
+    assert change.times(3.0) == pytest.approx((0.3, 0.0036, 1.0))
+
+
+def test_all_values_of_all_exposures_are_drawn_and_things_move_while_they_are() -> None:
+    seen = Exposed(12, 3, 5, 9, 2.0, 0.0, 1.0, 0.5, 1.0, 0.5, 0.3, {}, speed_px_per_s=200.0)
+    assert seen.draws == 60 and seen.moved(500.0) == ", in which things move up to 0.1 px"
+    assert dataclasses.replace(seen, speed_px_per_s=None).moved(500.0) == ""
 
 
 def test_chances_of_random_changes_are_what_is_said() -> None:
