@@ -154,6 +154,26 @@ def test_numbers_are_ready_for_json() -> None:
     assert sum(numbers["intervals_same"]) + sum(numbers["intervals_opposite"]) == 500 - 6
 
 
+def test_each_number_is_what_its_name_says() -> None:
+    """Of two pixels of six: one sends ON, ON, OFF, and one far from it ON; the last two are isolated."""
+    events = events_of([0, 4000, 100_000, 200_000], x=[0, 0, 0, 2], p=[1, 1, 0, 1])
+    found = statistics_of([events.stretch(0, 1), events.stretch(1, 4)], (3, 2))
+    numbers = found.as_dict()
+    assert found.span_us == (0, 200_000) and numbers["rate_hz"] == pytest.approx(4 / 6 / 0.2)
+    assert numbers["active_share"] == pytest.approx(2 / 6) and numbers["on_share"] == 0.75
+    assert found.isolated == (1, 1) and numbers["isolated_on_share"] == 0.5
+    same, opposite = (np.flatnonzero(numbers[f"intervals_{name}"]).tolist() for name in ("same", "opposite"))
+    assert [EDGES_US[k] <= 4000 < EDGES_US[k + 1] for k in same] == [True]
+    assert [EDGES_US[k] <= 96_000 < EDGES_US[k + 1] for k in opposite] == [True]
+    assert numbers["interval_us"] == {
+        "5": EDGES_US[same[0] + 1],
+        "50": EDGES_US[same[0] + 1],
+        "95": EDGES_US[opposite[0] + 1],
+    }
+    assert str(found).startswith("3.33 events/pixel/s, 75 % ON; 1.67 isolated; intervals from 4000 us, half below ")
+    assert EDGES_US[-1] == 10**10 and (np.diff(EDGES_US) > 0).all()
+
+
 @pytest.mark.parametrize(("shortest_us", "low_us"), [(1, EDGES_US[25]), (1400, 1400)])
 def test_about_is_even_in_logarithms_within_its_bin(shortest_us: int, low_us: float) -> None:
     intervals = np.zeros((2, len(EDGES_US) - 1), np.int64)
