@@ -278,6 +278,32 @@ def test_a_pixel_by_itself_wakes_for_what_its_shots_leave_to_be_reached(dt_ns):
         assert_alike(spec, light, dt_ns * np.arange(len(light)), seed)
 
 
+ALONE = {  # pixels; ms of an interval; how many in each light; a sensor
+    "poles that are slower than the leak": (
+        (1, 1.0, 60, {"photoreceptor_tau_us": 100, "follower_tau_us": 300_000, "leak_rate_hz": 10})
+    ),
+    "shots while a pole is under way": (1, 0.1, 60, {"photoreceptor_tau_us": 2000, "shot_rate_hz": 100}),
+    "shots and leak": (1, 2.0, 100, {"leak_rate_hz": 10, "shot_rate_hz": 5}),
+    "shots and leak of several": (3, 2.0, 100, {"leak_rate_hz": 10, "shot_rate_hz": 5}),
+    "shots, and memories that jump later": (
+        (1, 0.1, 100, {"refractory": "track", "refractory_us": 900, "leak_rate_hz": 30, "shot_rate_hz": 100})
+    ),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ALONE)
+def test_pixels_by_themselves_wake_before_a_level_is_reached(name):
+    """Light goes as far as it can without an event, up and down, so whatever else moves is soon at a level."""
+    pixels, dt_ms, hold, effects = ALONE[name]
+    spec = clean(threshold_on=0.2, threshold_off=0.2, shot_light_factor=1.0, **effects)
+    ways = np.stack([np.roll(np.tile([0, 0, 1, -1, 0, 0, -1, 1], 8), 3 * k) for k in range(pixels)], 1)
+    for seed in range(10):
+        far = np.random.default_rng(seed).uniform(0.16, 0.195, ways.shape)
+        light = 0.5 * np.exp(np.repeat(ways * far, hold, 0)).astype(np.float32)[:, None]
+        assert_alike(spec, light, round(1e6 * dt_ms) * np.arange(len(light)), seed)
+
+
 def test_an_interval_too_short_for_a_lag_to_move_does_not_end_the_making_up():
     spec = clean(photoreceptor_tau_us=1e6, follower_tau_us=5e5)
     light = np.full((60, *SIZE[::-1]), 0.5, np.float32)
