@@ -12,7 +12,7 @@ import pytest
 from against.clips import clean
 
 from vid2ev import load_sensor
-from vid2ev.bounds.scene import OF_BARE, QUARTER_EDGES, SPREAD, Scene
+from vid2ev.bounds.scene import DISTANCE_TAU_S, OF_BARE, QUARTER_EDGES, SPREAD, Scene
 from vid2ev.errors import UsageError
 from vid2ev.physics.omission import crossings
 from vid2ev.plan.measure import Measure
@@ -174,6 +174,46 @@ def test_times_are_those_since_a_shot_began() -> None:
     assert seen.longest_s == pytest.approx(0.03)
     assert seen.pushed_when_s == pytest.approx((0.02 + 0.01) / 2, rel=0.15)  # (a shot begins in the midst of levels)
     assert seen.turned_when_s == pytest.approx((0.03 + 0.01) / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("mismatch", [0.0, 0.02])
+def test_sums_over_a_zigzag_are_those_of_the_theory(mismatch: float) -> None:
+    """Up and down five times, behind no poles: a leg pushes but for a threshold, its end is a turn, bends are 30 nat/s
+    at the beginning and 60 at each turn, and what follows counts by all turns, and all bends, before it."""
+    legs, way, slope, theta = 5, 0.6, 30.0, 0.1
+    nats = np.interp(np.arange(20 * legs + 1), 20 * np.arange(legs + 1), way * (np.arange(legs + 1) % 2))
+    frames = [Frame(np.full(SIZE[::-1], np.exp(y), np.float32), 1_000_000 * k) for k, y in enumerate(nats)]
+    jumps = {"refractory": "track", "refractory_us": 0.1}
+    spec = clean(filter="after", dark_level=1e-12, threshold_on=theta, threshold_off=theta, mismatch=mismatch, **jumps)
+    seen = scene_of(spec, SIZE, frames)
+    pixels, k = seen.pixels * theta, np.arange(legs)
+    weight = seen.turns.sum() / (seen.pixels * legs)  # (theta / a pixel's own, which is more than 1 on average)
+    assert weight == pytest.approx(1 + (mismatch / theta) ** 2, rel=0.01)
+    travel = np.where(k > 0, way - theta / weight, way) * weight
+    assert seen.travel.sum() / seen.pixels == pytest.approx(travel.sum(), rel=2e-3)
+    assert seen.pushed_s.sum() / seen.pixels == pytest.approx(travel.sum() / slope, rel=2e-3)
+    bends = np.where(k > 0, 2 * slope, slope)
+    assert seen.bend.sum() / seen.pixels == pytest.approx(weight * bends.sum(), rel=1e-3)
+    assert seen.bend_at_turns.sum() / seen.pixels == pytest.approx(weight * bends[1:].sum(), rel=1e-3)
+    if mismatch:
+        return
+    lost = seen.by_turns[0].sum() / seen.pixels / travel.sum()
+    assert lost == pytest.approx(1 - np.exp(-theta / slope / (2 * DISTANCE_TAU_S)), rel=0.01)
+    stirs = np.cumsum(bends * slope / theta) * 1e-6  # [nat/ms^2]
+    strays = np.sqrt(np.cumsum(bends**2 * slope / theta) * 1e-9)  # [nat/ms^1.5]
+    for name, wanted in {
+        "by_turns": lost * travel @ k,
+        "by_bends": lost * travel @ (2 * slope * k),
+        "by_stirs": travel / slope @ stirs,
+        "by_strays": travel / slope @ strays,
+        "by_stirs_at_turns": theta * stirs[1:].sum(),
+        "by_strays_at_turns": theta * strays[1:].sum(),
+        "by_stirs_before": lost * travel @ np.append(0, np.cumsum(stirs[1:])),
+        "by_strays_before": lost * travel @ np.append(0, np.cumsum(strays[1:])),
+    }.items():
+        assert getattr(seen, name)[1].sum() / seen.pixels == pytest.approx(wanted, rel=2e-3), name
+    assert seen.by_stirs_at_turns[0].sum() == pytest.approx(pixels * (legs - 1), rel=1e-4)
+    assert not seen.off_peaks.any() and not seen.by_felt.any() and not seen.by_felt_at_turns.any()
 
 
 def test_nothing_is_carried_across_a_cut() -> None:
