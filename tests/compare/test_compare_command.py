@@ -116,6 +116,20 @@ def test_an_event_missing_at_the_end_is_missing() -> None:
     assert empty["matched_share_of_reference"] == 0 and empty["reference_events"] == 1000
 
 
+@pytest.mark.parametrize(("apart_us", "one_end"), [(4999, True), (5000, False)])
+def test_ends_less_than_a_window_apart_are_one_end(apart_us: int, one_end: bool) -> None:
+    """Nothing beyond it is left out then, at the beginning or at the end; and recordings may share only an instant."""
+    inner = write(events_of([20_000, 50_000]), "inner.h5", start_us=10_000)
+    ends_us = 10_000 - apart_us, 50_000 + apart_us
+    outer = write(events_of([ends_us[0], 20_000, ends_us[1]]), "outer.h5", start_us=ends_us[0])
+    for found, name in ((compare(inner, outer), "reference_left_out"), (compare(outer, inner), "left_out")):
+        assert found["span_us"] == (list(ends_us) if one_end else [10_000, 50_000])
+        assert found[name] == (0 if one_end else 2)
+    after = write(events_of([50_000, 90_000]), "after.h5", start_us=50_000)
+    found = compare(inner, after)
+    assert (found["span_us"], found["events"], found["reference_events"], found["matched"]) == ([50_000] * 2, 1, 1, 1)
+
+
 def test_clocks_that_differ_are_laid_on_one_another_on_request() -> None:
     events = busy(1000, SIZE)
     here = write(events, "here.h5")
