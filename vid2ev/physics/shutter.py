@@ -42,6 +42,8 @@ from vid2ev.physics.adc import lsb_per_light
 from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.stream.ticks import Ticks
 
+PARTS = 512  # of a nanosecond
+
 
 class Shutter(BaseModel, frozen=True, extra="forbid"):
     """Parameters of the shutter."""
@@ -56,6 +58,16 @@ class Shutter(BaseModel, frozen=True, extra="forbid"):
 def opening_ns(k: int, frame_rate_hz: float) -> int:
     """When exposure k opens [ns after the first]; the rate as it is written in decimals, halves upwards."""
     return Ticks.of(frame_rate_hz, 10**9).at(k)
+
+
+def whole_parts_ns(times_us: np.ndarray | float) -> np.ndarray:
+    """Times [ns, float64], each the nearest of 512 parts of a nanosecond.
+
+    Sums and halves of such numbers are exact up to 2^43 ns, so that a row that is read at a frame is so on either side
+    of that frame: 16.1 us are 16100 ns, and not 2e-12 ns more, which a long interval before the frame swallows and a
+    short one behind it does not.
+    """
+    return np.rint(np.asarray(times_us, np.float64) * (1e3 * PARTS)) / PARTS
 
 
 def interval_weights(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.physics.shutter import interval_weights, opening_ns
+from vid2ev.physics.shutter import interval_weights, opening_ns, whole_parts_ns
 from vid2ev.sensors.cis_readout import frozen_of, numbers_of
 from vid2ev.sensors.cis_rows import Rows
 from vid2ev.sensors.cis_spec import CisSpec
@@ -71,7 +71,8 @@ class Cis:
                 f"{spec.in_flight(height)} exposures of {width}x{height} pixels open at a time: expected to hold them"
                 " in 4 GiB; shorten exposure_us or line_us, or lower frame_rate_hz"
             )
-        self._row_ns = np.arange(height) * (1e3 * spec.line_us)
+        self._row_ns = whole_parts_ns(np.arange(height) * spec.line_us)
+        self._exposure_ns = float(whole_parts_ns(spec.exposure_us))
         self._numbers = numbers_of(spec, seed, camera)
         frozen = frozen_of(spec, self._numbers, size)
         self._rows: Any = Rows(shape, self._numbers, frozen, threads, colour=spec.colour, linear=linear)
@@ -211,7 +212,7 @@ class Cis:
 
     def _weights(self, row_ns: np.ndarray, length_ns: int, cut: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`interval_weights` of rows that open at row_ns; without blur those of the middles of their windows."""
-        exposure_ns = 1e3 * self.spec.exposure_us
+        exposure_ns = self._exposure_ns
         if self.spec.blur:
             return interval_weights(row_ns, exposure_ns, length_ns, cut)
         before, after, _ = interval_weights(row_ns + exposure_ns / 2, 0.0, length_ns, cut)
@@ -222,7 +223,7 @@ class Cis:
         codes, light = self._rows.read(each.total, each.index)
         self._spare.append(each.total)
         self._made += 1
-        end_ns = each.start_ns + round(self._row_ns[-1] + 1e3 * self.spec.exposure_us)
+        end_ns = each.start_ns + round(self._row_ns[-1] + self._exposure_ns)
         made = None if light is None else self._shaped(light)
         return Exposure(self._shaped(codes), each.start_ns, end_ns, each.index, made)
 
