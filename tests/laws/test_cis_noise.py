@@ -74,6 +74,14 @@ def test_codes_have_their_bits(bits):
     assert halfway == math.floor(top / 2 + 0.5)
 
 
+@pytest.mark.parametrize("mean", [1e15, 4e15, 1e17, 1e24])
+def test_of_any_number_of_electrons_the_shot_noise_is_its_root(mean):
+    """Which is less than 1e-5 codes of 1e15 electrons and more: the code is that of the light."""
+    sensor = spec(shot_noise=True, white_e=1e9, exposure_gain=1e9, slope=1e9, bits=16)
+    light = np.float32(mean / 1e18)
+    assert (exposures(sensor, light) == math.floor(min(65535 * float(light), 65535) + 0.5)).all()
+
+
 @pytest.mark.parametrize("mean", [0.0, 0.3, 5.0, 11.5, 12.5, 60.0, 1000.0])
 def test_shot_noise_is_that_of_a_poisson_number(mean):
     """Its distribution, by chi squared: electrons are codes here."""

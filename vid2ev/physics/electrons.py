@@ -49,7 +49,6 @@ from vid2ev.physics.random import normal_pair
 
 FEW = 12.0  # electrons up to which probabilities are added up
 MOST = 200.0  # of FEW on average: what rounding leaves of a probability must not be searched for ever
-MANY = 1e15  # beyond, a single electron is below the precision of float64
 
 
 class Electrons(BaseModel, frozen=True, extra="forbid"):
@@ -64,7 +63,7 @@ class Electrons(BaseModel, frozen=True, extra="forbid"):
 @compiled
 def poisson_many(mean, z):
     """A Poisson number of a mean above FEW, from a standard normal number."""
-    mean = min(max(mean, FEW), MANY)
+    mean = max(mean, FEW)
     root = sqrt(mean)
     number = mean + root * z + (2.0 + z * z) / 6.0 - (z + 0.5 * z * z * z) / (36.0 * root)
     return max(floor(number), 0.0)
