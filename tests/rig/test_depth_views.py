@@ -66,9 +66,10 @@ def _pixels(points: np.ndarray, camera: Intrinsics) -> np.ndarray:
     return cv2.projectPoints(flat, np.zeros(3), np.zeros(3), camera.matrix, values)[0].reshape((*points.shape[:2], 2))
 
 
-def test_a_plane_given_as_depth_is_the_plane() -> None:
+@pytest.mark.parametrize("behind_m", [-0.2, 0.4, 2.0, 5.0])  # (then each pixel is wide enough for 1, 1, 2 and 4)
+def test_a_plane_given_as_depth_is_the_plane(behind_m: float) -> None:
     light = cv2.GaussianBlur(np.random.default_rng(0).random((120, 160), np.float32), (0, 0), 1)
-    pose = Pose.of((2, -5, 7), (0.1, -0.05, 0.2))
+    pose = Pose.of((2, -5, 7), (0.1, -0.05, -behind_m))
     by_depth = Views(SOURCE, [(SOURCE, pose)]).see(light, np.full((120, 160), 2, np.float32))[0]
     by_homography = Views(SOURCE, [(SOURCE, pose)], 2.0).see(light)[0]
     assert (by_depth.valid != by_homography.valid).mean() < 1e-3

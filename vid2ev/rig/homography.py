@@ -67,14 +67,17 @@ def places_on_plane(
     return Places(px[..., 0].astype(np.float32), px[..., 1].astype(np.float32), np.asarray(inside & before))
 
 
-def samples_for(places: Places) -> int:
-    """How many places across a pixel it takes for none of the source to be skipped; from places of one each."""
+def samples_for(places: Places, samples: int = 1, every: int = 1) -> int:
+    """How many places across a pixel it takes for none of the source to be skipped.
+
+    places   `samples` across each pixel; of their rows and columns one in `every` is looked at, the middle ones too
+    """
     spacings = []
     for axis in (0, 1):
-        both = np.logical_and(np.take(places.seen, range(1, places.seen.shape[axis]), axis),
-                              np.take(places.seen, range(places.seen.shape[axis] - 1), axis))  # fmt: skip
-        step = np.hypot(np.diff(places.x, axis=axis), np.diff(places.y, axis=axis))
-        spacings.append(float(np.median(step[both])) if both.any() else 1.0)
+        first = places.x.shape[1 - axis] // 2 % every
+        x, y, seen = (np.moveaxis(values, axis, 0)[:, first::every] for values in places)
+        step = np.hypot(np.diff(x, axis=0), np.diff(y, axis=0))[seen[1:] & seen[:-1]]
+        spacings.append(samples * float(np.median(step)) if step.size else 1.0)
     return min(max(math.ceil(max(spacings) - SKIPPED), 1), FINEST)
 
 

@@ -38,6 +38,7 @@ from vid2ev.rig.tensor_views import TensorLook
 
 INSET_PX = 2  # of the camera: what fills a hole comes from so far beyond its rim
 SMOOTHINGS = 5
+LOOKED_AT = 16  # one row and column in so many tells how wide the pixels of a camera are on a surface
 NEAREST_M = 1e-6  # depth below counts as zero
 
 
@@ -179,8 +180,10 @@ class Views:
         if not pose.translation_m.any():
             return far
         samples = self._samples(k, far)
-        fine = camera.scaled_to((camera.size[0] * samples, camera.size[1] * samples)) if samples > 1 else camera
-        x, y, inverse = seen_of(surface, fine, pose, self._bands)
+        x, y, inverse = seen_of(surface, _finer(camera, samples), pose, self._bands)
+        more = samples_for(Places(x, y, inverse >= 0), samples, LOOKED_AT)
+        if more > samples:  # (from behind the source what is near looks smaller than what is far)
+            samples, (x, y, inverse) = more, seen_of(surface, _finer(camera, more), pose, self._bands)
         seen = inverse >= 0
         if not seen.any():
             nothing = far.places._replace(seen=np.zeros_like(far.places.seen))
@@ -217,6 +220,11 @@ def filled_inverse(depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if not known.all():
         apply_fill(fill_of(inverse), inverse[..., None])
     return (inverse if known.any() else np.zeros_like(inverse)), known
+
+
+def _finer(camera: Intrinsics, samples: int) -> Intrinsics:
+    """The camera with so many pixels across and down in the place of each."""
+    return camera.scaled_to((camera.size[0] * samples, camera.size[1] * samples)) if samples > 1 else camera
 
 
 def _of_whole_pixels(seen: np.ndarray, camera: Intrinsics) -> np.ndarray:
