@@ -12,6 +12,7 @@ from drawn_rigs import differences, pair
 from vid2ev.commands import Commands
 from vid2ev.commands.calibration import NAMES, calibration
 from vid2ev.commands.init import init
+from vid2ev.errors import DataError
 from vid2ev.rig.calibration import FORMATS, UNITS_M, read_calibration, write_calibration
 from vid2ev.rig.rig_file import EXAMPLE, read_rig, write_rig
 
@@ -53,6 +54,13 @@ def test_init_begins_with_a_calibration(name: str) -> None:
     assert shown.exit_code == 0 and "left, rgb, right" in shown.output and f"({name})" in shown.output
     assert read_rig("rig.toml") == read_calibration("calibration").rig
     assert max(differences(read_rig("rig.toml"), pair())) < 1e-9
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_calibration_in_place_of_a_rig_is_told_how_to_become_one(name: str) -> None:
+    write_calibration("calibration", pair(), name)
+    with pytest.raises(DataError, match=r"^calibration: .*; vid2ev init rig\.toml --from calibration makes a rig"):
+        read_rig("calibration")
 
 
 @pytest.mark.parametrize("name", FORMATS)

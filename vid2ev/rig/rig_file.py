@@ -125,7 +125,9 @@ def _tables(path: Path) -> dict[str, Any]:
     try:
         return parsed_toml(text)
     except ValueError as error:
-        raise DataError(f"{path}: not valid TOML: {error}; correct that line") from error
+        calibrated = f"; vid2ev init rig.toml --from {path} makes a rig of a calibration file"
+        remedy = "" if path.suffix == ".toml" else calibrated
+        raise DataError(f"{path}: not valid TOML: {error}; correct that line{remedy}") from error
 
 
 def _camera(table: Mapping[str, Any], index: int, path: Path, to_use: bool) -> Camera:
