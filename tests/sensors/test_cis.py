@@ -203,7 +203,8 @@ def test_exposures_that_the_light_does_not_last_for_are_counted():
     made = list(cis.run(Frame(light, k * 1_000_000) for k in range(101)))
     assert [each.index for each in made] == list(range(8))  # the eighth closes at 95 ms
     assert cis.counts == {"frames": 8, "unfinished": 2, "not_finite": 0}
-    assert cis.flush() == []
+    assert cis.flush() == [] and cis.counts["unfinished"] == 2  # they are dropped, and counted once
+    assert len(cis.state()["open"]) == 0
 
 
 def test_a_burst_ends_after_as_many_exposures_wherever_it_is_interrupted():
