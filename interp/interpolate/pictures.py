@@ -9,7 +9,6 @@ exr    float32, linear light, white at 1.0 and no upper end; needs the package O
 from __future__ import annotations
 
 from fractions import Fraction
-from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +23,10 @@ from interp.rows import AT_ONCE
 from vid2ev.errors import UsageError
 from vid2ev.light.eight_bits import srgb_codes
 from vid2ev.light.transfer import parse_transfer
+from vid2ev.pictures.film import rate_of_film
 from vid2ev.recording.exposures import write_codes
 
 TABLE = 65535  # entries of the table of a curve, less one
-SLOWEST_HZ = Fraction(1, 10**5)  # of films
-FINEST, TERMS = 10**6, 2**31 - 1  # denominators of their rates, and both terms, at the most
 
 
 class Pictures:
@@ -96,7 +94,7 @@ def checked_play(play: Number | None, kind: str) -> Fraction | None:
     rate = parse_number(play, "--play")
     if not 0 < rate <= 1000:
         raise UsageError(f"--play {play}: expected more than 0 and at most 1000 frames per second")
-    return of_film(rate)
+    return rate_of_film(rate)
 
 
 def film_rate(take: Take, grid: Grid, play: Number | None, kind: str) -> Fraction:
@@ -104,15 +102,9 @@ def film_rate(take: Take, grid: Grid, play: Number | None, kind: str) -> Fractio
     if asked := checked_play(play, kind):
         return asked
     if isinstance(grid, Rate):
-        return of_film(grid.rate_hz)
+        return rate_of_film(grid.rate_hz)
     assert isinstance(grid, Times)
-    return of_film(grid.multiple * take.rate)
-
-
-def of_film(rate: Fraction) -> Fraction:
-    """The rate nearest to one, above 0, that a film can have."""
-    slow = max(rate, SLOWEST_HZ)
-    return slow.limit_denominator(max(1, min(FINEST, TERMS // ceil(slow))))
+    return rate_of_film(grid.multiple * take.rate)
 
 
 def _by_curve(curve: str) -> np.ndarray | None:

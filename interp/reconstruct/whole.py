@@ -15,7 +15,7 @@ from interp import pretrained
 from interp.interpolate.choice import device_of
 from interp.interpolate.destination import kind_of, manifest_of, places_of
 from interp.interpolate.instants import Number, parse_number
-from interp.interpolate.pictures import SLOWEST_HZ, Pictures, checked_play, of_film
+from interp.interpolate.pictures import Pictures, checked_play
 from interp.interpolate.shelf import Shelf
 from interp.interpolate.take import check_contrast, check_second
 from interp.reconstruct.high_pass import CUTOFF_HZ, HighPass
@@ -27,6 +27,7 @@ from interp.representation.dead_time import stated
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
+from vid2ev.pictures.film import SLOWEST_HZ, rate_of_film
 from vid2ev.recording.manifest import identity, machine, sha256, versions
 from vid2ev.sensors.limits import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
@@ -97,7 +98,9 @@ def reconstruct(
     made_by, why, about = _choice(network, cutoff_hz, size, sensor, where)
     if told:
         told(f"{made_by.name}: {why}")
-    rate = checked_play(play, kind) or (Fraction(FPS) if isinstance(slicing, Count) else of_film(10**6 / slicing.us))
+    rate = checked_play(play, kind) or (
+        Fraction(FPS) if isinstance(slicing, Count) else rate_of_film(10**6 / slicing.us)
+    )
     pictures = Pictures(kind, 8, "srgb")
     job = {
         "versions": versions(("torch",)),

@@ -22,7 +22,7 @@ from interp.interpolate import frames, interpolate
 from interp.interpolate.choice import choice
 from interp.interpolate.fill import Filled
 from interp.interpolate.instants import Instant
-from interp.interpolate.pictures import SLOWEST_HZ, Pictures
+from interp.interpolate.pictures import Pictures
 from interp.interpolate.take import Options, open_take
 from interp.networks import make
 from interp.own_codes import shown
@@ -30,6 +30,7 @@ from interp.representation.carried import footprint_of
 from interp.weights import save
 from vid2ev import open_source
 from vid2ev.errors import DataError, UsageError
+from vid2ev.pictures.film import SLOWEST_HZ
 from vid2ev.recording.exposures import read_codes, write_codes
 
 

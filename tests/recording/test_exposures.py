@@ -38,12 +38,12 @@ def exposures(n: int = 7, shape: tuple[int, ...] = (15, 22, 3), seed: int = 0) -
     return made[:n]
 
 
-def files(folder: Path, kinds: Sequence[str] = ALL) -> ExposureFiles:
-    return ExposureFiles(folder, kinds, SPEC.picture_codes(), SPEC.curve, SPEC.frame_rate_hz)
+def files(folder: Path, kinds: Sequence[str] = ALL, rate_hz: float = SPEC.frame_rate_hz) -> ExposureFiles:
+    return ExposureFiles(folder, kinds, SPEC.picture_codes(), SPEC.curve, rate_hz)
 
 
-def written(tmp_path: Path, made: Sequence[Exposure], kinds: Sequence[str] = ALL) -> Path:
-    into, at_work = tmp_path / "whole", files(tmp_path / "work", kinds)
+def written(tmp_path: Path, made: Sequence[Exposure], kinds: Sequence[str] = ALL, rate_hz: float = 29.97) -> Path:
+    into, at_work = tmp_path / "whole", files(tmp_path / "work", kinds, rate_hz)
     into.mkdir()
     for exposure in made:
         at_work.add(exposure)
@@ -68,6 +68,15 @@ def test_raw_pictures_are_the_codes_as_others_read_them(tmp_path: Path, shape: t
         assert found.format.name == f"{coded}be"  # (PNG is big-endian)
         assert np.array_equal(found.to_ndarray(format=f"{coded}le"), exposure.codes)
         assert np.array_equal(read_codes(folder / f"{k:06d}.png"), exposure.codes)
+
+
+@pytest.mark.parametrize("rate_hz", [30000 / 1001, 100 / 3, 999_999.9999, 1 / 3, 1e-5, 1e-6, 1e-300])
+def test_the_film_has_the_rate_of_the_sensor_or_the_nearest_that_films_have(tmp_path: Path, rate_hz: float) -> None:
+    """Both terms of a film's rate have 31 bits, and a picture of it lasts for a day at most."""
+    path = written(tmp_path, exposures(3), ["mp4"], rate_hz) / "frames.mp4"
+    with av.open(str(path)) as film:
+        times_s = [float(frame.pts * frame.time_base) for frame in film.decode(video=0)]
+    assert times_s == pytest.approx([k / max(rate_hz, 1e-5) for k in range(3)], rel=1e-6)
 
 
 @pytest.mark.parametrize("shape", [(15, 22, 3), (15, 22)])

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 from itertools import chain
+from math import ceil
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -29,6 +30,8 @@ MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins whil
 # (nothing that looks at shrunken pictures in advance: of narrow ones the encoder reads what it never wrote, and now and
 # then makes other bytes)
 NO_LOOKAHEAD = "mbtree=0:rc-lookahead=0:scenecut=0:weightp=0"
+SLOWEST_HZ = Fraction(1, 10**5)  # of films
+FINEST, TERMS = 10**6, 2**31 - 1  # denominators of their rates, and both terms, at the most
 ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 
 
@@ -76,6 +79,12 @@ def write_film(path: Path, pictures: Iterable[np.ndarray], fps: Fraction | int, 
         for picture in chain([first], coming):
             film.add(picture)
     return film.frames
+
+
+def rate_of_film(rate: Fraction) -> Fraction:
+    """The rate nearest to one, above 0, that a film can have."""
+    slow = max(rate, SLOWEST_HZ)
+    return slow.limit_denominator(max(1, min(FINEST, TERMS // ceil(slow))))
 
 
 def film_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -2,7 +2,8 @@
 
     raw     raw/000000.png ...       codes of the ADC as they are, in PNG of 16 bits, gray or colour
     png     frames/000000.png ...    8 bits, by the curve of the sensor's `gamma`
-    mp4     frames.mp4               a film of these at the sensor's rate; made at the end of what is on the disk
+    mp4     frames.mp4               a film of these at the sensor's rate, or the nearest that a film can have; made at
+                                     the end of what is on the disk
 
 Each of the two folders has a `timestamps.txt`, by which it can be opened as a source again:
 
@@ -117,9 +118,9 @@ class ExposureFiles:
             shutil.rmtree(copy_of, ignore_errors=True)
             shutil.copytree(self._folders[kind], copy_of, copy_function=_linked)
         if "mp4" in self.kinds and self.count:
-            from vid2ev.pictures.film import write_film
+            from vid2ev.pictures.film import rate_of_film, write_film
 
-            write_film(into / KINDS["mp4"], self._pictures(), self.rate, tag_of(self.curve))
+            write_film(into / KINDS["mp4"], self._pictures(), rate_of_film(self.rate), tag_of(self.curve))
         return [KINDS[kind] for kind in self.kinds if kind != "mp4" or self.count]
 
     def _pictures(self) -> Iterator[np.ndarray]:
