@@ -176,6 +176,16 @@ def test_the_fixed_pattern_is_a_gain_and_an_offset_that_stay():
     assert abs(np.corrcoef(maps["gain"].ravel(), maps["dark"].ravel())[0, 1]) < 5 / math.sqrt(PIXELS)
 
 
+@pytest.mark.parametrize(("prnu", "dsnu"), [(0.02, 0.0), (0.0, 15.0)])
+def test_gain_and_offset_are_those_of_the_pixel_each_without_the_other_too(prnu, dsnu):
+    sensor = spec(prnu=prnu, dsnu=dsnu, white_e=65535, slope=1, bits=16)
+    both = Cis(sensor.model_copy(update={"prnu": 0.02, "dsnu": 15.0}), SIZE).maps()
+    maps = {name: both[name].astype(float) if own else at_rest for name, own, at_rest in (
+        ("gain", prnu, 1.0), ("dark", dsnu, 0.0),
+    )}  # fmt: skip
+    assert exposures(sensor, 0.5)[0] == pytest.approx(65535 * 0.5 * maps["gain"] + maps["dark"], abs=0.51)
+
+
 @pytest.mark.parametrize("prnu", [0.3, 1.0])
 def test_no_pixel_answers_light_with_its_opposite(prnu):
     gain = Cis(spec(prnu=prnu), SIZE).maps()["gain"]

@@ -175,6 +175,17 @@ def test_beyond_the_border_is_the_nearest_that_is_seen() -> None:
     assert view.valid[:, :100].all() and not view.valid[:, 101:].any()
 
 
+@pytest.mark.parametrize(
+    ("turn_deg", "row", "column"),
+    [((0, 120, 0), 15, 40), ((0, -120, 0), 15, 0), ((120, 0, 0), 0, 20), ((-120, 0, 0), 30, 20)],
+)
+def test_a_camera_that_looks_back_sees_the_border_on_its_side(turn_deg, row: int, column: int) -> None:  # type: ignore[no-untyped-def]
+    """To the right of the source it is the light of the right border, and so on; in the middle that of the middle."""
+    camera, light = pinhole((41, 31)), noise((41, 31))
+    view = Views(camera, [(camera, Pose.of(turn_deg))]).see(light)[0]
+    assert view.light[15, 20] == pytest.approx(light[row, column], abs=1e-5) and not view.valid.any()
+
+
 def test_the_mask_is_where_the_rays_meet_the_picture() -> None:
     camera, pose = pinhole((90, 70), 60), POSES["both"]
     view = Views(SOURCE, [(camera, pose)], 2.0).see(noise())[0]
