@@ -365,6 +365,34 @@ def test_maps_of_depth_that_no_frame_had_are_told(tmp_path: Path, maps: int) -> 
                                " than the frames?"] * (maps == 6)  # fmt: skip
 
 
+class AskedDepth:
+    """Maps of the frames 2 to 5 of a video, which remember for which of them they were asked."""
+
+    plane_m, count = None, None
+
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+
+    def at(self, index: int, light: np.ndarray) -> np.ndarray:
+        self.asked.append(index)
+        return np.full(light.shape, 1.0 + index, np.float32)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_part_asks_for_the_depth_of_its_own_frames_alone(tmp_path: Path, first: int) -> None:
+    """Others may have none, and of a model each costs time."""
+    np.save(tmp_path / "a.npy", np.ones((9, 3, 5), np.float32))
+    depth = AskedDepth()
+    part = open_source(
+        tmp_path / "a.npy", fps=1, start=2, stop=5, seen_through=lambda whole, _: WithDepth(whole, depth, "a")
+    )
+    depth.asked.clear()
+    seen = list(part.frames(first))
+    assert depth.asked == list(range(2 + first, 6))
+    assert [float(frame.depth[0, 0]) for frame in seen] == [3.0 + first + k for k in range(4 - first)]
+    assert [frame.t_ns for frame in seen] == [(2 + first + k) * 10**9 for k in range(4 - first)]
+
+
 def test_a_size_may_be_two_numbers(tmp_path: Path) -> None:
     picture = np.random.default_rng(0).uniform(0, 3, (20, 30)).astype(np.float32)
     np.testing.assert_array_equal(framed(tmp_path, picture, size=(7, 9)), framed(tmp_path, picture, size="7x9"))

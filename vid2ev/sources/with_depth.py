@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +54,17 @@ class WithDepth(Edit):
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on."""
+        return self.frames_between(None, None, start)
+
+    def frames_between(self, since_ns: int | None, until_ns: int | None, start: int = 0) -> Iterator[Frame]:
+        """See `Divisible`; of frames outside of the part no depth is asked for."""
+        skipped = start if since_ns is None else 0
+        coming = enumerate(self.source.frames(skipped), skipped)
+        part = (each for each in coming if since_ns is None or each[1].t_ns >= since_ns)
         seen = 0
-        for index, frame in enumerate(self.source.frames(start), start):
+        for index, frame in islice(part, start - skipped, None):
+            if until_ns is not None and frame.t_ns > until_ns:
+                return
             yield replace(frame, depth=self._depth.at(index, frame.light))
             seen = index + 1
         self._frames = seen
