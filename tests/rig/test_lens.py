@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from vid2ev.rig.intrinsics import Framing, Intrinsics
@@ -100,6 +100,11 @@ def test_what_no_lens_sees_has_no_pixel() -> None:
 
 
 @settings(max_examples=60)
+@example(
+    [0.7993011981156823, 0.921875, 0.921875, -0.63404049338429, -0.84375, 0.7993011981156823, 0.0, -0.3949154126346851],
+    ("radtan", 8),
+    10.0,
+)  # infinite where Newton's method comes past
 @given(
     st.lists(st.floats(-1, 1), min_size=8, max_size=8),
     st.sampled_from([("radtan", 4), ("radtan", 5), ("radtan", 8), ("equidistant", 4)]),

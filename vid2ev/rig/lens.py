@@ -146,10 +146,10 @@ def _straightened(px: np.ndarray, plane: np.ndarray, camera: Intrinsics) -> np.n
         miss = px - here
         if not np.nanmax(np.abs(miss), initial=0) > 1e-3 * NEAR_PX:
             break
-        across = (_distorted(place + right, camera) - here) / step
-        down = (_distorted(place + lower, camera) - here) / step
-        area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):  # (a quotient of polynomials may be infinite in a place)
+            across = (_distorted(place + right, camera) - here) / step
+            down = (_distorted(place + lower, camera) - here) / step
+            area = across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]
             way = np.stack(
                 [
                     (miss[..., 0] * down[..., 1] - miss[..., 1] * down[..., 0]) / area,
