@@ -77,6 +77,16 @@ def test_a_plane_given_as_depth_is_the_plane(behind_m: float) -> None:
     np.testing.assert_allclose(by_depth.light[both], by_homography.light[both], atol=2e-4)
 
 
+def test_holes_are_filled_from_beyond_their_rim_also_by_wide_pixels() -> None:
+    """A rim of 3 px of the source, on which the light of the card is mixed in, is less than two px of half as many."""
+    light, depth_m = card_before_wall()
+    light[40:80, 100:103] = FRONT
+    view = Views(SOURCE, [(SOURCE.scaled_to((80, 60)), BESIDE)]).see(light, depth_m)[0]
+    hole = np.flatnonzero(~view.valid[30, :70])
+    assert len(hole) >= 5  # (the first of them is half the card)
+    np.testing.assert_allclose(view.light[22:38, hole[1:]], BACK, atol=1e-5)
+
+
 def test_it_agrees_with_the_inverse_warp_of_kornia() -> None:
     """Warped back by the depth of the other camera, which kornia needs and a slanted plane has in closed form."""
     pose, camera = Pose.of((1, -2, 3), (0.1, -0.05, 0.1)), SOURCE
