@@ -131,3 +131,12 @@ def test_a_part_of_a_picture_is_the_picture_at_its_places(name: str) -> None:
     back = framing.lens_of_whole(part)
     assert back.size == SIZE and back.distortion == whole.distortion
     np.testing.assert_allclose(back.matrix, whole.matrix, rtol=1e-14, atol=1e-11)
+
+
+@pytest.mark.parametrize("size", [(20, 20), (80, 10), (40, 30), (13, 47)])
+def test_of_another_shape_the_width_stays_and_rows_are_cut_or_added_on_both_sides(size: tuple[int, int]) -> None:
+    lens = Intrinsics(size=(40, 30), focal_px=(33.0, 31.0), centre_px=(18.0, 16.0))
+    other, across = lens.scaled_to(size), size[0] / 40
+    ends = [np.array([[-0.5, row], [width - 0.5, row]]) for width, row in ((40, 14.5), (size[0], (size[1] - 1) / 2))]
+    np.testing.assert_allclose(rays_of(ends[1], other), rays_of(ends[0], lens), atol=1e-12)
+    assert other.focal_px == pytest.approx((33 * across, 31 * across))

@@ -114,3 +114,18 @@ def test_pixels_of_a_slanted_surface_count_beside_a_cut_as_far_as_they_are_of_it
     first, second = -0.5 * 0.75 * 0.25**2, 1 - 2.5 * 0.75**2 + 1.5 * 0.75**3  # (Keys: of pixels 13 and 14; own is 15)
     expected = light[5, 15] - 0.2 * first - 0.1 * second
     assert sampled(Spline(light, Bands(1)), x, y, Bands(1), *cuts)[0, 0, 0] == pytest.approx(expected, abs=1e-5)
+
+
+def test_beside_a_cut_light_stays_within_that_of_the_pixels_of_its_surface() -> None:
+    """Cubic convolution by itself goes beyond a bright line: below zero beside it, above it within."""
+    source = Intrinsics(size=(32, 12), focal_px=(30.0, 30.0), centre_px=(15.5, 5.5))
+    columns = np.arange(32)
+    inverse = np.tile(np.where(columns < 16, 1, 0.1), (12, 1)).astype(np.float32)
+    light = np.tile(np.isin(columns, (13, 14)), (12, 1)).astype(np.float32)
+    surface = surface_of(inverse, corners_of(source), source)
+    x, y = np.meshgrid(np.linspace(12.0, 15.4, 35, dtype=np.float32), np.full(1, 5, np.float32))
+    cuts = surface.near_cut, surface.inverse[1:-1, 1:-1], surface.steep
+    assert surface.near_cut[5, 14:16].all()
+    found = sampled(Spline(light, Bands(1)), x, y, Bands(1), *cuts)[0, :, 0]
+    near = surface.near_cut[5, np.rint(x[0]).astype(int)]
+    assert near.sum() > 10 and found[near].min() >= 0 and found[near].max() <= 1
