@@ -95,6 +95,9 @@ def test_a_lens_of_another_shape_than_the_video_is_refused() -> None:
     assert rig.resolved((641, 360)).source.size == (641, 360)  # (rounded off)
     with pytest.raises(UsageError, match="1280x720 is of another shape than the video, 640x480"):
         rig.resolved((640, 480))
+    assert rig.resolved((640, 361)).source.size == (640, 361)
+    with pytest.raises(UsageError, match="640x362"):  # (two rows are not)
+        rig.resolved((640, 362))
 
 
 def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,3 +60,15 @@ def test_the_middle_is_the_mean_of_what_is_on_one_surface(
                     at for at in range(4) if ways[at] and (at + 1) % 4 in reached
                 }
             assert middles[k] == pytest.approx(corners[sorted(reached)].mean(), rel=1e-6)
+
+
+@pytest.mark.parametrize("across", [True, False])
+def test_a_cut_is_near_to_the_two_pixels_on_either_side(across: bool) -> None:
+    """Sampling looks two pixels away from the nearest one, from side to side and up and down."""
+    inverse = np.ones((20, 20), np.float32)
+    inverse[:, 12:] = 0.1
+    camera = Intrinsics.of_field((20, 20), 60)
+    found = surface_of(inverse if across else inverse.T.copy(), corners_of(camera), camera).near_cut
+    expected = np.zeros((20, 20), np.bool_)
+    expected[:, 10:14] = True
+    np.testing.assert_array_equal(found if across else found.T, expected)
