@@ -258,7 +258,7 @@ def test_how_much_of_a_scene_changes_is_known_of_short_ones() -> None:
 def test_too_few_frames_to_time_sleep_by_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "short.npz", frames=np.ones((3, 4, 4), np.float32), t=np.arange(3) / 100)
     done = CliRunner().invoke(example("benchmark_skip").main, ["--clip", str(tmp_path / "short.npz")])
-    assert done.exit_code == 2 and "3 frames, expected at least 12" in done.output
+    assert done.exit_code == 2 and "3 frames, expected at least 30" in done.output
 
 
 @pytest.mark.long
