@@ -30,20 +30,21 @@ MUXER = {"movflags": "+faststart"}  # the index comes first: playing begins whil
 # (nothing that looks at shrunken pictures in advance: of narrow ones the encoder reads what it never wrote, and now and
 # then makes other bytes)
 NO_LOOKAHEAD = "mbtree=0:rc-lookahead=0:scenecut=0:weightp=0"
+ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 SLOWEST_HZ = Fraction(1, 10**5)  # of films
 FINEST, TERMS = 10**6, 2**31 - 1  # denominators of their rates, and both terms, at the most
-ENCODER = {"preset": "veryfast", "crf": "18", "x264-params": NO_LOOKAHEAD}
 
 
 class Film:
-    """A film of pictures of `size` (width, height), at `fps` a second, as a context; raises OSError.
+    """A film of pictures of `size` (width, height), at `fps` a second or nearly (`rate_of_film`), as a context; raises
+    OSError.
 
     Odd sides are made even, as 4:2:0 needs them: the last row or column is there twice.  `transfer` is the code of
     the curve of the pictures' codes (H.273).
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: Fraction | int, transfer: int = BT709):
-        self.rate, self._transfer = Fraction(fps), transfer
+        self.rate, self._transfer = rate_of_film(Fraction(fps)), transfer
         self.frames = 0
         width, height = size
         self._margin = (0, height % 2), (0, width % 2), (0, 0)

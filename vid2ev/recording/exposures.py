@@ -118,9 +118,9 @@ class ExposureFiles:
             shutil.rmtree(copy_of, ignore_errors=True)
             shutil.copytree(self._folders[kind], copy_of, copy_function=_linked)
         if "mp4" in self.kinds and self.count:
-            from vid2ev.pictures.film import rate_of_film, write_film
+            from vid2ev.pictures.film import write_film
 
-            write_film(into / KINDS["mp4"], self._pictures(), rate_of_film(self.rate), tag_of(self.curve))
+            write_film(into / KINDS["mp4"], self._pictures(), self.rate, tag_of(self.curve))
         return [KINDS[kind] for kind in self.kinds if kind != "mp4" or self.count]
 
     def _pictures(self) -> Iterator[np.ndarray]:
