@@ -17,7 +17,7 @@ from vid2ev.kernels.layout import HIGH, INPUT, LANE_PITCH, LOW, PITCH
 from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64
 from vid2ev.physics.log_curve import light_at, log_level
-from vid2ev.physics.photoreceptor import response, response_terms, separate_rates
+from vid2ev.physics.photoreceptor import bracketed, response, response_terms, separate_rates
 
 F = np.float32
 # Planes of the lanes: the response, the piece, the end of the next piece and of the interval, the levels that the scan
@@ -310,16 +310,16 @@ def settle(level, jobs, s, k, b):
     end = d0 + (rise * hi + (c1 * expm1_64(-a * hi) + c2 * expm1_64(-b * hi)))
     if (end < 0.0) == up:  # the end that the next interval starts with is rounded: there, and not before it
         return hi
-    for turn in range(100):
+    step = hi - lo
+    for _ in range(100):
         m1, m2 = expm1_64(-a * s), expm1_64(-b * s)
         f = d0 + (rise * s + (c1 * m1 + c2 * m2))
         if (f < 0.0) == up:
             lo = s
         else:
             hi = s
-        newton = s - f / (rise - a * c1 * (1.0 + m1) - b * c2 * (1.0 + m2))
-        here = newton if (newton > lo) & (newton < hi) & (turn % 4 != 3) else 0.5 * (lo + hi)
-        if abs(here - s) < enough:
-            return here
-        s = here
+        here = bracketed(s - f / (rise - a * c1 * (1.0 + m1) - b * c2 * (1.0 + m2)), s, lo, hi, step)
+        step, s = abs(here - s), here
+        if step < enough:
+            break
     return s
