@@ -194,7 +194,7 @@ def take_forced(block, work, keys, chance, forced, p0, shots, planes, flags, num
     forced = keep_likely(block, work.scratch, keys, chance, forced, flags, num, iv)
     for j in range(forced):
         prefetch(planes.memory, p0 + place_of_candidate(keys[j], iv)[0])
-    if all_general(flags, iv):
+    if len(flags.track) > 0 or all_general(flags, iv):
         for j in range(forced):
             work.flagged[place_of_candidate(keys[j], iv)[0]] = 1
         return forced, shots

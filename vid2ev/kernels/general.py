@@ -1,9 +1,9 @@
 """Slow path for everything at once: one pixel, one interval, scalar code.
 
-Used where the closed forms of the two fast slow paths do not hold: a drift or noise added after a low-pass before the
-log, forced events, photoreceptor noise that the interval does not resolve, and the refractory kind `track`.  The
-comparator's input F(s) (`path`) is followed from knot to knot: turning points, forced events, the end of a refractory
-period.  With `timing = "frame"` it stays at its start until the frame is there.
+Used where the fast slow paths do not go: forced events, photoreceptor noise that the interval does not resolve, and the
+refractory kind `track` of signals that are straight lines.  The comparator's input F(s) (`path`) is followed from knot
+to knot: turning points, forced events, the end of a refractory period.  With `timing = "frame"` it stays at its start
+until the frame is there.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.kernels.blind import blind_until, stay_blind
 from vid2ev.kernels.crossing import (
     AT,
     HOT,
@@ -38,7 +39,7 @@ from vid2ev.physics.random import unit
 @inner
 def next_rice(path, knots, s, k, on, off, pixel, num, iv):
     """Candidate k of the unresolved noise after s: (its s, the expected number it stands for)."""
-    top, bottom = value(path, 0.0), value(path, 0.0)
+    top = bottom = value(path, 0.0)
     for knot in knots:
         here = value(path, knot)
         top, bottom = max(top, here), min(bottom, here)
@@ -84,17 +85,17 @@ def walk_pixel(
     off = lanes[AT] - lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
     piece, s, begin, solved, candidate = 0, 0.0, value(path, 0.0), 0, 0
-    blind_until = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
+    sees_from = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
     if len(flags.track) and good:
-        blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
+        sees_from = blind_until(pixel, planes, num, iv)
     rice_s, expected = next_rice(path, knots, s, 0, on, off, pixel, num, iv) if rice else (2.0, 0.0)
     while True:
         forced_s = 2.0
         if j < forced:
             whose, when = place_of_candidate(keys[j], iv)
             forced_s = when if whose == i else 2.0
-        blind = blind_until > s
-        blind_s = blind_until if blind else 2.0
+        blind = sees_from > s
+        blind_s = sees_from if blind else 2.0
         stop = min(min(knots[piece], forced_s), min(rice_s, blind_s))
         end = value(path, stop)
         if not blind and (end >= on or end <= off):
@@ -108,7 +109,7 @@ def walk_pixel(
             s, begin = here, at
             on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
             if len(flags.track):
-                blind_until = s + num.refractory_ns / iv.dt_ns
+                sees_from = blind_until(pixel, planes, num, iv)
             if rice:
                 candidate += 1
                 rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
@@ -119,13 +120,13 @@ def walk_pixel(
             fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)
             leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
-            blind_until = -1.0
+            sees_from = -1.0
         elif stop == forced_s:
             on, off, out, n = force(
                 lanes, pixels, pixel, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
             )
             if len(flags.track) and good:
-                blind_until = np.float64(planes.t_last[pixel] + num.refractory_ns - iv.t0_ns) / iv.dt_ns
+                sees_from = blind_until(pixel, planes, num, iv)
             j += 1
         elif stop == rice_s:
             polarity = accept_rice(path, s, candidate, expected, on, off, pixel, num, iv)
@@ -136,14 +137,14 @@ def walk_pixel(
                     lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
                 )
                 if len(flags.track):
-                    blind_until = s + num.refractory_ns / iv.dt_ns
+                    sees_from = blind_until(pixel, planes, num, iv)
             rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
         elif knots[piece] >= 1.0:
             break
         else:
             piece, solved = piece + 1, 0
-    if blind_until > 1.0:  # the levels are not known before the blind time ends: look at every interval until then
-        block[HIGH * PITCH + i], block[LOW * PITCH + i] = -np.inf, np.inf
+    if sees_from > 1.0:
+        stay_blind(pixel, planes, flags)
     return out, n
 
 

@@ -46,6 +46,7 @@ class Flags(NamedTuple):
     straight: tuple  # the comparator's input is a straight line in nats within the interval
     light_bandwidth: tuple
     leak: tuple
+    drift: tuple  # what is added to the log of a response of light is not the same all the time
     crossing_noise: tuple
     track: tuple  # the refractory period ends by memorising the signal
     noise: tuple  # photoreceptor noise

@@ -80,7 +80,18 @@ def path_of(block, scratch, i, flags, num, iv):
 @inner
 def value(path, s):
     """F(s) [nat]."""
-    y = path.end if s >= 1.0 else response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b)
+    return seen(path, path.end, 1.0) if s >= 1.0 else value_inside(path, s)
+
+
+@inner
+def value_inside(path, s):
+    """F(s) [nat] by the response, at the end of the interval, too."""
+    return seen(path, response(s, path.y0, path.rise, path.c1, path.c2, path.a, path.b), s)
+
+
+@inner
+def seen(path, y, s):
+    """What the comparator sees [nat] of a response that is y at s."""
     if path.light:
         y = log_level(max(y, 0.0), path.curve)
     return y + path.base + path.drift * s
@@ -138,10 +149,15 @@ def turns_of(path):
 @inner
 def slope_of(path, share, more):
     """y' + share y + more, which is a response."""
-    a, b = path.a, path.b
-    rise, c1, c2 = share * path.rise, (share - a) * path.c1, (share - b) * path.c2
-    start = path.rise - a * path.c1 - b * path.c2 + share * path.y0 + more
-    return plain(start, response(1.0, start, rise, c1, c2, a, b), rise, c1, c2, path)
+    start, rise, c1, c2 = slope_terms(path.y0, path.rise, path.c1, path.c2, path.a, path.b, share, more)
+    return plain(start, response(1.0, start, rise, c1, c2, path.a, path.b), rise, c1, c2, path)
+
+
+@inner
+def slope_terms(y0, rise, c1, c2, a, b, share, more):
+    """(y0, rise, c1, c2) of the same."""
+    start = rise - a * c1 - b * c2 + share * y0 + more
+    return start, share * rise, (share - a) * c1, (share - b) * c2
 
 
 @inner
@@ -198,6 +214,12 @@ def ahead_of(path, level, s):
     y, rate, bend = response_and_bend(path, s)
     there, drift = level - path.base - path.drift * s, path.drift
     if path.light:
-        there = light_at(there, path.curve)
-        drift /= log_slope(max(there, 0.0), path.curve)
+        there, drift = moved_light(there, drift, path.curve)
     return y - there, rate + drift, bend
+
+
+@inner
+def moved_light(level, drift, curve):
+    """The light of a level [nat], and how fast it falls while what is added to the log rises by a drift."""
+    light = light_at(level, curve)
+    return light, drift / log_slope(max(light, 0.0), curve)

@@ -1,7 +1,7 @@
 """The slow path: events of the pixels that the scan flagged, some blocks' worth at a time.
 
-Monotone piece by monotone piece: which levels are reached (`ladder`), when (`straight` or `response`), and what that
-leaves behind and sends (`crossing`).
+Monotone piece by monotone piece (`response`): which levels are reached (`ladder`), when (`straight` or `roots`), and
+what that leaves behind and sends (`crossing`).  Memories that jump to the signal go by rounds of their own (`blind`).
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.kernels.blind import climb_seeing
 from vid2ev.kernels.company import anyone
 from vid2ev.kernels.crossing import AT, LABEL, WHEN, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, few, lanes_with_more, next_rungs
 from vid2ev.kernels.layout import LANE_COUNT
-from vid2ev.kernels.response import batch_times, lane_times, load_responses, next_pieces, prepare_responses
+from vid2ev.kernels.response import load_responses, next_pieces, prepare_responses
+from vid2ev.kernels.roots import batch_times, lane_times
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
 
 
@@ -32,9 +34,9 @@ def climb(work, count, planes, flags, num, iv, out, n, tally):
     if len(flags.straight):
         prepare_lines(work.lanes, count, flags, num, iv)
     else:
-        prepare_responses(
-            work.lanes, work.turns, work.guesses, work.live, count, slower_rate(flags, iv), flags, num, iv
-        )
+        prepare_responses(work, count, slower_rate(flags, iv), flags, num, iv)
+        if len(flags.track):
+            return climb_seeing(work, count, slower_rate(flags, iv), planes, flags, num, iv, out, n, tally)
     while anyone(count > 0):
         count = few(count)
         load_thresholds(work.lanes, work.pixels, count, planes, flags, num)
@@ -45,7 +47,7 @@ def climb(work, count, planes, flags, num, iv, out, n, tally):
         leave_levels(work.lanes, work.pixels, count, planes, flags, num)
         if len(flags.straight):
             break
-        count = next_pieces(work.lanes, work.pixels, work.live, count, slower_rate(flags, iv), flags, num)
+        count = next_pieces(work, count, slower_rate(flags, iv), flags, num)
     return out, n
 
 

@@ -47,20 +47,20 @@ def flags_of(spec: DvsSpec, labels: bool) -> Flags:
         straight=flag(straight),
         light_bandwidth=flag(spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0),
         leak=flag(leak),
+        drift=flag(not straight and not log_input and (leak or noise)),
         crossing_noise=flag(spec.crossing_noise > 0),
         track=flag(track),
         noise=flag(noise),
         forced=flag(forced),
         labels=flag(labels and (leak or forced)),
         uncounted=flag(not straight or refractory or (labels and leak)),
-        # A drift after a low-pass that acts on the light has none, nor has a memory that jumps to the signal.
-        no_closed_form=flag(track or (not straight and not log_input and (leak or noise))),
+        no_closed_form=flag(straight and track),
     )
 
 
 def flags_at_rest(flags: Flags) -> Flags:
     """Those that pixels are settled and roused by: without what only their walk goes by."""
-    return flags._replace(straight=OFF, track=OFF, forced=OFF, uncounted=OFF, no_closed_form=OFF)
+    return flags._replace(straight=OFF, drift=OFF, track=OFF, forced=OFF, uncounted=OFF, no_closed_form=OFF)
 
 
 def numbers_of(spec: DvsSpec, seed: int, camera: int) -> Numbers:
