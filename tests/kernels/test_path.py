@@ -31,6 +31,12 @@ def walked(path, s):
     return knots, values, met
 
 
+@compiled
+def left_at_once(path, level, start, up):
+    """Where a path that is at a level at `start` reaches it."""
+    return reach(path, level, start, 1.0, level, level, up)
+
+
 def path_of_light(light: float, rise: float, lags: tuple[float, float], rates: tuple[float, float], drift: float,
                   curve: Curve) -> Path:  # fmt: skip
     """A path of light behind two poles, the lags of which are these shares of the light."""
@@ -65,6 +71,15 @@ def goes_one_way(path: Path) -> None:
         begin, end, there = walked(path, np.array([start, knot, reached]))[1]
         assert there == pytest.approx((begin + end) / 2, abs=1e-9 + 1e-6 * abs(end - begin))
         start = knot
+
+
+@pytest.mark.parametrize("up", [True, False])
+def test_a_level_that_a_signal_starts_at_is_reached_there(up):
+    """Also by one that stays, as where noise has just brought a memory one threshold away from steady light."""
+    still = path_of_light(0.5, 0.0, (0.0, 0.0), (3.0, 10.0), 0.0, CURVES[0])
+    level = walked(still, np.array([0.0]))[1][0]
+    for start in (0.0, 0.25):
+        assert left_at_once(still, level, start, up) == start
 
 
 def test_a_leak_that_outruns_the_fall_of_light_turns_the_signal_twice():

@@ -189,7 +189,7 @@ def reach(path, level, lo, hi, begin, end, up):
     Bracketed steps of Halley's method from the chord's root, in the filter's domain: light is nearer to a straight
     line and an exponential there than its log.
     """
-    if (begin >= level) == up:
+    if begin == level or (begin > level) == up:  # (where it stays there is no chord)
         return lo
     s, step, fastest = lo + (hi - lo) * min((level - begin) / (end - begin), 1.0), hi - lo, max(path.a, path.b)
     for _ in range(80):
