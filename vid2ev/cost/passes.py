@@ -32,7 +32,7 @@ PICTURES = 8  # of each view, kept for comparison
 
 
 class Float64Dvs(Dvs):
-    """An event sensor that takes all pixels' lags to be too steep for float32 (`kernels.scan.refine`)."""
+    """An event sensor that takes all pixels' lags to be too steep for float32 (`kernels.steep.refine`)."""
 
     def __init__(self, *arguments: Any, **options: Any):
         super().__init__(*arguments, **options | {"skip": False})

@@ -12,8 +12,8 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import BLOCK, PITCH, STRIP
+from vid2ev.kernels.light import BRIGHTEST
 from vid2ev.kernels.measured import BEHIND, BENDS, LEVEL, LIGHT, SEEN, SMOOTH, TRACE, first_tau, left_of
-from vid2ev.kernels.scan import BRIGHTEST
 
 F = np.float32
 STRIPS = BLOCK // STRIP

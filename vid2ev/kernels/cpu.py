@@ -10,13 +10,16 @@ from vid2ev.kernels.crossing import cross
 from vid2ev.kernels.forced import candidates, keep_likely, place_of_candidate
 from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import BLOCK, HIGH, LANE_COUNT, LOW, PITCH, STRIP, stride_of
+from vid2ev.kernels.light import read_light
 from vid2ev.kernels.naps import AWAKE, give_back, of_frame
 from vid2ev.kernels.rows import RISEN, interval_of_row
-from vid2ev.kernels.scan import NEW, commit, forget_rests, note_rests, read_light, scan
+from vid2ev.kernels.scan import commit, scan
+from vid2ev.kernels.scratch import NEW
 from vid2ev.kernels.settle import settle_lanes, shift_pixel
 from vid2ev.kernels.shots import aim
 from vid2ev.kernels.sleep import doze, next_run, stir
 from vid2ev.kernels.slow import climb, load
+from vid2ev.kernels.steep import forget_rests, note_rests
 
 AHEAD = 64  # entries of float32 in four lines of a cache
 

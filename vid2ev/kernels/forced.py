@@ -10,7 +10,7 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import INPUT, PITCH
-from vid2ev.kernels.scan import NEW
+from vid2ev.kernels.scratch import NEW
 from vid2ev.physics.elementary import log64
 from vid2ev.physics.log_curve import light_at
 from vid2ev.physics.random import HOT, SHOT, philox, unit

@@ -16,7 +16,8 @@ import numpy as np
 
 from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.layout import BLOCK, LAG1, LAG2, PITCH, STRIP, last_light, stride_of
-from vid2ev.kernels.scan import CLOCK, LIGHT, NEW1, NEW2, NOISE0, NOISE1, SEEN, light_weights
+from vid2ev.kernels.scan import light_weights
+from vid2ev.kernels.scratch import CLOCK, LIGHT, NEW1, NEW2, NOISE0, NOISE1, SEEN
 from vid2ev.stream.still import NOT_SAID
 
 F = np.float32

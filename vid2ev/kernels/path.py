@@ -14,7 +14,8 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.layout import INPUT, PITCH
-from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
+from vid2ev.kernels.scratch import CLOCK, NEW, NOISE0, NOISE1
+from vid2ev.kernels.steep import new_lag, old_lag
 from vid2ev.physics.elementary import expm1_64
 from vid2ev.physics.log_curve import Curve, light_at, log_level, log_slope
 from vid2ev.physics.photoreceptor import (

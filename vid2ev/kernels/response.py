@@ -38,7 +38,8 @@ from vid2ev.kernels.lanes import (
     enter,
 )  # fmt: skip
 from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH
-from vid2ev.kernels.scan import CLOCK, NEW, NOISE0, NOISE1, new_lag, old_lag
+from vid2ev.kernels.scratch import CLOCK, NEW, NOISE0, NOISE1
+from vid2ev.kernels.steep import new_lag, old_lag
 from vid2ev.physics.elementary import exp64
 from vid2ev.physics.photoreceptor import response_terms, separate_rates
 

@@ -14,7 +14,8 @@ from vid2ev.kernels.crossing import AT, LABEL, SHOT, UP, WHEN, least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import HIGH, LAG1, LANE_COUNT, PITCH
 from vid2ev.kernels.path import path_of, value
-from vid2ev.kernels.scan import CLOCK, NEW1, turns_at
+from vid2ev.kernels.scan import turns_at
+from vid2ev.kernels.scratch import CLOCK, NEW1
 from vid2ev.physics.thresholds import FLOOR
 
 

@@ -39,7 +39,8 @@ from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
 from vid2ev.kernels.naps import AWAKE, LONGEST, NAPS, SLEEPS, borrow, catch_up
-from vid2ev.kernels.scan import NEW, NOISE0, STEEP
+from vid2ev.kernels.scratch import NEW, NOISE0
+from vid2ev.kernels.steep import STEEP
 from vid2ev.physics.elementary import exp64, log64
 from vid2ev.physics.log_curve import log_level_32
 

@@ -11,8 +11,9 @@ from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
 from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
-from vid2ev.kernels.scan import NEW, NOISE0, NOISE1, new_lag, old_lag
+from vid2ev.kernels.scratch import NEW, NOISE0, NOISE1
 from vid2ev.kernels.sink import put, put_two, replace_last, room
+from vid2ev.kernels.steep import new_lag, old_lag
 from vid2ev.physics.log_curve import log_level
 
 START, PER_NAT, ADDED0, ADDED1 = (AFTER_LADDER + k * LANE_PITCH for k in range(4))

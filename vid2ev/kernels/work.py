@@ -15,7 +15,7 @@ from vid2ev.kernels.layout import BLOCK, LANE_COUNT, LANE_PITCH
 from vid2ev.kernels.path import KNOTS
 from vid2ev.kernels.response import LANES
 from vid2ev.kernels.roots import GUESSES, JOBS
-from vid2ev.kernels.scan import SCRATCH
+from vid2ev.kernels.scratch import SCRATCH
 from vid2ev.kernels.turns import TURNS
 
 LINE = 64  # bytes

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, BLOCK_BITS, INPUT, LAG1, PITCH, Flags, Numbers, Planes, stride_of
-from vid2ev.kernels.scan import STEEP
+from vid2ev.kernels.steep import STEEP
 from vid2ev.physics.log_curve import log_level
 
 

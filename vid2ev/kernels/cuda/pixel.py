@@ -14,21 +14,13 @@ from vid2ev.kernels.cuda.staged import Staged, send_waiting
 from vid2ev.kernels.forced import keep_likely
 from vid2ev.kernels.general import walk_pixel
 from vid2ev.kernels.layout import LAG1, NOT_FINITE, Planes, stride_of
+from vid2ev.kernels.light import BRIGHTEST
 from vid2ev.kernels.rows import RISEN, interval_of_row
-from vid2ev.kernels.scan import (
-    BRIGHTEST,
-    NEW,
-    SCRATCH,
-    advance,
-    advance_noise,
-    commit,
-    flag_rice,
-    forget_rests,
-    note_rests,
-    scan,
-)
+from vid2ev.kernels.scan import advance, advance_noise, commit, flag_rice, scan
+from vid2ev.kernels.scratch import NEW, SCRATCH
 from vid2ev.kernels.settle import settle_lanes, shift_pixel
 from vid2ev.kernels.slow import climb, load
+from vid2ev.kernels.steep import forget_rests, note_rests
 
 F = np.float32
 
