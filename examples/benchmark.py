@@ -50,6 +50,7 @@ PRESETS = {  # name -> the sensor and what is changed in it
     "paper": ("paper", ()),
     "v2e-clean": ("v2e-clean", ()),
     "v2e-noisy": ("v2e-noisy", ()),
+    "davis346": ("davis346", ()),
 }
 THRESHOLDS = ("threshold_on=0.2", "threshold_off=0.2")
 # Bundled with scikit-image, so that every machine has the same.
