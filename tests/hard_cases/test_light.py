@@ -161,3 +161,14 @@ def test_codes_are_not_taken_for_light(dtype):
 def test_another_shape_is_refused(shape):
     with pytest.raises(UsageError, match=r"\(5, 7\)"):
         Dvs(clean(), (7, 5)).step(np.ones(shape, np.float32), 0)
+
+
+def test_a_threshold_beyond_all_numbers_of_float32_leaves_the_other_polarity_as_it_is():
+    """As one that no light reaches does, also in the dark after a flash, where lags are steep."""
+    frames = np.array([1e4, 1e4, 0, 0, 0], np.float32)[:, None, None]
+    out_of_reach, beyond = (
+        play(clean(threshold_on=on, photoreceptor_tau_us=300, follower_tau_us=100), np.arange(5) * 2_000_000, frames)
+        for on in (20.0, 100.0)
+    )
+    assert len(out_of_reach) > 50
+    np.testing.assert_array_equal(beyond.t, out_of_reach.t)

@@ -18,6 +18,7 @@ from vid2ev.physics.photoreceptor import light_weights_32
 from vid2ev.physics.photoreceptor_noise import noise_draw, rice_expected, rice_gap
 
 F = np.float32
+HIGHEST = 3e38  # a level in light, for what float32 has no number for: that is for pixels that have no levels
 MARGIN = 1.5e-6  # [nat]: 4 units in the last place of a level near 7 nat
 
 
@@ -211,4 +212,4 @@ def compared(into, levels, inward, count, flags, num):
     else:
         raised = num.curve.dark if len(flags.leak) else 0.0
         for j in range(count):
-            into[j] = light_at(levels[j] + inward, num.curve) + raised
+            into[j] = min(light_at(levels[j] + inward, num.curve) + raised, HIGHEST)

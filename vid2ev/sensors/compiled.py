@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from vid2ev.kernels.layout import BLOCK, OFF, ON, PITCH, Flags, Interval, Numbers, Planes, stride_of
+from vid2ev.kernels.scan import HIGHEST
 from vid2ev.kernels.work import aligned
 from vid2ev.physics.bad_pixels import bad_pixel_map
 from vid2ev.physics.log_curve import curve_of
@@ -17,6 +18,7 @@ from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 
 F = np.float32
+STEEPEST_LEAK_NAT = 80.0  # between two frames, by which light in float32 may be multiplied
 UNUSED = 2  # (a single entry is never spread out)
 RECORDS: dict[str, tuple[type, tuple[int, ...]]] = {  # the planes that only the slow path touches
     "memory": (np.float64, ()),
@@ -169,7 +171,8 @@ def interval_of(
     weights = step_weights(dt, num.tau1_ns, num.tau2_ns)
     leak0 = num.leak_nat_per_ns * (t0_ns - leak_since_ns)
     leak1 = num.leak_nat_per_ns * (t1_ns - leak_since_ns)
-    gain = math.exp(min(leak1, 80.0))
+    # (beyond float32 every light is at the highest level)
+    gain, shift = (math.exp(leak1), num.curve.dark * math.exp(leak1)) if leak1 < STEEPEST_LEAK_NAT else (0.0, HIGHEST)
     resolved = bool(flags.noise) and dt * RESOLVED <= num.tau2_ns
     noise = (0.0,) * 6
     if resolved:
@@ -191,7 +194,7 @@ def interval_of(
         leak0=leak0,
         leak1=leak1,
         gain=F(gain),
-        shift=F(num.curve.dark * gain),
+        shift=F(shift),
         noise_keep1=F(keep1),
         noise_mix=F(mix),
         noise_keep2=F(keep2),
