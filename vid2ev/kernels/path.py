@@ -17,7 +17,7 @@ from vid2ev.kernels.layout import INPUT, PITCH
 from vid2ev.kernels.scratch import CLOCK, NEW, NOISE0, NOISE1
 from vid2ev.kernels.steep import new_lag, old_lag
 from vid2ev.physics.elementary import expm1_64
-from vid2ev.physics.log_curve import Curve, light_at, log_level, log_slope
+from vid2ev.physics.log_curve import Curve, light_at, log_level
 from vid2ev.physics.photoreceptor import (
     bracketed,
     response,
@@ -210,17 +210,18 @@ def reach(path, level, lo, hi, begin, end, up):
 
 @inner
 def ahead_of(path, level, s):
-    """How far y(s) is above what makes a level [nat] of F there, and the first two derivatives of that; the drift is so
-    slow that it hardly bends."""
+    """How far y(s) is above what makes a level [nat] of F there, and the first two derivatives of that."""
     y, rate, bend = response_and_bend(path, s)
-    there, drift = level - path.base - path.drift * s, path.drift
+    there, fall, less = level - path.base - path.drift * s, path.drift, 0.0
     if path.light:
-        there, drift = moved_light(there, drift, path.curve)
-    return y - there, rate + drift, bend
+        there, fall, less = moved_light(there, path.drift, path.curve)
+    return y - there, rate + fall, bend - less
 
 
 @inner
 def moved_light(level, drift, curve):
-    """The light of a level [nat], and how fast it falls while what is added to the log rises by a drift."""
-    light = light_at(level, curve)
-    return light, drift / log_slope(max(light, 0.0), curve)
+    """The light of a level [nat], how fast it falls while what is added to the log rises by a drift, and how fast it
+    falls less and less."""
+    light, dim = light_at(level, curve), level < curve.log_knee
+    fall = drift / curve.slope if dim else drift * (light + curve.dark)
+    return light, fall, 0.0 if dim else drift * fall

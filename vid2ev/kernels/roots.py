@@ -130,7 +130,8 @@ def guess(levels, jobs, guesses, count, drift, num):
         level, rise, up = levels[k], jobs[RISE + k], stop > start
         if len(drift):  # (as if the light did what its level does)
             middle = 0.5 * (lo + hi)
-            level, fall = moved_light(levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * middle, jobs[DRIFT + k], num.curve)
+            there, drifts = levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * middle, jobs[DRIFT + k]
+            level, fall, _ = moved_light(there, drifts, num.curve)
             level, rise, up = level + fall * middle, rise + fall, jobs[WAY + k] > 0.0
             start, stop = start + fall * lo, stop + fall * hi
         share = (level - start) / (stop - start)
@@ -170,9 +171,10 @@ def polished(levels, jobs, s, k, b, poles, drift, num):
     m2 = expm1_64(-b * s) if two else 0.0
     k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
     level, d, bend = levels[k], rise - k1 - k2, a * k1 + b * k2
-    if len(drift):  # (so slow that it hardly bends)
-        level, fall = moved_light(levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * s, jobs[DRIFT + k], num.curve)
-        d += fall
+    if len(drift):
+        there, drifts = levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * s, jobs[DRIFT + k]
+        level, fall, less = moved_light(there, drifts, num.curve)
+        d, bend = d + fall, bend - less
     f = (jobs[Y0 + k] - level) + (rise * s + (c1 * m1 + c2 * m2))
     step = -(f * d) / (d * d - 0.5 * f * bend)
     there = s + step
