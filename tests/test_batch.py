@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 from vid2ev import Events, read_events
 from vid2ev.commands import batch, main
 from vid2ev.formats.event_file import Recording
+from vid2ev.formats.frame_index import write_frame_index
 from vid2ev.sources import many
-from vid2ev.tracks.outputs import write_frame_index
 
 QUICK = ["--upsample", "none", "--threads", "1", "--fps", "100", "--no-preview"]
 

@@ -15,11 +15,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from vid2ev import convert
 from vid2ev.commands.render import render as command
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, Picture, Recording, within
 from vid2ev.formats.hdf5 import write_events
 from vid2ev.pictures.colours import GROUND, OFF, ON, in_8_bits
+from vid2ev.reformat import reformat
 from vid2ev.stream.events import Events
 from vid2ev.views import canvas
 from vid2ev.views import render as rendering
@@ -276,6 +278,42 @@ def test_frames_are_under_wide_events(filmed: Filmed) -> None:
     assert render("davis.aedat4", "-o", "b.png", "--no-frames", "--no-stamp")["size"] == [1280, 480]
     # (frames that are not shown have their times all the same)
     assert render("davis.aedat4", "-o", "c.png", "--by", "source", "--no-frames")["slices"] == 5
+
+
+@pytest.mark.parametrize("kind", ["csv", "evt3", "dat", "npz", "v2e-hdf5"])
+def test_a_recording_tells_its_frames_whatever_format_its_events_have(kind: str) -> None:
+    """As from events.h5, which has their instants inside; others have them beside."""
+    clip = np.linspace(0.1, 0.9, 6)[:, None, None] * np.linspace(0.5, 1, 32 * 24).reshape(24, 32)
+    np.savez("clip.npz", frames=clip.astype(np.float32), t_us=np.cumsum([0, 10_000, 30_000, 20_000, 5_000, 15_000]))
+    asked = ["--by", "source", "--size", "64", "--no-stamp"]
+    for name in ("hdf5", kind):
+        convert("clip.npz", name, formats=[name], preview=False)
+        render(name, "-o", f"{name}-pictures", *asked)
+        render(name, "-o", f"{name}-part", *asked, "--start", "0.02", "--stop", "0.07")
+    for part in ("pictures", "part"):
+        expected = {path.name: path.read_bytes() for path in Path(f"hdf5-{part}").iterdir()}
+        assert (
+            len(expected) > 3
+            and {path.name: path.read_bytes() for path in Path(f"{kind}-{part}").iterdir()} == expected
+        )
+
+
+def test_an_index_of_frames_that_is_none_is_refused() -> None:
+    write(scattered())
+    file = reformat("events.h5", "events.csv")
+    assert file["events"] > 0
+    Path("events.h5").unlink()
+    for text in (
+        "t_us,events\n5,0\n5,1\n",
+        "t,n\n0,0\n",
+        "t_us,events\none,0\n",
+        "",
+        "t_us,events\n99999999999999999999,0\n",
+    ):
+        Path("frame_index.csv").write_text(text)
+        refused(DataError, "frame_index.csv", "events.csv", "-o", "a.png", "--by", "source")
+    Path("events.csv").rename("other.csv")  # (the index speaks for files of a recording)
+    refused(UsageError, "times of the frames", "other.csv", "-o", "a.png", "--by", "source")
 
 
 # ------------------------------------------------------------------------------------------------------ what does not

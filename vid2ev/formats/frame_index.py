@@ -1,8 +1,16 @@
-"""How many events there are up to each frame of the source."""
+"""How many events there are up to each frame of the source; `frame_index.csv` says it beside files that do not."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+
+from vid2ev.errors import DataError
+from vid2ev.formats.event_file import Recording
+from vid2ev.untrusted import check_bytes, check_file
+
+FRAME_INDEX, HEADER = "frame_index.csv", "t_us,events"
 
 
 class FrameIndex:
@@ -22,3 +30,37 @@ class FrameIndex:
         self.counts[part] = start + np.searchsorted(t, self.frame_us[part], side="right")
         self._known = max(self._known, known)
         self.counts[self._known :] = start + len(t)
+
+
+def write_frame_index(path: Path, recording: Recording) -> None:
+    """The instants of the frames of the source, and the number of events up to each, as CSV: events number a ... b - 1
+    are those of the interval between two frames with counts a and b.  Raises OSError."""
+    assert recording.frame_us is not None
+    index = FrameIndex(recording.frame_us)
+    start = 0
+    for events in recording.blocks():
+        index.add(events.t, start)
+        start += len(events)
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write(f"{HEADER}\n")
+        file.writelines(f"{t_us},{count}\n" for t_us, count in zip(index.frame_us, index.counts, strict=True))
+
+
+def frame_times_beside(events: Path) -> np.ndarray | None:
+    """The instants of the frames [us] that stand beside the event file of a recording; None if there are none.
+
+    Raises DataError for a file that is no such index.
+    """
+    path = events.parent / FRAME_INDEX
+    if not (events.name.startswith("events") and path.exists()):
+        return None
+    check_file(path)
+    try:
+        check_bytes(path, path.stat().st_size)
+        head, *rows = path.read_text("utf-8").splitlines()
+        times = np.array([row.split(",")[0] for row in rows], np.int64)
+    except (OSError, ValueError, OverflowError) as error:
+        raise DataError(f"{path} cannot be read ({error}); convert again, or choose --by duration:10ms") from error
+    if head != HEADER or (np.diff(times) <= 0).any():
+        raise DataError(f"{path}: expected {HEADER}, and later times in later lines; convert again")
+    return times

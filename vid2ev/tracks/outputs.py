@@ -11,13 +11,12 @@ from typing import Any
 from vid2ev.errors import SavedError, UsageError
 from vid2ev.formats import FORMATS, check_holds, format_named
 from vid2ev.formats.event_file import Format, Recording
-from vid2ev.formats.frame_index import FrameIndex
+from vid2ev.formats.frame_index import FRAME_INDEX, write_frame_index
 from vid2ev.recording import exposures
 from vid2ev.requests import names_in
 from vid2ev.views.on_disk import KINDS, write_frames
 from vid2ev.views.requests import parse_representation, parse_slicing
 
-FRAME_INDEX = "frame_index.csv"
 FRAMES_BY, FRAMES_AS = "duration:10ms", "counts"
 
 
@@ -151,20 +150,6 @@ class Outputs:
         if self.frames is not None:
             path = folder / KINDS[self.frames]
             write_frames(path, recording, self.frames_as, self.frames_by, kind=self.frames)
-
-
-def write_frame_index(path: Path, recording: Recording) -> None:
-    """The instants of the frames of the source, and the number of events up to each, as CSV: events number a ... b - 1
-    are those of the interval between two frames with counts a and b.  Raises OSError."""
-    assert recording.frame_us is not None
-    index = FrameIndex(recording.frame_us)
-    start = 0
-    for events in recording.blocks():
-        index.add(events.t, start)
-        start += len(events)
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        file.write("t_us,events\n")
-        file.writelines(f"{t_us},{count}\n" for t_us, count in zip(index.frame_us, index.counts, strict=True))
 
 
 def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:

@@ -19,6 +19,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
+from vid2ev.formats.frame_index import frame_times_beside
 from vid2ev.pictures.film import film_size
 from vid2ev.recording.disk import whole, writing
 from vid2ev.views.canvas import Canvas
@@ -76,7 +77,8 @@ def render(
     slicing, kind = _slicing(by, rate, speed), _kind(view)
     file = open_events(of_only_camera(events))
     zero_us = beginning_us(file)
-    recording = _recording(file, zero_us, start_s, stop_s, bool(frames))
+    frame_us = frame_times_beside(file.path) if isinstance(slicing, Source) and not file.has_frames else None
+    recording = _recording(file, zero_us, start_s, stop_s, bool(frames), frame_us)
     if isinstance(slicing, Source):
         recording = with_frame_times(recording)
     if made_as == "png" and by is None and (start_s, stop_s) != (None, None):
@@ -148,14 +150,21 @@ def _kind(view: str) -> Kind:
     return parse_representation(VIEWS[name] + colon + rest)
 
 
-def _recording(file: EventFile, zero_us: int, start_s: float | None, stop_s: float | None, frames: bool) -> Recording:
-    """The window of a file, which has to have `frames` if so."""
+def _recording(
+    file: EventFile,
+    zero_us: int,
+    start_s: float | None,
+    stop_s: float | None,
+    frames: bool,
+    frame_us: np.ndarray | None,
+) -> Recording:
+    """The window of a file, which has to have `frames` if so; their instants may stand beside it."""
     if start_s is not None and stop_s is not None and stop_s <= start_s:
         raise UsageError(f"--stop {stop_s:g} is not after --start {start_s:g}; choose a later one")
     if frames and not file.has_frames:
         raise UsageError(f"{file.path} holds no frames beside its events; leave out --with-frames")
     start_us, stop_us = (None if s is None else zero_us + round(s * 1e6) for s in (start_s, stop_s))
-    recording = window(file, zero_us if start_us is None else start_us, stop_us, as_seen=True)
+    recording = window(file, zero_us if start_us is None else start_us, stop_us, as_seen=True, frame_us=frame_us)
     if not recording.count and (start_s, stop_s) != (None, None):
         raise UsageError(f"{file.path}: no events from {start_s or 0:g} s to {_end(stop_s)}; choose another window")
     return recording

@@ -25,14 +25,22 @@ def beginning_us(file: EventFile) -> int:
     return first if first - file.start_us > LONG_US else min(first, file.start_us)
 
 
-def window(file: EventFile, start_us: int, stop_us: int | None = None, *, as_seen: bool = False) -> Recording:
+def window(
+    file: EventFile,
+    start_us: int,
+    stop_us: int | None = None,
+    *,
+    as_seen: bool = False,
+    frame_us: np.ndarray | None = None,
+) -> Recording:
     """The events and frames with start_us <= t <= stop_us.
 
     It ends with the last of these.  Reads all of the events once; raises as `survey` does.
 
     as_seen   with the last frame before them, too: it is what is seen as they begin
+    frame_us  the instants of frames, of a file that does not say them
     """
-    return survey(_Window(file, start_us, stop_us, as_seen))
+    return survey(_Window(file, start_us, stop_us, as_seen, frame_us))
 
 
 def with_frame_times(recording: Recording) -> Recording:
@@ -45,11 +53,12 @@ def with_frame_times(recording: Recording) -> Recording:
 class _Window:
     """An event file of which only a part is there."""
 
-    def __init__(self, file: EventFile, start_us: int, stop_us: int | None, as_seen: bool):
+    def __init__(self, file: EventFile, start_us: int, stop_us: int | None, as_seen: bool, frame_us: np.ndarray | None):
         self._file, self.start_us, self._stop_us, self._as_seen = file, start_us, stop_us, as_seen
         self.path, self.size, self.labelled, self.has_frames = file.path, file.size, file.labelled, file.has_frames
         self.says_start, self.warnings, self.describe = True, file.warnings, file.describe
         known: np.ndarray | None = getattr(file, "frame_us", None)
+        known = frame_us if known is None else known
         self.frame_us = None if known is None else known[(known >= start_us) & ~self._is_later(known)]
 
     def events(self, start_us: int | None = None, stop_us: int | None = None, block: int = BLOCK) -> Iterator[Events]:
