@@ -350,6 +350,23 @@ def test_frames_to_rebuild_are_those_of_a_camera_that_sees_what_key_frames_show(
     same(sequence.events(start_us, stop_us).within(SIZE)[0], Events.concatenate(read_events(made / "c")))
 
 
+def test_a_recording_that_cannot_be_interpolated_says_what_it_lacks(tmp_path: Path) -> None:
+    source, rig = images(tmp_path / "in", moving(4)), tmp_path / "rig.toml"
+    rig.write_text('[[camera]]\nname = "a"\nkind = "cis"\n')
+    for name, options, sentence in (
+        ("events", {}, "a recording without frames; convert its video with --frames$"),
+        (
+            "film",
+            {"frame_camera": True, "pictures": ["mp4"]},
+            "in a film alone.* convert its video with --cis-out raw$",
+        ),
+        ("frames", {"rig": rig, "pictures": ["png"]}, "of frames alone.* with an event camera"),
+    ):
+        convert(source, tmp_path / name, preview=False, threads=1, **options)
+        with pytest.raises(DataError, match=sentence):
+            interpolate(tmp_path / name, tmp_path / "out", multiple=2)
+
+
 def test_events_of_a_camera_that_stands_elsewhere_are_said_to_be_brought(tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     cameras = [f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\n' for kind in ("dvs", "cis")]

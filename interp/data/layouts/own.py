@@ -43,7 +43,7 @@ class Own:
         frames = sorted((each for each in cameras if each["kind"] == "cis"), key=lambda each: each["rate_hz"])
         events = [each for each in cameras if each["kind"] == "dvs"]
         if not events or not frames:
-            raise DataError(f"{folder}: a recording without events or without frames; convert its video with --frames")
+            raise DataError(f"{folder}: {_lack(folder, bool(events))}")
         keys = frames[0]
         beside = {each["name"]: calibration.apart(keys["name"], each["name"]) for each in cameras}
         alike = [each for each in frames if each["size"] == keys["size"] and not beside[each["name"]]]
@@ -113,6 +113,15 @@ class Own:
         parts = list(read_events(self.events_folder, start_us + 1, stop_us + 1))
         t, x, y, p = (np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in "txyp")
         return Placed(t.astype(np.int64), x.astype(np.float32), y.astype(np.float32), p.astype(np.uint8))
+
+
+def _lack(folder: Path, events: bool) -> str:
+    """What a recording would need, and has not."""
+    if not events:
+        return "a recording of frames alone; convert its video with an event camera in the rig, or without a rig"
+    if any(folder.glob(f"*/{KINDS['mp4']}")):
+        return "its frames are in a film alone, which has not their times; convert its video with --cis-out raw"
+    return "a recording without frames; convert its video with --frames"
 
 
 def _check_events(folder: Path) -> None:
