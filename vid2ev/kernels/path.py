@@ -28,6 +28,7 @@ from vid2ev.physics.photoreceptor import (
 )
 
 ENOUGH = 1e-4  # last step, in units of the faster time constant or of how the slope changes: what is left is its cube
+BLINDING = 300.0  # [nat]: beyond all light, and products of three such lights are still numbers
 KNOTS = 12  # room for the ends of pieces: each of three responses reaches a level three times at most
 
 
@@ -195,15 +196,17 @@ def reach(path, level, lo, hi, begin, end, up):
     s, step, fastest = lo + (hi - lo) * min((level - begin) / (end - begin), 1.0), hi - lo, max(path.a, path.b)
     for _ in range(80):
         ahead, rate, bend = ahead_of(path, level, s)
+        dim = dim_at(path, level, s)
         if (ahead < 0.0) == up:
             lo = s
         else:
             hi = s
-        there = s - (ahead * rate) / (rate * rate - 0.5 * ahead * bend)
+        newton = ahead / rate  # (infinite where the slope is 0, which is no reason to stay)
+        there = s - newton / (1.0 - 0.5 * newton * (bend / rate))
         here = bracketed(there, s, lo, hi, step)
         step, s = abs(here - s), here
         near = (here == there) & (step * max(max(1.0, abs(bend / rate)), fastest) < ENOUGH)
-        if near | (step < 1e-13):
+        if near & (dim_at(path, level, here) == dim) | (step < 1e-13):
             return here
     return s
 
@@ -219,9 +222,15 @@ def ahead_of(path, level, s):
 
 
 @inner
+def dim_at(path, level, s):
+    """Whether a level [nat] of F is below a knee of the curve at s, beyond which its light moves another way."""
+    return path.light & (level - path.base - path.drift * s < path.curve.log_knee)
+
+
+@inner
 def moved_light(level, drift, curve):
     """The light of a level [nat], how fast it falls while what is added to the log rises by a drift, and how fast it
     falls less and less."""
-    light, dim = light_at(level, curve), level < curve.log_knee
+    light, dim = light_at(min(level, BLINDING), curve), level < curve.log_knee
     fall = drift / curve.slope if dim else drift * (light + curve.dark)
     return light, fall, 0.0 if dim else drift * fall

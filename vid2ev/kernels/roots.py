@@ -170,18 +170,20 @@ def polished(levels, jobs, s, k, b, poles, drift, num):
     m1 = expm1_64(-a * s) if one else 0.0
     m2 = expm1_64(-b * s) if two else 0.0
     k1, k2 = a * c1 * (1.0 + m1), b * c2 * (1.0 + m2)
-    level, d, bend = levels[k], rise - k1 - k2, a * k1 + b * k2
+    level, d, bend, knee = levels[k], rise - k1 - k2, a * k1 + b * k2, num.curve.log_knee
     if len(drift):
-        there, drifts = levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * s, jobs[DRIFT + k]
-        level, fall, less = moved_light(there, drifts, num.curve)
+        at, drifts = levels[k] - jobs[BASE + k] - jobs[DRIFT + k] * s, jobs[DRIFT + k]
+        level, fall, less = moved_light(at, drifts, num.curve)
         d, bend = d + fall, bend - less
     f = (jobs[Y0 + k] - level) + (rise * s + (c1 * m1 + c2 * m2))
     step = -(f * d) / (d * d - 0.5 * f * bend)
     there = s + step
     inside = (there >= jobs[FROM_S + k]) & (there <= jobs[TO_S + k])
     # (where the exponentials have died away Halley's step is small without being near: Newton's tells)
-    left = max(abs(step), abs(f / d)) * max(max(1.0, abs(bend / d)), max(a, b))
-    return there if inside else s, left if inside else np.inf
+    left, known = max(abs(step), abs(f / d)) * max(max(1.0, abs(bend / d)), max(a, b)), inside
+    if len(drift):  # (beyond the knee a level moves another way than the step knows)
+        known = inside & ((at < knee) == (at - drifts * step < knee))
+    return there if inside else s, left if known else np.inf
 
 
 @inner
