@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,14 +20,16 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner, Result
+from numba import njit
 
 from vid2ev import UsageError
-from vid2ev.commands import main
+from vid2ev.commands import main, progress, tidy
 from vid2ev.commands.summary import of_the_clip, result_facts
 from vid2ev.making import conversion
 from vid2ev.recording.manifest import difference
 from vid2ev.seen import instants
 from vid2ev.seen.instants import Instant
+from vid2ev.sensors.tiles import Tiles
 
 CLIP = "synthetic:moving-edge,size=64x48,fps=100,duration_s=0.2"
 LONG = "a" * 300
@@ -528,6 +531,35 @@ def test_control_c_counts_even_where_python_loses_the_exception() -> None:
         del callback
         with pytest.raises(KeyboardInterrupt):
             check()
+
+
+@posix
+@pytest.mark.parametrize("within", ["heard", "tidy", "sensor"])
+def test_control_c_counts_during_compiled_code(within: str) -> None:
+    """That returns an array: Numba makes it by a function of Python's, and does not look whether that raised."""
+    place = np.zeros(8)
+    busy(place, 1)  # (compiled)
+    asked = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
+    asked.start()
+    with pytest.raises(KeyboardInterrupt):
+        if within == "sensor":
+            for _ in range(10_000):
+                Tiles(1, 1).each(lambda _: busy(place, 5_000_000))
+        else:
+            with progress.heard() if within == "heard" else tidy() as check:
+                for _ in range(10_000):
+                    busy(place, 5_000_000)
+                    if check:
+                        check()
+    asked.join()
+
+
+@njit(nogil=True)
+def busy(out, rounds):  # type: ignore[no-untyped-def]
+    """What it was given, after a while of arithmetic."""
+    for k in range(rounds):
+        out[k % len(out)] = out[k % len(out)] * 0.5 + k
+    return out
 
 
 @posix

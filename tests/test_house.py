@@ -28,6 +28,7 @@ FLOORS = {
     "toml_text": 0,
     "terminal": 0,
     "stamps": 0,
+    "interrupts": 0,
     "cluster": 1,
     "requests": 1,
     "untrusted": 1,

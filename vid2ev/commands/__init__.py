@@ -21,6 +21,7 @@ from typing import Any
 import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
+from vid2ev.interrupts import found_again
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
@@ -44,7 +45,8 @@ def tidy() -> Iterator[None]:
     for each in heard:
         signal.signal(each, signal.default_int_handler)
     try:
-        yield
+        with found_again():
+            yield
     finally:
         for each in heard:
             signal.signal(each, signal.SIG_DFL)
@@ -73,7 +75,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Errors meant for people become one line; what else goes wrong keeps its traceback."""
         try:
-            return super().invoke(ctx)
+            with found_again():
+                return super().invoke(ctx)
         except Vid2evError as error:
             click.echo(f"error: {error}", err=True)
             sys.exit(error.exit_code)

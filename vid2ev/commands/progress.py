@@ -15,11 +15,13 @@ from click.core import ParameterSource
 from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError, SavedError
+from vid2ev.interrupts import is_lost
 from vid2ev.terminal import counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
+    from types import FrameType
 
     from vid2ev.cost.turns import Report
     from vid2ev.formats.event_file import Recording
@@ -60,10 +62,10 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
     """
     asked = 0
 
-    def note(*_: Any) -> None:
+    def note(_number: int, at: FrameType | None) -> None:
         nonlocal asked
         asked += 1
-        if asked > gently:
+        if asked > gently and not is_lost(at):
             raise KeyboardInterrupt
 
     def check() -> bool:

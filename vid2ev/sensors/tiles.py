@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
 from vid2ev.errors import UsageError
+from vid2ev.interrupts import found_again
 
 R = TypeVar("R")
 
@@ -46,10 +47,11 @@ class Tiles:
 
     def each(self, work: Callable[[int], R]) -> list[R]:
         """[work(0), work(1), ... work(count - 1)], at the same time."""
-        if self._pool is None:
-            return [work(0)]
-        others = [self._pool.submit(work, k) for k in range(1, self.count)]
-        return [work(0), *(other.result() for other in others)]
+        with found_again():
+            if self._pool is None:
+                return [work(0)]
+            others = [self._pool.submit(work, k) for k in range(1, self.count)]
+            return [work(0), *(other.result() for other in others)]
 
     def each_blocks(self, work: Callable[[int, int, int], R]) -> list[R]:
         """[work(k, first block, the block after the last) for each tile k], at the same time; then cut anew."""
