@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +15,8 @@ from vid2ev.commands.options import FiniteRange
 from vid2ev.commands.worker_options import worker_options
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from vid2ev.cluster.work import Outcome
     from vid2ev.commands.live import Said
 
@@ -86,7 +90,7 @@ def dataset(
         raise UsageError(named + clause(complaint["msg"])) from error
     quiet |= as_json
     share = partial(shared_out, noun="scenes", quiet=quiet, said=_said)
-    with counting(quiet, SCENES) as report:
+    with _kept(directory), counting(quiet, SCENES) as report:
         facts = write_dataset(directory, spec, resume=resume, workers=workers, share=share, report=report)
     if as_json:
         click.echo(json.dumps(facts, indent=2))
@@ -96,6 +100,21 @@ def dataset(
         click.echo(table([*done, *left]))
         made = (counted(facts[f"{name}s"], name) for name in ("scene", "sample", "event"))
         click.echo(f"{directory}: {', '.join(made)}")
+
+
+@contextmanager
+def _kept(directory: Path) -> Iterator[None]:
+    """What asks it to end within says so if it can be resumed."""
+    from vid2ev.commands import INTERRUPTED, tidy
+
+    try:
+        with tidy():
+            yield
+    except KeyboardInterrupt:
+        begun = (directory.with_name(f"{directory.name}.partial") / "job.json").exists()
+        remedy = "what is done is kept, the same command with --resume goes on" if begun else "nothing is left behind"
+        click.echo(f"interrupted; {remedy}", err=True)
+        sys.exit(INTERRUPTED)
 
 
 def _said(outcome: Outcome) -> Said:

@@ -273,6 +273,20 @@ def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, m
         pass
 
 
+def test_who_asks_it_to_end_is_told_whether_it_can_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from interp.data import dataset as module
+
+    def asks(*_: object, **__: object) -> object:
+        return signal.raise_signal(signal.SIGINT)
+
+    for name, said in (("make_scene", "kept, the same command with --resume"), ("scenes_of", "nothing is left behind")):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, asks)
+            result = run(tmp_path / name, "--count", 2, "--size", "32x24", "--jobs", 1)
+        assert result.exit_code == 130 and said in result.stderr and result.stderr.count("\n") == 1
+        assert (tmp_path / f"{name}.partial").exists() == (name == "make_scene")
+
+
 def test_what_is_there_is_left_alone(made: Path) -> None:
     with pytest.raises(UsageError, match="exists; choose another folder"):
         write_dataset(made, DatasetSpec(**QUICK))
