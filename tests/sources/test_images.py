@@ -120,8 +120,27 @@ def test_other_files_in_the_folder_do_not_matter(tmp_path: Path) -> None:
     assert open_source(tmp_path, fps=1).frames_expected == 1
 
 
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (["b.mp4", "a.mkv", "notes.md"], r"the videos or folders of images in it, such as .*/a\.mkv$"),
+        (["b/0.png", "c/notes.md"], r"the videos or folders of images in it, such as .*/b$"),
+        (["b/manifest.json", "a/manifest.json", "README.md"], r"the recordings in it, such as .*/a$"),
+        (["b/c/manifest.json", "notes.md"], r"expected \.png, "),
+    ],
+)
+def test_a_folder_of_sources_or_recordings_says_which_could_be_given(
+    tmp_path: Path, made: list[str], said: str
+) -> None:
+    for name in made:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(DataError, match=f"no images in this folder; {'give one of ' * (said[:3] == 'the')}{said}"):
+        open_source(tmp_path, fps=30)
+
+
 def test_refusals(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="no images"):
+    with pytest.raises(DataError, match=r"no images in this folder; expected \.png, "):
         open_source(tmp_path, fps=30)
     write(tmp_path, ["0.png", "1.png"])
     with pytest.raises(UsageError, match="--fps"):

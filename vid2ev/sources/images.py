@@ -27,6 +27,7 @@ from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
 from vid2ev.rig.lens_file import lens_in
+from vid2ev.sources.many import sources_in
 from vid2ev.sources.times import (
     Clock,
     digest_of,
@@ -70,7 +71,7 @@ class Images:
         self.warnings: list[str] = []
         self._places = _places(self.path)
         if not self._places:
-            raise DataError(f"{self.path}: no images in this folder; expected {', '.join(PICTURE_SUFFIXES)}")
+            raise DataError(f"{self.path}: no images in this folder; {_instead(self.path)}")
         self._fps = None if fps is None else parse_fps(fps)
         self._stamps: list[Fraction] = []
         self._unit: str | None = None
@@ -173,6 +174,18 @@ def _of_camera(said: Any, folder: str) -> tuple[str, int | None]:
     gamma, bits = (said["sensor"]["parameters"][key] for key in ("gamma", "bits"))
     curve = gamma if gamma == "srgb" else f"gamma:{gamma}"
     return {KINDS["raw"]: ("linear", bits_of(bits)), KINDS["png"]: (curve, None)}[folder]
+
+
+def _instead(folder: Path) -> str:
+    """What to give in place of a folder without pictures."""
+    held = sources_in(str(folder)) if folder.is_dir() else []
+    for kind, first in (
+        ("videos or folders of images", next((source for source in held if Path(source) != folder), None)),
+        ("recordings", next((path.parent for path in sorted(folder.glob("*/manifest.json"))), None)),
+    ):
+        if first is not None:
+            return f"give one of the {kind} in it, such as {first}"
+    return f"expected {', '.join(PICTURE_SUFFIXES)}"
 
 
 def _remarks_on_gaps(files: Sequence[Path]) -> list[str]:
