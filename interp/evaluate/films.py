@@ -31,6 +31,7 @@ from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 from vid2ev.sources import is_scene
+from vid2ev.terminal import counted
 
 SLOW_HZ = 240.0
 CUT = "a cut between the key frames"
@@ -127,7 +128,9 @@ class Film:
             told.remarks.append(f"ended early: {error}")
         told.remarks += source.warnings
         if left := len(part) - 1:
-            told.remarks.append(f"{left} frames after the last complete group of {self.multiple} are not rebuilt")
+            told.remarks.append(
+                f"not rebuilt: {counted(left, 'frame')} after the last complete group of {self.multiple}"
+            )
 
     def about(self) -> dict[str, Any]:
         """See `interp.evaluate.group.Footage`."""

@@ -16,6 +16,7 @@ from interp.evaluate.protocol import Protocol
 from interp.representation.carried import over
 from vid2ev.errors import DataError
 from vid2ev.recording.manifest import identity
+from vid2ev.terminal import counted
 
 
 class Recording:
@@ -88,9 +89,9 @@ class Recording:
         if self.frames - self.begin < 2:
             remarks.append("a single frame from its first key frame on, with none after it to rebuild")
         if left := max(self.frames - 1 - self.begin, 0) % multiple:
-            remarks.append(f"{left} frames after the last complete group of {multiple} are not rebuilt")
+            remarks.append(f"not rebuilt: {counted(left, 'frame')} after the last complete group of {multiple}")
         if self.begin:
-            remarks.append(f"{self.begin} frames before the first key frame are not rebuilt")
+            remarks.append(f"not rebuilt: {counted(self.begin, 'frame')} before the first key frame")
         used = {k for first in self._firsts for k in (first, first + multiple)}
         if self._own_keys and (others := sum(k not in self._own_keys for k in used)):
             apart = self._own_keys[1] - self._own_keys[0] if len(self._own_keys) > 1 else 0

@@ -161,7 +161,7 @@ def test_empty_and_instant_files_are_no_trouble(tmp_path: Path) -> None:
     instant = gaps[2]._replace(t=np.full(200, 3 * STEP_US + 7, np.int64))
     save(tmp_path / "seq", "hsergb", 3, instant)
     sequence = open_sequence(tmp_path / "seq")
-    assert sequence.remarks == ["1 of 6 event files are empty"]
+    assert sequence.remarks == ["1 of 6 event files is empty"]
     same(sequence.events(3 * STEP_US, 4 * STEP_US), instant)
     same(sequence.events(STEP_US, 2 * STEP_US), gaps[0])
     assert len(sequence.events(3 * STEP_US, 3 * STEP_US + 6).t) == 0

@@ -52,7 +52,7 @@ def test_groups_of_a_recording_are_its_frames_and_events(tmp_path: Path) -> None
     assert not (groups[1].events.contrast == 0.15).all()  # nobody knows it: it is fitted
     about = recording.about()
     assert about["groups"] == 2 and about["not_scored"] == {}
-    assert about["remarks"] == ["1 frames after the last complete group of 4 are not rebuilt"]
+    assert about["remarks"] == ["not rebuilt: 1 frame after the last complete group of 4"]
 
 
 def test_what_cannot_be_scored_is_named_and_counted(tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ def test_key_frames_of_an_own_recording_are_those_of_its_frame_camera(own: Path)
     assert groups[0].cameras.disparity_px == groups[0].cameras.offset_us == 0
     assert groups[0].cameras.exposure_us == pytest.approx(4e6 / 960, abs=2)
     assert groups[0].events.contrast.flatten().tolist() == pytest.approx(sequence.contrast)
-    assert f"{begin} frames before the first key frame are not rebuilt" in recording.about()["remarks"]
+    assert f"not rebuilt: {begin} frame{'s' * (begin > 1)} before the first key frame" in recording.about()["remarks"]
 
 
 @pytest.mark.parametrize("damage", ["cut short", "missing"])
@@ -206,7 +206,7 @@ def test_a_film_is_seen_by_the_event_camera_of_convert(tmp_path: Path) -> None:
         assert group.events.contrast.flatten().tolist() == pytest.approx([0.15, 0.2])
     codes = [each.shape for each in groups[1].truth]
     assert codes == [frames[0].shape] * 3
-    assert film.about()["remarks"] == ["1 frames after the last complete group of 4 are not rebuilt"]
+    assert film.about()["remarks"] == ["not rebuilt: 1 frame after the last complete group of 4"]
 
 
 @pytest.mark.parametrize("first", ["cis", "dvs"])

@@ -55,7 +55,7 @@ class EventParts:
         self.first_us = int(self._spans[used, 0].min()) if used.any() else 0
         self.last_us = int(self._spans[used, 1].max()) if used.any() else 0
         if empty := int((~used & ~self._damaged).sum()):
-            self.remarks.append(f"{empty} of {len(self.paths)} event files are empty")
+            self.remarks.append(f"{empty} of {len(self.paths)} event files {'is' if empty == 1 else 'are'} empty")
 
     def between(self, start_us: int, stop_us: int) -> Placed:
         """The events in (start_us, stop_us].  Raises DataError where a file in that time cannot be read."""
