@@ -34,10 +34,11 @@ def setting(text: str, example: str) -> tuple[str, Any]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key.rpartition(".")[2] or not value:
         raise UsageError(f"Setting '{text}' is not of the form key=value; write for example {example}.")
-    return key, _value(value)
+    return key, value_of(value)
 
 
-def _value(text: str) -> Any:
+def value_of(text: str) -> Any:
+    """A TOML value, else a number as people write them, else the text itself."""
     try:
         parsed = parsed_toml(f"value = {text}")
     except ValueError:

@@ -205,6 +205,12 @@ def test_a_key_of_another_table_is_no_hint_at_itself(path: Path) -> None:
         read_scene(path, ["colour=1"])
 
 
+def test_numbers_of_settings_are_as_people_write_them() -> None:
+    """.5 and 5. are none in TOML; as those of sensors they are numbers here, too."""
+    for written, number in ((".5", 0.5), ("+.25e1", 2.5), ("5.", 5.0), ("1_0", 10)):
+        assert read_scene("room", [f"duration_s={written}"]).resolved(0).scene.duration_s == number
+
+
 def test_a_scene_without_lamps_says_so_where_one_is_to_be_changed(tmp_path: Path) -> None:
     (tmp_path / "dark.toml").write_text("[scene]\nambient = 1\n")
     with pytest.raises(UsageError, match=r"no 'lamp'; the scene has no lights$"):

@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from vid2ev.errors import DataError, UsageError, nearest
+from vid2ev.requests import value_of
 from vid2ev.scenes.complaints import sentence
 from vid2ev.scenes.ranges import Chance, chance_of, drawn, extremes, is_range
 from vid2ev.scenes.scene import Scene
@@ -186,7 +187,7 @@ def read_scene(name_or_path: str | Path, settings: Sequence[str] = ()) -> SceneF
         raise UsageError(f"scene {path} says nothing: expected tables such as [scene], [camera] and [[objects]]")
     for text in settings:
         tables = changed(tables, text, name)
-    asked = (_parsed(text.partition("=")[2].strip()) for text in settings)
+    asked = (value_of(text.partition("=")[2].strip()) for text in settings)
     file = SceneFile(name, path, tables, frozenset(value for value in asked if isinstance(value, str)))
     file.check()
     return file
@@ -204,7 +205,7 @@ def changed(tables: Mapping[str, Any], setting: str, name: str) -> dict[str, Any
         node = _entered(node, step, steps[:depth], f"{name}: setting '{setting}'")
     if not isinstance(node, dict) or is_range(node):
         raise UsageError(f"{name}: setting '{setting}': {'.'.join(steps[:-1])} is no table; set it as a whole")
-    node[steps[-1]] = _parsed(value)
+    node[steps[-1]] = value_of(value)
     return whole
 
 
@@ -225,15 +226,6 @@ def _entered(node: Any, step: str, before: Sequence[str], where: str) -> Any:
     if not isinstance(node, dict):
         raise UsageError(f"{where}: {'.'.join(before)} is no table; set it as a whole")
     return node.setdefault(step, [] if not before and step in LISTS else {})
-
-
-def _parsed(text: str) -> Any:
-    """A TOML value, or the text itself."""
-    try:
-        parsed = parsed_toml(f"value = {text}")
-    except ValueError:
-        return text
-    return parsed["value"] if list(parsed) == ["value"] else text
 
 
 def _find(name_or_path: str) -> tuple[str, Path]:
