@@ -163,7 +163,7 @@ class Recipe:
         away = next((mount for mount in self.mounts if mount.pose.translation_m.any()), None)
         if self.depth is not None and away is None and not kinds & {"depth", "map"}:
             raise UsageError(
-                f"depth '{self.depth}' and all cameras where the video's is, which see the same at any depth; leave"
+                f"depth '{self.depth}': all cameras stand where the video's does, and see the same at any depth; leave"
                 " --depth out, or add --rig with a camera beside it, or --truth depth"
             )
         if self.depth is None and away is not None and self.sight().needs_depth:
