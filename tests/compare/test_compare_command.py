@@ -91,6 +91,15 @@ def test_numbers_and_text_and_picture() -> None:
         CliRunner().invoke(command, [mine, theirs, "--plot", "picture.pdf"], catch_exceptions=False)
 
 
+def test_nothing_in_common_is_1_or_more_and_so_it_is_said() -> None:
+    """Traces of events in bursts add up: five at once against none are five squared by five."""
+    nothing = write(events_of([]), "nothing.h5", duration_us=10**6)
+    for name, at_once in (("far.h5", 1), ("burst.h5", 5)):
+        burst = write(events_of(np.repeat([1000, 500_000], at_once)), name, duration_us=10**6)
+        assert compare(burst, nothing)["distance"] == pytest.approx(at_once)
+        assert "1 or more: nothing in common" in CliRunner().invoke(command, [burst, nothing]).stdout
+
+
 def test_what_both_have_is_compared() -> None:
     events = busy(20_000, SIZE, duration_us=2_000_000)
     whole = write(events, "whole.h5")

@@ -45,7 +45,8 @@ def compare(
     recordings, or of two rigs with the same cameras.
 
     The distance is van Rossum's at 1 ms, per pixel and polarity: 0 is the same, 0.01 is 2 % of the events missing, 1 is
-    nothing in common.  Timing errors are those of events that belong together, positive where A is late.
+    nothing in common, and more the same of events in bursts, or of the wrong polarity.  Timing errors are those of
+    events that belong together, positive where A is late.
     """
     from vid2ev.commands.progress import event_bar
     from vid2ev.compare.plots import plot as draw

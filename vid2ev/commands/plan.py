@@ -33,9 +33,9 @@ def plan(source: str, effects: str, tolerance: float, as_json: bool, **options: 
     """Measure SOURCE and say of each effect of the sensor what leaving it out would change, what that costs, and
     whether `convert --effects auto` would keep it; of a rig, for each camera, with the views and sub-frames.
 
-    The distance of events is van Rossum's at 1 ms: 0 for the same, 1 for nothing in common.  That of frames is the
-    square of the greatest change of a level, as a share of what rounding to codes changes: 0.01 is 0.029 LSB.  Nothing
-    is converted.
+    The distance of events is van Rossum's at 1 ms: 0 for the same, 1 or more for nothing in common.  That of frames is
+    the square of the greatest change of a level, as a share of what rounding to codes changes: 0.01 is 0.029 LSB.
+    Nothing is converted.
     """
     from vid2ev.cores import usable_cores
     from vid2ev.plan.recordings import described, plans_of

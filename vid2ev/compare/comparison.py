@@ -110,7 +110,7 @@ class Comparison:
         beside = "".join(f", {text}" for text in others)
         wrong = "" if self.count_error is None else f"; count error {_percent(self.count_error)}, pixel by pixel"
         facts = [
-            ("distance", f"{headline}{beside} (van Rossum; 0: the same, 1: nothing in common)"),
+            ("distance", f"{headline}{beside} (van Rossum; 0: the same, 1 or more: nothing in common)"),
             ("counts", f"{self.events:,} events against {self.reference_events:,} of the reference{wrong}"),
         ]
         if not all(events):

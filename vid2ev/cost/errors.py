@@ -29,7 +29,7 @@ from vid2ev.cost.quality import Quality, quality
 class Errors:
     """Errors against the reference; None where there is nothing to compare.
 
-    distance      vR: 0 for the same events, 1 for nothing in common
+    distance      vR: 0 for the same events, 1 or more for nothing in common
     count_error   share of the reference's events
     timing_us     median and 95th percentile
     matched       share of the reference's events that have partners
