@@ -95,3 +95,22 @@ def test_every_event_comes_when_it_is_due(refractory, blind_us, leak_hz, log_cur
         assert (late <= 1.0 + np.array([doubt for _, _, doubt in due])).all(), (i, late.max())
         total += len(due)
     assert total > 20
+
+
+def test_a_blind_time_that_ends_with_a_frame_to_the_nanosecond_ends_as_one_before_it():
+    """The memory jumps to the signal there, and what comes later is what comes of that."""
+    light, t_ns = clip()[:, None, 9:10], [k * GAP_US * 1000 for k in range(FRAMES)]
+    pixel, sent = Pixel(THRESHOLD, THRESHOLD, *TAUS_US), []
+
+    def seeing(blind_ns: int) -> tuple:
+        blind = {"refractory_us": blind_ns / 1000, "refractory": "track", "leak_rate_hz": LEAKS_HZ[0]}
+        dvs = start(sensor(pixel, **blind), light)
+        return feed(dvs, t_ns, light), dvs
+
+    _, dvs = seeing(10**9)  # (one event)
+    last_ns = int(dvs.state()["t_last"][0])
+    for shorter_ns in (0, 1):
+        sent.append(seeing(t_ns[4] - last_ns - shorter_ns)[0])
+    assert 0 < last_ns < t_ns[4] and len(sent[0]) > 1
+    assert sent[0].p.tolist() == sent[1].p.tolist()
+    np.testing.assert_allclose(sent[0].t, sent[1].t, atol=1.0)
