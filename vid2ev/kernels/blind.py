@@ -16,19 +16,16 @@ from vid2ev.kernels.crossing import (
     LEVEL_OFF,
     LEVEL_ON,
     UP,
-    WHEN,
     fresh_thresholds,
     leave_levels,
     load_thresholds,
     send,
 )
 from vid2ev.kernels.ladder import END, REACHED, RUNGS, few
-from vid2ev.kernels.lanes import BASE, BLIND, C1, C2, DRIFT, F0, LAST, RISE, S0, S1, Y0, A
+from vid2ev.kernels.lanes import BLIND, F0, S0, S1, response_at, seen_at
 from vid2ev.kernels.layout import CAPPED, HIGH, LOW, PITCH, place_of, stride_of
 from vid2ev.kernels.response import next_piece
 from vid2ev.kernels.roots import batch_times
-from vid2ev.physics.log_curve import log_level
-from vid2ev.physics.photoreceptor import response
 
 
 @inner
@@ -51,7 +48,7 @@ def climb_seeing(work, count, b, planes, flags, num, iv, out, n, tally):
     load_thresholds(lanes, pixels, count, planes, flags, num)
     for j in range(count):
         live[j], lanes[BLIND + j] = j, blind_until(pixels[j], planes, num, iv)
-        lanes[WHEN + j], lanes[LABEL + j] = 0.0, 0.0
+        lanes[LABEL + j] = 0.0
     left = np.int64(count)
     while anyone(left > 0):
         left = few(left)
@@ -86,12 +83,9 @@ def see(work, some, b, planes, flags, num):
     for k in range(some):
         j = who[k]
         s = lanes[BLIND + j]
-        y = response(s, lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j], b)
-        y = y if s < 1.0 else lanes[LAST + j]
-        at = y if len(flags.log_input) else log_level(max(y, 0.0), num.curve)
-        if len(flags.drift):
-            at += lanes[BASE + j] + lanes[DRIFT + j] * s
-        lanes[AT + j], lanes[S0 + j], lanes[F0 + j], lanes[BLIND + j] = at, s, y, -1.0
+        y = response_at(lanes, j, s, b)
+        lanes[AT + j] = seen_at(lanes, j, y, s, flags, num)
+        lanes[S0 + j], lanes[F0 + j], lanes[BLIND + j] = s, y, -1.0
     fresh_thresholds(lanes, work.pixels, who, some, planes, flags, num)
 
 
@@ -124,8 +118,7 @@ def turn_blind(work, some, planes, flags, num, iv, out, n, tally):
     lanes, who, when = work.lanes, work.who, work.when
     for k in range(some):
         j = who[k]
-        when[k] = max(when[k], lanes[S0 + j])
-        lanes[WHEN + j] = lanes[S0 + j] = when[k]
+        lanes[S0 + j] = when[k] = max(when[k], lanes[S0 + j])
     out, n = send(when, who, some, lanes, work.pixels, planes, flags, num, iv, out, n, tally)
     fresh_thresholds(lanes, work.pixels, who, some, planes, flags, num)
     for k in range(some):

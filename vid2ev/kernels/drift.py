@@ -69,11 +69,12 @@ def split_drifting(work, count, b, flags, num):
     for k in range(some):
         j, turns = live[k], work.jobs[R.WAY + k]
         once = (turns == ONCE) & (work.steps[k] < R.ENOUGH)
-        if turns != NEVER:
-            turn = work.when[k] if once else knot_after(lanes, j, 0.0, work.knots, b, num)
-            if turn < 1.0:
-                enter(lanes, j, 0.0, lanes[Y0 + j], turn, b)
-                lanes[NEXT + j] = 1.0 if once else knot_after(lanes, j, turn, work.knots, b, num)
+        if once:
+            enter(lanes, j, 0.0, lanes[Y0 + j], work.when[k], b)
+        elif turns != NEVER:
+            knots_of_lane(lanes, j, work.knots, b, num)
+            enter(lanes, j, 0.0, lanes[Y0 + j], first_after(0.0, work.knots), b)
+            lanes[NEXT + j] = first_after(lanes[S1 + j], work.knots)
 
 
 @inner
@@ -109,15 +110,20 @@ def slopes_to_jobs(work, some, b, num):
 
 
 @inner
-def knot_after(lanes, j, s, knots, b, num):
-    """Where the piece of lane j ends that begins at s."""
+def knots_of_lane(lanes, j, knots, b, num):
+    """Where the pieces of lane j end, into `knots`."""
     path = Path(
         lanes[Y0 + j], lanes[LAST + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j], b, True,
         lanes[BASE + j], lanes[DRIFT + j], num.curve,
     )  # fmt: skip
     knots_of(path, knots)
+
+
+@inner
+def first_after(s, knots):
+    """Where the piece ends that begins at s; 1.0 if none does."""
     for knot in knots:
-        if knot > s:
+        if knot > s or knot >= 1.0:
             return knot
     return 1.0
 
@@ -126,4 +132,5 @@ def knot_after(lanes, j, s, knots, b, num):
 def look_further(lanes, j, knots, b, num):
     """Where the piece after lane j's ends, if there is one."""
     if lanes[S1 + j] < 1.0:
-        lanes[NEXT + j] = knot_after(lanes, j, lanes[S1 + j], knots, b, num)
+        knots_of_lane(lanes, j, knots, b, num)
+        lanes[NEXT + j] = first_after(lanes[S1 + j], knots)

@@ -22,18 +22,29 @@ LANES = BLIND + LANE_PITCH
 
 
 @inner
+def response_at(lanes, j, s, b):
+    """Lane j's response at s; at the end of the interval from the state that the next one starts with."""
+    inside = response(s, lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j], b)
+    return inside if s < 1.0 else lanes[LAST + j]
+
+
+@inner
+def seen_at(lanes, j, y, s, flags, num):
+    """What the comparator sees [nat] of lane j, the response of which is y at s."""
+    # (light has a floor of 0: after a flash of many decades the arithmetic may leave less than nothing of it)
+    nats = y if len(flags.log_input) else log_level(max(y, 0.0), num.curve)
+    if len(flags.drift):
+        nats += lanes[BASE + j] + lanes[DRIFT + j] * s
+    return nats
+
+
+@inner
 def end_in_nats(lanes, j, flags, num):
     """Where lane j's piece leads [nat]."""
-    # (light has a floor of 0: after a flash of many decades the arithmetic may leave less than nothing of it)
-    end = lanes[F1 + j] if len(flags.log_input) else log_level(max(lanes[F1 + j], 0.0), num.curve)
-    if len(flags.drift):
-        end += lanes[BASE + j] + lanes[DRIFT + j] * lanes[S1 + j]
-    return end
+    return seen_at(lanes, j, lanes[F1 + j], lanes[S1 + j], flags, num)
 
 
 @inner
 def enter(lanes, j, start, begin, stop, b):
     """Let the piece of lane j be from `start`, where its response is at `begin`, to `stop`."""
-    inside = response(stop, lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], lanes[A + j], b)
-    lanes[S0 + j], lanes[F0 + j], lanes[S1 + j] = start, begin, stop
-    lanes[F1 + j] = inside if stop < 1.0 else lanes[LAST + j]
+    lanes[S0 + j], lanes[F0 + j], lanes[S1 + j], lanes[F1 + j] = start, begin, stop, response_at(lanes, j, stop, b)

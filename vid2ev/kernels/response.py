@@ -173,8 +173,7 @@ def next_pieces(work, count, b, flags, num):
     left = reached_lanes(lanes, count, live)
     keep_lanes(lanes, END, LANES, work.pixels, live, left)
     for j in range(left):
-        enter(lanes, j, lanes[S1 + j], lanes[F1 + j], lanes[NEXT + j], b)
-        lanes[NEXT + j], lanes[END + j] = 1.0, end_in_nats(lanes, j, flags, num)
+        move_on(lanes, j, b, flags, num)
     if len(flags.drift):
         for j in range(left):
             look_further(lanes, j, work.knots, b, num)
@@ -182,9 +181,15 @@ def next_pieces(work, count, b, flags, num):
 
 
 @inner
-def next_piece(lanes, j, knots, b, flags, num):
-    """Move lane j to its next piece."""
+def move_on(lanes, j, b, flags, num):
+    """Let lane j be on its next piece, as if that were the last."""
     enter(lanes, j, lanes[S1 + j], lanes[F1 + j], lanes[NEXT + j], b)
     lanes[NEXT + j], lanes[END + j] = 1.0, end_in_nats(lanes, j, flags, num)
+
+
+@inner
+def next_piece(lanes, j, knots, b, flags, num):
+    """Move lane j to its next piece."""
+    move_on(lanes, j, b, flags, num)
     if len(flags.drift):
         look_further(lanes, j, knots, b, num)

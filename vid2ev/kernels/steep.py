@@ -92,7 +92,7 @@ def refine(block, rest, scratch, flagged, n, flags, num, iv):
 
 @inner
 def exact_light_weights(clock, b, flags):
-    """The same in float64."""
+    """The weights of a step for one pixel's dt / tau1, in float64."""
     if len(flags.poles) > 1:
         return light_weights_64(clock, b)
     x1 = -expm1_64(-clock)
