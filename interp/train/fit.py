@@ -22,7 +22,7 @@ from interp.train.machines import Machines
 from interp.train.progress import Bar
 from interp.train.run_folder import RunFolder
 from interp.train.running_mean import RunningMean
-from interp.train.schedule import Schedule
+from interp.train.schedule import Schedule, Steps
 from interp.train.scores import Scores
 from interp.train.session import Limits, Session, validate_every
 from vid2ev.errors import DataError
@@ -78,8 +78,9 @@ class Fit:
         """Train.  Raises DataError where training does not get on, or a file does not hold what it should."""
         with unmentioned(), self._threads():
             step = read_checkpoint(self.folder.checkpoint)["global_step"] if self.folder.checkpoint.exists() else 0
-            self._take_up(self._given())
-            trainer = self._trainer(step)
+            steps = self._given()
+            self._take_up(steps)
+            trainer = self._trainer(step, steps)
             self._measure(trainer, step)
             with made_by_workers():
                 trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
@@ -96,22 +97,24 @@ class Fit:
         finally:
             torch.set_num_threads(before)
 
-    def _given(self) -> tuple[int, int] | None:
-        steps = self.learner.recipe.steps
-        return (steps, 0) if steps else self.folder.fixed()
-
-    def _take_up(self, steps_and_level: tuple[int, int] | None) -> None:
+    def _given(self) -> Steps | None:
         recipe = self.learner.recipe
-        self.learner.schedule = Schedule(recipe.warm_up, recipe.rate_end, *steps_and_level or ())
+        if recipe.steps is None:
+            return self.folder.steps()
+        return Steps(((0, recipe.steps),), validate_every(recipe.steps, recipe.validations))
 
-    def _fix(self, steps: int, level: int) -> None:
-        self.folder.fix(steps, level)
-        self._take_up((steps, level))
+    def _take_up(self, steps: Steps | None) -> None:
+        recipe = self.learner.recipe
+        self.learner.schedule = Schedule(recipe.warm_up, recipe.rate_end, steps.plans if steps else ())
 
-    def _trainer(self, step: int) -> Trainer:
-        recipe, steps = self.learner.recipe, self.learner.schedule.steps
-        limits = Limits(recipe.time_s, recipe.validations, self.session_s, self.stop)
-        session = Session(limits, self._fix, self._validation_s, self.begun_s)
+    def _planned(self, steps: Steps) -> None:
+        self.folder.plan(steps)
+        self._take_up(steps)
+
+    def _trainer(self, step: int, steps: Steps | None) -> Trainer:
+        recipe = self.learner.recipe
+        limits = Limits(None if recipe.steps else recipe.time_s, recipe.validations, self.session_s, self.stop)
+        session = Session(limits, steps, self._planned, self._validation_s, self.begun_s)
         path = self.folder.path
         board = TensorBoardLogger(path, name="tensorboard", version="", purge_step=step or None)
         return Trainer(
@@ -119,9 +122,9 @@ class Fit:
             devices=self.machines.devices,
             num_nodes=self.machines.nodes,
             precision=self._precision(),  # type: ignore[arg-type]
-            max_steps=steps or -1,
+            max_steps=steps.plans[-1][1] if steps else -1,
             max_epochs=-1,
-            val_check_interval=validate_every(steps, recipe.validations) if steps else NEVER,
+            val_check_interval=steps.validate_every if steps else NEVER,
             check_val_every_n_epoch=None,
             num_sanity_val_steps=0,
             log_every_n_steps=LOG_EVERY,

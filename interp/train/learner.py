@@ -33,7 +33,7 @@ from vid2ev.errors import DataError
 class Learner(LightningModule):
     """A network that learns.  Families of networks add `parts` and `predicted`.
 
-    schedule   of the learning rate; replaced once, where the steps are fixed on the way
+    schedule   of the learning rate; replaced where the steps are planned
     features   what the loss looks at beside pictures, if it does
     skipped    steps whose gradients were not finite, so far
     table      mean scores of each group of clips, of the last validation, which was at step `validated_at`

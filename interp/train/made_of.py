@@ -42,7 +42,7 @@ def learner_of(job: Job) -> Learner:
     """The learner, with first weights that are a function of the seed."""
     torch.manual_seed(job.recipe.seed)
     network: Any = make(job.network, job.size, **job.options)
-    schedule = Schedule(job.recipe.warm_up, job.recipe.rate_end, job.recipe.steps)
+    schedule = Schedule(job.recipe.warm_up, job.recipe.rate_end)  # (how many steps, and so the way down: `Fit`)
     kinds: dict[str, Any] = dict.fromkeys(EVENT_FED, EventFedLearner) | {"hdr": HdrLearner, "flow": FlowLearner}
     return kinds.get(job.network, FrameFedLearner)(job.network, network, job.recipe, schedule)
 

@@ -2,7 +2,7 @@
 
     run.json              what is trained, with what, how; versions and machine, also of others that it went on with
     start*.safetensors    weights that it began with, if it did
-    steps.json            how many steps, once that is known
+    steps.json            how many steps, once that is known, and when that was planned
     checkpoint.ckpt       where training goes on
     weights.safetensors   the running mean of the network at its best validation, for use (`interp.networks`)
     baselines.json        scores of methods that need no training
@@ -24,11 +24,13 @@ import operator
 import re
 import shutil
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from interp.pretrained import OF_RUN
+from interp.train.schedule import Steps
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.held import Held
@@ -128,22 +130,26 @@ class RunFolder:
         """The folder of pictures."""
         return self.path / "pictures"
 
-    def fixed(self) -> tuple[int, int] | None:
-        """(steps, level) of the schedule, once they are known."""
+    def steps(self) -> Steps | None:
+        """How many steps, once they are known."""
         file = self.path / "steps.json"
         if not file.exists():
             return None
         found = read_json(file)
         with as_stated(file):
-            steps, level = operator.index(found["steps"]), operator.index(found["level"])
-            if not 0 < steps < MOST_STEPS or not 0 <= level < MOST_STEPS:
-                raise ValueError(f"{steps} steps, level {level}")
-        return steps, level
+            plans = tuple((operator.index(at), operator.index(steps)) for at, steps in found["plans"])
+            every = operator.index(found["validate_every"])
+            order = [at for at, _ in plans]
+            if not plans or order != sorted(set(order)) or not 0 < every < MOST_STEPS:
+                raise ValueError(f"plans {plans}, validation every {every} steps")
+            if not all(0 <= at <= steps < MOST_STEPS and steps for at, steps in plans):
+                raise ValueError(f"plans {plans}")
+        return Steps(plans, every)
 
-    def fix(self, steps: int, level: int) -> None:
-        """Write them down, once and for all."""
+    def plan(self, steps: Steps) -> None:
+        """Write them down."""
         if self.first:
-            self._write("steps.json", {"steps": steps, "level": level})
+            self._write("steps.json", asdict(steps))
 
     def baselines(self) -> dict[str, dict[str, dict[str, float]]]:
         """Scores of methods without training: method, group of clips, score; empty until they are measured."""

@@ -78,9 +78,8 @@ def session(folder: Path, resume: bool = False, devices: int = 1, spoilt: range 
     few = {"steps": STEPS_OF_RUN, "batch": 4, "save_s": 1e-6, "validations": 2, "threads": 1, "warm_up": 3}
     recipe = Recipe(**(few | changed))
     torch.manual_seed(recipe.seed)
-    learner = FrameFedLearner(
-        NETWORK, make(NETWORK, **of_network), recipe, Schedule(recipe.warm_up, recipe.rate_end, recipe.steps)
-    )  # type: ignore[arg-type]
+    schedule = Schedule(recipe.warm_up, recipe.rate_end)
+    learner = FrameFedLearner(NETWORK, make(NETWORK, **of_network), recipe, schedule)  # type: ignore[arg-type]
     machines = Machines(devices, accelerator="cpu")
     place = RunFolder(folder, {"recipe": recipe.model_dump(mode="json")}, resume, machines.first)
     try:

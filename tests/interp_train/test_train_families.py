@@ -42,7 +42,7 @@ def learner(name: str, colours: int = 3) -> Learner:
     recipe, network = Recipe(steps=8, rate=rate), make(name, **options)
     if name == "hdr":  # (which begins with frames that are right already, wherever they are not clipped)
         torch.nn.init.normal_(network.out.weight, std=0.05)  # type: ignore[arg-type, union-attr]
-    made: Any = KINDS[name](name, network, recipe, Schedule(0, 1.0, 8))  # type: ignore[arg-type]
+    made: Any = KINDS[name](name, network, recipe, Schedule(0, 1.0, ((0, 8),)))  # type: ignore[arg-type]
     made._trainer = SimpleNamespace(global_step=0, world_size=1)
     return made
 

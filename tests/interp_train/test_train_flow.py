@@ -35,7 +35,7 @@ def moving() -> dict[str, torch.Tensor]:
 
 def test_it_finds_the_motion_of_a_texture_and_serves_others_frozen(tmp_path: Path) -> None:
     one, network = moving(), make("flow", "tiny")
-    learner: Any = FlowLearner("flow", network, Recipe(steps=100, rate=1e-3), Schedule(0, 1.0, 100))
+    learner: Any = FlowLearner("flow", network, Recipe(steps=100, rate=1e-3), Schedule(0, 1.0))
     learner._trainer = SimpleNamespace(global_step=0, world_size=1)
     optimizer = learner.configure_optimizers()["optimizer"]
     for _ in range(100):

@@ -131,7 +131,7 @@ def test_a_validation_that_loses_a_number_is_not_the_best() -> None:
 
 def of_clip(network: torch.nn.Module, clip: dict[str, torch.Tensor]) -> list[Scores]:
     """Scores of a network on a clip."""
-    learner = FrameFedLearner(NETWORK, network, Recipe(), Schedule(0, 0))  # type: ignore[arg-type]
+    learner = FrameFedLearner(NETWORK, network, Recipe(), Schedule(0, 0.0))  # type: ignore[arg-type]
     with torch.no_grad():
         return learner.scored(clip, learner.predicted(clip).float())
 

@@ -1,0 +1,51 @@
+"""What a run's folder says of steps is what was planned, or one sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from interp.train.run_folder import RunFolder
+from interp.train.schedule import Steps
+from vid2ev.errors import DataError
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Any:
+    opened = RunFolder(tmp_path / "run", {}, resume=False)
+    yield opened
+    opened.close()
+
+
+def test_plans_are_kept(folder: RunFolder) -> None:
+    assert folder.steps() is None
+    for steps in (Steps(((7, 7),), 1), Steps(((30, 400), (90, 310), (200, 640)), 40)):
+        folder.plan(steps)
+        assert folder.steps() == steps
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {},
+        {"steps": 300, "level": 20},
+        {"plans": [], "validate_every": 30},
+        {"plans": [[20, 300]], "validate_every": 0},
+        {"plans": [[20, 300.5]], "validate_every": 30},
+        {"plans": [[20, 300, 1]], "validate_every": 30},
+        {"plans": [[20, 10]], "validate_every": 30},
+        {"plans": [[-1, 10]], "validate_every": 30},
+        {"plans": [[0, 0]], "validate_every": 30},
+        {"plans": [[20, 300], [20, 400]], "validate_every": 30},
+        {"plans": [[20, 1 << 40]], "validate_every": 30},
+        {"plans": 3, "validate_every": 30},
+    ],
+)
+def test_what_is_no_plan_is_one_sentence(folder: RunFolder, said: Any) -> None:
+    (folder.path / "steps.json").write_text(json.dumps(said))
+    with pytest.raises(DataError, match=r"steps\.json ") as error:
+        folder.steps()
+    assert "\n" not in str(error.value)
