@@ -11,7 +11,7 @@ from scipy.stats import poisson
 from vid2ev.bounds.chances import _chernoff, _counted, _pixels, at_least, at_most, surely
 from vid2ev.bounds.scene import Scene
 from vid2ev.physics.mismatch import clipped, fill_thresholds
-from vid2ev.physics.thresholds import chances_below
+from vid2ev.physics.thresholds import _of_pixels, chances_below, soon
 from vid2ev.sensors.spec import DvsSpec
 
 from .clips import clip
@@ -121,5 +121,35 @@ def test_thresholds_are_at_or_below_a_level_as_often_as_drawn_ones(noise: float,
     spec = DvsSpec(threshold_on=mean, threshold_off=mean, mismatch=mismatch, crossing_noise=noise)
     for level in (0.01, 0.05, 0.1, 0.15, 0.2, 0.25, 0.28, 0.2851, 0.4, 0.7):
         reference = np.average((drawn <= level).mean(axis=1), weights=1.0 / pixels)
-        assert chances_below(level, mean, spec)[0] == pytest.approx(reference, abs=0.06)
-    assert chances_below(1.91 * pixels.max(), mean, spec)[0] == 1.0
+        found = np.average(chances_below(level, mean, spec), weights=1.0 / _of_pixels(mean, spec))
+        assert found == pytest.approx(reference, abs=0.06)
+    assert (chances_below(1.91 * pixels.max(), mean, spec) == 1.0).all()
+
+
+@pytest.mark.parametrize("mismatch", [0.0, 0.015, 0.06])
+@pytest.mark.parametrize("noise", [0.0, 0.035, 0.1])
+@pytest.mark.parametrize("way", [0.03, 0.1, 0.14, 0.16, 0.2, 0.29, 0.31, 0.5, 2.0])
+def test_crossings_too_soon_after_one_that_counts_are_no_more_than_is_said(
+    way: float, noise: float, mismatch: float
+) -> None:
+    """A signal that goes steadily: whatever is less than a way behind an event that was sent is swallowed."""
+    mean, draws = 0.15, np.random.default_rng(3)
+    spec = DvsSpec(threshold_on=mean, threshold_off=mean, mismatch=mismatch, crossing_noise=noise)
+    crossings = swallowed = near = 0.0
+    for pixel in _of_pixels(mean, spec):
+        gaps = [clipped(pixel, noise, z) if noise else pixel for z in draws.standard_normal(2000)]
+        places = np.cumsum(gaps)
+        places = places[places < 100 * mean]
+        gone, sent = [], -np.inf
+        for place in places:
+            if place - sent < way:
+                gone.append(place)
+            else:
+                sent = place
+        crossings, swallowed = crossings + len(places), swallowed + len(gone)
+        apart = np.abs(np.subtract.outer(gone, gone)) / (7.0 * mean)
+        near += (np.exp(-apart).sum() - len(gone)) / 14.0
+    chance, chance_again = soon(way, spec)
+    assert swallowed / crossings <= chance + 0.01
+    assert chance <= 1.6 * swallowed / crossings + 0.02
+    assert near <= (chance_again + 0.01) * swallowed

@@ -19,7 +19,7 @@ import numpy as np
 from vid2ev.bounds.chances import at_least, at_most, surely
 from vid2ev.bounds.distance import off_by, unlike
 from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
-from vid2ev.physics.slopes import most_too_soon, slopes_of
+from vid2ev.physics.slopes import slopes_of
 from vid2ev.physics.thresholds import DEVIATIONS, STEPS, soon, spread_of, spread_thresholds
 
 SPREAD_MOST = 1 / 3  # of a threshold: up to there levels lie as evenly as bounds take them to
@@ -172,7 +172,7 @@ def unsent(scene: Scene, spec: Any) -> float:
     leaked, (travel, _) = spec.leak_rate_hz * spec.threshold_on * blind_s, scene.by_slope
     slopes, seen = slopes_of(scene, spec), np.flatnonzero(travel)
     chances = [soon(slopes[k] * blind_s + leaked, spec)[0] for k in seen]
-    return min(float(np.dot(chances, travel[seen])) / float(travel.sum()), most_too_soon(scene, blind_s, spec))
+    return float(np.dot(chances, travel[seen])) / float(travel.sum())
 
 
 def readout_shifts(scene: Scene, spec: Any) -> float:

@@ -7,8 +7,9 @@ What leaving it out changes: none is lost if the signal cannot go a threshold fa
 
     refractory_us slope_max < least threshold
 
-and else at most the share of thresholds that are so low; the memory moves alike (`quantised`).  Events of noise come
-within the period of others as often as their rate says.
+and else at most the share of thresholds that are so low, nor more than follow one that is sent within the period
+(`thresholds.soon`); the memory moves alike (`quantised`).  Events of noise come within the period of others as often as
+their rate says.
 
 Sources: the paper, algorithm step 2e; `track` as the reset of the differencing amplifier in Lichtsteiner et al. 2008.
 """
@@ -25,7 +26,7 @@ from pydantic import BaseModel, Field
 from vid2ev.bounds.chances import at_most
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
-from vid2ev.physics.slopes import most_too_soon, slopes_at, slopes_of, steepest
+from vid2ev.physics.slopes import slopes_at, slopes_of, steepest
 from vid2ev.physics.thresholds import soon
 
 
@@ -68,7 +69,6 @@ def omission(scene: Scene, spec: Any) -> Omission:
     why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
     why += f", and {noise:.2g} by noise" if noise else ""
     together = float(costs.min()) / swallowed if swallowed else 1.0
-    swallowed = min(swallowed, total * most_too_soon(scene, spec.refractory_us * 1e-6, spec))
     gone, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
     without = spec.model_copy(update={"refractory_us": 0.0})
     both = crossings(scene) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy

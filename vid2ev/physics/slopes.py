@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from vid2ev.bounds.scene import QUARTER_EDGES, Scene
-from vid2ev.physics.thresholds import per_nat
 
 
 def steepest(scene: Scene, spec: Any) -> np.ndarray:
@@ -33,11 +32,3 @@ def slopes_at(scene: Scene) -> np.ndarray:
     slopes = np.minimum(QUARTER_EDGES[1:], float(scene.slope_max.max()))
     slopes[-1] = float(scene.slope_max.max())
     return slopes
-
-
-def most_too_soon(scene: Scene, blind_s: float, spec: Any) -> float:
-    """The share of all crossings that are too soon at most: after one that is sent there are no more in the blind time
-    than the steepest way has thresholds."""
-    way_nat = (float(steepest(scene, spec).max()) + spec.leak_rate_hz * spec.threshold_on) * blind_s
-    many = way_nat * per_nat(spec)
-    return many / (1.0 + many)

@@ -41,39 +41,50 @@ def spread_thresholds(mean: float, spec: Any, count: int) -> np.ndarray:
     return _limited(pixels, spec.crossing_noise, quantiles[of_crossings])
 
 
-def chances_below(level: float, mean: float, spec: Any) -> tuple[float, float]:
-    """The share of the thresholds of this mean [nat] that are at or below a level [nat]: as they are met, lower ones
-    the more often; and how many of those near one that is, in the same pixel, are so, too, for each threshold of the
-    mean that the signal goes."""
+def chances_below(level: float, mean: float, spec: Any) -> np.ndarray:
+    """The share of the thresholds of this mean [nat] that are at or below a level [nat], of each of STEPS pixels."""
+    pixels = _of_pixels(mean, spec)
     if level < 0.0:
-        return 0.0, 0.0
-    pixels = _limited(np.full(STEPS, mean), spec.mismatch, _deviates())
+        return np.zeros(STEPS)
     reached, passed = (level >= _limited(pixels, spec.crossing_noise, np.full(STEPS, end)) for end in (-np.inf, np.inf))
     chances = reached.astype(np.float64)
     if spec.crossing_noise > 0:
         normal = NormalDist()
         for k in np.flatnonzero(reached & ~passed):
             chances[k] = normal.cdf((level - pixels[k]) / spec.crossing_noise)
-    often = mean / pixels
-    met = float((chances * often).sum())
-    return met / float(often.sum()), float(((chances * often) ** 2).sum()) / met if met > 0.0 else 0.0
+    return chances
 
 
 @lru_cache(4096)
 def soon(way_nat: float, spec: Any) -> tuple[float, float]:
-    """`chances_below` of the polarity that is the sooner reached after an event, while the signal goes so far."""
-    return max(chances_below(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
+    """The share of the crossings, at most, that are of no account as there is one that counts less than a way before,
+    of the polarity that is the sooner reached; and how many of those near one that is, in the same pixel, are so, too,
+    for each threshold of the mean that the signal goes."""
+    return max(_too_soon(way_nat, mean, spec) for mean in (spec.threshold_on, spec.threshold_off))
+
+
+def _too_soon(way_nat: float, mean: float, spec: Any) -> tuple[float, float]:
+    """A crossing is too soon if its threshold is below the way; and after each that counts only so many are.
+
+    These are N(way) = integral up to it of 1 + N(way - theta) on average, which is at most way E 1/theta: for
+    E 1/theta E min(theta, way) >= E min(1, way / theta) >= P(theta <= way).
+    """
+    many = way_nat * _per_nat(mean, spec)
+    chances = np.minimum(chances_below(way_nat, mean, spec), many / (1.0 + many))
+    often = mean / _of_pixels(mean, spec)  # (a pixel of low thresholds has the more crossings)
+    met = float((chances * often).sum())
+    return met / float(often.sum()), float(((chances * often) ** 2).sum()) / met if met > 0.0 else 0.0
+
+
+def _of_pixels(mean: float, spec: Any) -> np.ndarray:
+    return _limited(np.full(STEPS, mean), spec.mismatch, _deviates())
 
 
 @lru_cache(64)
-def per_nat(spec: Any) -> float:
-    """1 / threshold on average, as thresholds are met, lower ones the more often [1/nat].
-
-    So many crossings there are on average in each nat that a signal goes after one, at most: by the renewal equation
-    N(x) = integral up to x of 1 + N(x - theta), and E 1/theta E min(theta, x) >= E min(1, x / theta) >= P(theta <= x).
-    """
-    often = 1.0 / spread_thresholds(min(spec.threshold_on, spec.threshold_off), spec, STEPS)
-    return float((often**2).sum() / often.sum())
+def _per_nat(mean: float, spec: Any) -> np.ndarray:
+    """1 / threshold, on average over crossings, of each of STEPS pixels [1/nat]."""
+    pixels = _of_pixels(mean, spec)
+    return np.mean([1.0 / _limited(pixels, spec.crossing_noise, np.full(STEPS, z)) for z in _deviates()], axis=0)
 
 
 def _limited(means: np.ndarray, sigma: float, z: np.ndarray) -> np.ndarray:
