@@ -19,8 +19,8 @@ import numpy as np
 from vid2ev.bounds.chances import at_least, at_most, surely
 from vid2ev.bounds.distance import off_by, unlike
 from vid2ev.bounds.scene import DISTANCE_TAU_S, QUARTER_EDGES, Kind, Omission, Scene
-from vid2ev.physics.slopes import slopes_of
-from vid2ev.physics.thresholds import DEVIATIONS, STEPS, soon, spread_of, spread_thresholds
+from vid2ev.physics.swallowed import unsent
+from vid2ev.physics.thresholds import DEVIATIONS, STEPS, spread_of, spread_thresholds
 
 SPREAD_MOST = 1 / 3  # of a threshold: up to there levels lie as evenly as bounds take them to
 
@@ -107,7 +107,7 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def light_events(scene: Scene, spec: Any) -> float:
     """How many events of light there are at least, on average."""
-    return crossings(scene) * (1.0 - unsent(scene, spec))
+    return crossings(scene) * (1.0 - unsent(scene, spec).share)
 
 
 def crossings(scene: Scene) -> float:
@@ -125,9 +125,10 @@ def set_anew(scene: Scene, spec: Any, share: float) -> float:
     there, so that all their events may be others.
 
     Two memories on one signal take turns, one event of this after one of that, and so each two cost no more than one
-    by itself.  Not so where a pixel is blind after an event: then one of them may send the ON events of light that
-    flickers, and the other the OFF events.  Levels that start from the signal are as crowded as those of pixels in
-    step; there is one event more, at most, each time that the pixel is pushed.
+    by itself.  Where a pixel is blind after an event, not all are sent, and of either recording others: then one may
+    have the ON events of light that flickers, and the other the OFF events.  What is missing of both adds up by the
+    triangle inequality.  Levels that start from the signal are as crowded as those of pixels in step; there is one
+    event more, at most, each time that the pixel is pushed.
     """
     if scene.still:
         return 0.0
@@ -135,7 +136,7 @@ def set_anew(scene: Scene, spec: Any, share: float) -> float:
     in_step = max(_in_step(spec) - 1.0, 0.0) if spread > 0.0 else math.inf
     more = 1.0 + 0.5 * min(float(scene.turns.sum()) / scene.events, in_step)
     apart = apart_at_most(scene, spec)
-    each = apart if unsent(scene, spec) > 0.0 else 1.0
+    each = min((1.0 + math.sqrt(2.0 * unsent(scene, spec).cost)) ** 2, apart)
     return min(surely(scene, share * more * each, sent_share(scene, spec)), apart)
 
 
@@ -158,21 +159,6 @@ def apart_at_most(scene: Scene, spec: Any, lag_s: np.ndarray | float = math.inf)
 def _in_step(spec: Any) -> float:
     """How crowded levels are that start together, for thresholds that are spread."""
     return min(spec.threshold_on, spec.threshold_off) / (spread_of(spec) * math.sqrt(2.0 * math.pi))
-
-
-def unsent(scene: Scene, spec: Any) -> float:
-    """The share of the crossings of light, at most, of which nothing is sent, as an event has just been: within the
-    refractory period, or in the same event frame."""
-    blind_us = spec.refractory_us if spec.refractory == "quantised" else 0.0
-    blind_s = 1e-6 * max(blind_us, 1e6 / spec.frame_rate_hz if spec.frame_rate_hz > 0 else 0.0)
-    if blind_s == 0.0 or scene.still:
-        return 0.0
-    if spec.timing == "frame":
-        return 1.0
-    leaked, (travel, _) = spec.leak_rate_hz * spec.threshold_on * blind_s, scene.by_slope
-    slopes, seen = slopes_of(scene, spec), np.flatnonzero(travel)
-    chances = [soon(slopes[k] * blind_s + leaked, spec)[0] for k in seen]
-    return float(np.dot(chances, travel[seen])) / float(travel.sum())
 
 
 def readout_shifts(scene: Scene, spec: Any) -> float:
@@ -291,7 +277,7 @@ def omitted(
     distance = max(apart, trembling(scene, spec)[1]) * share
     if not obstacle(spec) and math.isfinite(mean):
         mean += 0.0 if spread else reset(scene, spec) * apart
-        sent = 1.0 - unsent(scene, spec)
+        sent = 1.0 - unsent(scene, spec).share
         mean *= readout_shifts(scene, spec)
         near = (mean + (1.0 - sent) * apart) * crowded
         least = max(scene.events - _missing(scene, spec), crossings(scene))

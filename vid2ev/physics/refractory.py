@@ -26,7 +26,8 @@ from pydantic import BaseModel, Field
 from vid2ev.bounds.chances import at_most
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.physics.omission import crossings, crowding, light_events, noise_events, omitted
-from vid2ev.physics.slopes import slopes_at, slopes_of, steepest
+from vid2ev.physics.slopes import slopes_at, steepest
+from vid2ev.physics.swallowed import swallowed
 from vid2ev.physics.thresholds import soon
 
 
@@ -54,22 +55,15 @@ def omission(scene: Scene, spec: Any) -> Omission:
         return replace(any_other, why="all events of a frame come at once")
     if spec.photoreceptor_noise > 0:
         return replace(any_other, why="events of noise may come at any time")
-    leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
-    swallowed, costs = 0.0, np.zeros(2)  # travel [nat], and what it costs in units of an event that is missing
-    for slope, travel, near in zip(slopes_of(scene, spec), *scene.by_slope, strict=True):
-        if travel > 0.0:
-            chance, chance_again = soon(slope * spec.refractory_us * 1e-6 + leaked, spec)
-            swallowed += chance * travel
-            evenly = 2.0 / math.expm1(min(scene.threshold / (slope * DISTANCE_TAU_S), 700.0))
-            costs += chance * (travel + chance_again * np.array([near, travel * evenly]))
+    share, cost = swallowed(scene, spec, spec.refractory_us * 1e-6)
     noise = _swallowed_with_noise(scene, spec)
+    leaked = spec.leak_rate_hz * spec.threshold_on * spec.refractory_us * 1e-6
     if noise == 0.0 and soon(way + leaked, spec)[0] == 0.0:
         return Omission(0.0, "exact", figure, "no threshold is so low that an event is swallowed")
-    total = float(scene.travel.sum())
-    why = f"a share of {swallowed / max(total, 1e-300):.2g} of the crossings may be swallowed"
+    why = f"a share of {share:.2g} of the crossings may be swallowed"
     why += f", and {noise:.2g} by noise" if noise else ""
-    together = float(costs.min()) / swallowed if swallowed else 1.0
-    gone, noisy = together * at_most(swallowed / scene.threshold / together), at_most(noise)
+    together = cost / share if share else 1.0
+    gone, noisy = together * at_most(share * scene.events / together), at_most(noise)
     without = spec.model_copy(update={"refractory_us": 0.0})
     both = crossings(scene) + light_events(scene, spec) + 2.0 * noise_events(scene, without)[0] - noisy
     rate_hz = max(spec.shot_rate_hz, spec.hot_rate_hz if spec.hot_probability > 0 else 0.0)
