@@ -21,7 +21,7 @@ from pydantic import BaseModel, Field
 
 from vid2ev.bounds.distance import added, elsewhere, off_by
 from vid2ev.bounds.scene import Omission, Scene
-from vid2ev.physics.omission import echoes, light_events, noise_events, omitted, sent_share
+from vid2ev.physics.omission import echoes, light_events, noise_events, omitted, sent_share, tracks
 
 
 class Leak(BaseModel, frozen=True, extra="forbid"):
@@ -39,7 +39,7 @@ def _off(scene: Scene, spec: Any) -> float:
     """
     share = 1.0 - (1.0 - spec.shot_light_factor) * np.clip(scene.light_max, 0.0, 1.0)
     rate_hz = np.maximum(spec.shot_rate_hz * share, 1e-12)
-    if spec.refractory_us > 0:  # (one of the two may be blind to it)
+    if tracks(spec):  # (one of the two may be blind to it)
         rate_hz[:] = 1e-12
 
     def drifted_s(t_s: np.ndarray | float) -> np.ndarray:
