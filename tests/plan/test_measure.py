@@ -172,6 +172,7 @@ def test_times_are_those_since_a_shot_began() -> None:
     ]
     seen = scene_of(clean(filter="after"), SIZE, frames)
     assert seen.longest_s == pytest.approx(0.03)
+    assert seen.travelled_when_s == pytest.approx((1 * 0.02 + 2 * 0.01) / 3, rel=0.15)
     assert seen.pushed_when_s == pytest.approx((0.02 + 0.01) / 2, rel=0.15)  # (a shot begins in the midst of levels)
     assert seen.turned_when_s == pytest.approx((0.03 + 0.01) / 2, rel=1e-6)
 

@@ -142,7 +142,7 @@ class Scene:
                               pole [nat]
     pushed_s                  [tiles] how long pixels were pushed, all together
     turns                     [tiles] how often pushing ended
-    pushed_when_s, turned_when_s   [tiles] the mean time of both since a shot began, 0 of none
+    travelled_when_s, pushed_when_s, turned_when_s   [tiles] the mean time of each since a shot began, 0 of none
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns and ends [nat/s]
     off_peaks                 [tiles] what the second pole takes from peaks, as often as there are levels in it [nat]
     by_slope                  [2, quarters of octaves] travel, and what its events have near them, by the slope there
@@ -180,6 +180,7 @@ class Scene:
     travel_at_least: np.ndarray
     pushed_s: np.ndarray
     turns: np.ndarray
+    travelled_when_s: np.ndarray
     pushed_when_s: np.ndarray
     turned_when_s: np.ndarray
     bend: np.ndarray

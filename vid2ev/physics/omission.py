@@ -69,7 +69,8 @@ def crowding(spec: Any, scene: Scene) -> float:
     in_step = max(_in_step(spec), 1.0)
     if not spec.random_phase:
         return in_step
-    return 1.0 + min(reset(scene, spec) + _at_rest(scene, spec), 1.0) * (in_step - 1.0)
+    ever_reset = -math.expm1(-spec.shot_rate_hz * scene.seconds)  # (where levels matter may be late in the clip)
+    return 1.0 + min(ever_reset + _at_rest(scene, spec), 1.0) * (in_step - 1.0)
 
 
 def _at_rest(scene: Scene, spec: Any) -> float:
@@ -82,8 +83,12 @@ def _at_rest(scene: Scene, spec: Any) -> float:
 
 
 def reset(scene: Scene, spec: Any) -> float:
-    """The share of pixels, at most, whose levels shot noise has set anew before an event, on average."""
-    return -math.expm1(-spec.shot_rate_hz * scene.seconds)
+    """The share of events of light, at most, before which shot noise has set the levels of their pixels anew since the
+    shot began, on average; such noise comes the more often the darker it is."""
+    if scene.still:
+        return 0.0
+    rates_hz = spec.shot_rate_hz * (1.0 - (1.0 - spec.shot_light_factor) * np.clip(scene.light_min, 0.0, 1.0))
+    return float(np.dot(-np.expm1(-rates_hz * scene.travelled_when_s), scene.travel) / scene.travel.sum())
 
 
 def tau_at(light: np.ndarray, spec: Any) -> np.ndarray:

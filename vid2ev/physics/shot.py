@@ -15,7 +15,6 @@ Source: v2e (Hu, Liu, Delbruck 2021), rate falling to a quarter at full scale, t
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from vid2ev.bounds.chances import at_most
 from vid2ev.bounds.distance import added
 from vid2ev.bounds.scene import DISTANCE_TAU_S, Omission, Scene
 from vid2ev.compiling.compiler import compiled
-from vid2ev.physics.omission import kind_of, light_events, set_anew
+from vid2ev.physics.omission import kind_of, light_events, reset, set_anew
 
 CELL_NS, CELL_PIXELS = 1_000_000, 2048
 
@@ -50,6 +49,6 @@ def omission(scene: Scene, spec: Any) -> Omission:
     extra = at_most(rate_hz * scene.pixels * scene.seconds)
     bunched = 1.0 + 2.0 * spec.shot_rate_hz * DISTANCE_TAU_S
     distance = added(light_events(scene, spec), extra, 0.0) * bunched
-    distance += set_anew(scene, spec, -math.expm1(-spec.shot_rate_hz * scene.seconds))
+    distance += set_anew(scene, spec, reset(scene, spec))
     why = f"{extra:.0f} events at most, and their pixels' levels"
     return Omission(distance, kind_of(spec), f"{rate_hz:.3g} events/pixel/s", why)

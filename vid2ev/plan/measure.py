@@ -23,6 +23,7 @@ from vid2ev.kernels.measured import (
     QUARTERS,
     SCRATCH,
     TRAVEL,
+    TRAVELLED,
     TURNED,
 )
 from vid2ev.kernels.play import end_measure
@@ -37,7 +38,7 @@ from vid2ev.stream.frames import Frame
 from vid2ev.stream.still import told_of
 
 BRIGHTNESS_EVERY = 8  # frames
-TIMED = [PUSHED_S, TURNED]
+TIMED = [TRAVELLED, PUSHED_S, TURNED]
 LIGHTS = 41  # octaves of light, from 2**-20 to 2**20
 
 
@@ -112,7 +113,7 @@ class Measure:
     def scene(self) -> Scene:
         """What was seen so far."""
         travel, tiles, spread = self._plane(TRAVEL), self._found.tiles.copy(), self._found.spread.copy()
-        pushed_when_s, turned_when_s = (self._end(tiles, spread) / np.maximum(tiles[:, TIMED], 1e-300)).T
+        when_s = (self._end(tiles, spread) / np.maximum(tiles[:, TIMED], 1e-300)).T
         bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
         return Scene(
             size=self.size,
@@ -120,8 +121,7 @@ class Measure:
             seconds=self._ns * 1e-9,
             shortest_s=self._shortest_ns * 1e-9,
             longest_s=self._longest_ns * 1e-9,
-            pushed_when_s=pushed_when_s,
-            turned_when_s=turned_when_s,
+            **dict(zip(("travelled_when_s", "pushed_when_s", "turned_when_s"), when_s, strict=True)),
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
