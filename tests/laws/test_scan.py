@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from against.clips import AFTER_TRACKING, EVERYTHING, clean, start
+from against.clips import AFTER_TRACKING, EVERYTHING, clean, feed, start
 
 from vid2ev import load_sensor
 from vid2ev.kernels.layout import HIGH, LOW, PITCH
@@ -55,3 +55,18 @@ def test_no_pixel_that_has_an_event_is_left_out(spec):
         solve_all(solves)
         sent += len(ours)
     assert sent > 1_000
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [pytest.param(spec, marks=[pytest.mark.long] * (name in RARE), id=name) for name, spec in SENSORS.items()],
+)
+def test_cold_pixels_send_nothing(spec):
+    """Nor do they of the light where they have noise, and turns within an interval are looked for in all pixels."""
+    rng = np.random.default_rng(6)
+    t_ns = np.cumsum(np.where(np.arange(40) % 2, 1e4, 1e6)).astype(np.int64)  # (noise is resolved in the short ones)
+    light = np.exp(rng.normal(size=(40, 30, 60))).astype(np.float32)
+    dvs = start(spec.model_copy(update={"cold_probability": 0.5}), light, seed=2)
+    sent, cold = feed(dvs, t_ns, light), dvs.maps()["cold"]
+    assert 0.4 < cold.mean() < 0.6 and len(sent) > 1000
+    assert not cold[sent.y, sent.x].any()

@@ -129,7 +129,7 @@ def turns_at(block, scratch, i, flags):
 def may_reach(block, scratch, i, gain0, flags, num, iv):
     """Whether the hull of an interval with a turning point reaches a level: y stays among inputs and first pole."""
     if len(flags.log_compare) and not len(flags.log_input):
-        return True  # the hull in nats would cost another logarithm
+        return block[HIGH * PITCH + i] < F(np.inf)  # all but bad pixels: their hull would cost another logarithm
     top, bottom = hull_of_turn(block, scratch, i)
     return hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv)
 
