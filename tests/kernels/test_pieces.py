@@ -1,0 +1,107 @@
+"""Pieces of responses, of which the log may drift: from turn to turn, found by vector code or not, they go one way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vid2ev.compiling.compiler import compiled
+from vid2ev.kernels.ladder import END
+from vid2ev.kernels.lanes import BASE, C1, C2, DRIFT, F1, LAST, LOWER, RISE, S1, UPPER, Y0, A
+from vid2ev.kernels.layout import Interval
+from vid2ev.kernels.path import KNOTS
+from vid2ev.kernels.response import next_piece, prepare_responses
+from vid2ev.kernels.work import Work, new_work
+from vid2ev.physics.log_curve import Curve
+from vid2ev.physics.photoreceptor import response_terms
+from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of
+from vid2ev.sensors.presets import load_sensor
+
+LANES = 500
+SENSORS = {
+    "two poles": (),
+    "one pole": ("follower_tau_us=0",),
+    "none": ("photoreceptor_tau_us=0", "follower_tau_us=0"),
+    "a knee": ("log_curve=toe",),
+    "a first pole as fast as the light": ("bandwidth=light",),
+    "after the log": ("filter=after",),
+    "two poles, no leak": ("leak_rate_hz=0",),
+    "one pole, no leak": ("leak_rate_hz=0", "follower_tau_us=0"),
+}
+
+
+@compiled
+def pieces_of(work, count, ends, b, flags, num, iv):
+    """The end of each piece of the loaded lanes, the response there and what is seen of it, into ends [count, .., 3]."""
+    prepare_responses(work, count, b, flags, num, iv)
+    for j in range(count):
+        for k in range(ends.shape[1]):
+            ends[j, k, 0], ends[j, k, 1], ends[j, k, 2] = work.lanes[S1 + j], work.lanes[F1 + j], work.lanes[END + j]
+            if work.lanes[S1 + j] >= 1.0:
+                break
+            next_piece(work.lanes, j, work.knots, b, flags, num)
+
+
+def loaded(rng: np.random.Generator, poles: int, rates: np.ndarray, iv: Interval, curve: Curve) -> Work:
+    """A work with lanes of random light [0.001, 3], its rise and its lags, and no numbers anywhere else.
+
+    Some light falls about as fast as what is added to its log rises.
+    """
+    work = new_work()
+    for plane in (work.lanes, work.levels, work.when, work.steps, work.jobs, work.guesses, work.turns, work.knots):
+        plane[:] = np.nan
+    light = 10 ** rng.uniform(-3, 0.5, LANES)
+    rise = np.where(rng.random(LANES) < 0.3, 0.0, light * rng.uniform(-0.9, 2, LANES))
+    e1, e2 = light * rng.uniform(-0.8, 0.8, (2, LANES)) * 10 ** rng.uniform(-6, 0, LANES)
+    follows, per_nat = rng.random(LANES) < 0.3, np.where(light < curve.knee, curve.floor, light + curve.dark)
+    rise = np.where(follows, np.maximum((iv.leak0 - iv.leak1) * per_nat * rng.uniform(0.5, 1.5, LANES), -light), rise)
+    c1, c2 = np.vectorize(response_terms)(rise, e1, e2, rates, iv.b, poles == 2) if poles else (0.0, 0.0)
+    start = light - (0.0, e1, e2)[poles]
+    last = start + rise + c1 * np.expm1(-rates) + c2 * np.expm1(-iv.b)
+    for plane, values in ((Y0, light), (RISE, rise), (C1, e1), (C2, e2), (A, rates), (LAST, last)):
+        work.lanes[plane : plane + LANES] = values
+    work.lanes[UPPER : UPPER + LANES], work.lanes[LOWER : LOWER + LANES] = -np.inf, np.inf
+    return work
+
+
+@pytest.mark.parametrize("settings", SENSORS.values(), ids=SENSORS.keys())
+def test_signals_go_one_way_from_turn_to_turn(settings):
+    spec = load_sensor("paper", ("leak_rate_hz=1", *settings))
+    flags, num = flags_of(spec, False), numbers_of(spec, 1, 0)
+    poles, drifts = len(flags.poles), len(flags.drift) > 0
+    rng, turned = np.random.default_rng(2), 0
+    s = np.unique(np.concatenate([np.linspace(0, 1, 300), np.geomspace(1e-6, 1, 300)]))
+    for dt_us in (10, 200, 2000, 40_000, 400_000):  # (the last drifts by more than vector code is asked for)
+        for falls in (False, True) if drifts else (False,):  # (as noise may)
+            iv = interval_of(flags, num, 0, dt_us * 1000, 0, 0, False)
+            iv = iv._replace(leak0=iv.leak1, leak1=iv.leak0) if falls else iv
+            rates = 10 ** rng.uniform(-2, 2, LANES) if flags.light_bandwidth else np.full(LANES, iv.a)
+            b = iv.b if poles == 2 else 0.0
+            work, ends = loaded(rng, poles, rates, iv, num.curve), np.ones((LANES, KNOTS, 3))
+            pieces_of(work, LANES, ends, b, flags, num, iv)
+            for j in range(LANES):
+                start, count = 0.0, int(np.argmax(ends[j, :, 0] >= 1.0)) + 1
+                light, heights = signal(work, j, s, b, num.curve, bool(flags.log_input))
+                for end, there, seen in ends[j, :count]:
+                    ways = np.diff(heights[(s >= start) & (s <= end)])
+                    least = 1e-6 if drifts else 1e-12
+                    assert (ways >= -least).all() or (ways <= least).all(), (dt_us, falls, j, start, end)
+                    assert end > start
+                    light, nats = signal(work, j, np.array([end]), b, num.curve, bool(flags.log_input))
+                    assert there == pytest.approx(light[0], rel=1e-9, abs=1e-12)
+                    assert seen == pytest.approx(nats[0], abs=1e-9)
+                    start = end
+                turned += count > 1
+    assert turned > (0 if poles == 0 else 100)  # (light that falls as the leak rises, within 4 ms)
+
+
+def signal(work: Work, j: int, s: np.ndarray, b: float, curve: Curve, log: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The response of lane j at s, and the signal [nat]."""
+    y0, rise, c1, c2, a, base, drift = (work.lanes[plane + j] for plane in (Y0, RISE, C1, C2, A, BASE, DRIFT))
+    y = y0 + rise * s + c1 * np.expm1(-a * s) + c2 * np.expm1(-b * s)
+    if log:
+        return y, y
+    light = np.maximum(y, 0.0)
+    logs = np.log(np.maximum(light, curve.knee) + curve.dark)
+    nats = np.where(light < curve.knee, light * curve.slope + curve.black, logs)
+    return y, nats + np.nan_to_num(base + drift * s)
