@@ -120,9 +120,8 @@ def knots_of(path, knots):
             put_in_order(knots, n)
     else:
         for turn in turns_of(path):
-            if turn < 1.0:
-                knots[n] = turn
-                n += 1
+            knots[n] = turn
+            n += 1
     knots[n] = 1.0
 
 
@@ -178,8 +177,6 @@ def add_reached(path, level, knots, n):
         if (begin > level) != (finish > level):
             knots[n] = reach(path, level, start, end, begin, finish, finish > level)
             n += 1
-        if end >= 1.0:
-            break
         start, begin = end, finish
     return n
 
@@ -193,7 +190,7 @@ def reach(path, level, lo, hi, begin, end, up):
     """
     if begin == level or (begin > level) == up:  # (where it stays there is no chord)
         return lo
-    s, step, fastest = lo + (hi - lo) * min((level - begin) / (end - begin), 1.0), hi - lo, max(path.a, path.b)
+    s, step, fastest = lo + (hi - lo) * ((level - begin) / (end - begin)), hi - lo, max(path.a, path.b)
     for _ in range(80):
         ahead, rate, bend = ahead_of(path, level, s)
         dim = dim_at(path, level, s)
