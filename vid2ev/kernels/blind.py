@@ -85,7 +85,7 @@ def see(work, some, b, planes, flags, num):
         s = lanes[BLIND + j]
         y = response_at(lanes, j, s, b)
         lanes[AT + j] = seen_at(lanes, j, y, s, flags, num)
-        lanes[S0 + j], lanes[F0 + j], lanes[BLIND + j] = s, y, -1.0
+        lanes[S0 + j], lanes[F0 + j] = s, y
     fresh_thresholds(lanes, work.pixels, who, some, planes, flags, num)
 
 
@@ -134,7 +134,7 @@ def with_more(work, left, b, flags, num):
         j = live[k]
         live[kept] = j
         if lanes[REACHED + j] > 0.0:
-            kept += np.int64((lanes[BLIND + j] <= 1.0) | (lanes[S1 + j] < 1.0))
+            kept += np.int64(lanes[BLIND + j] <= 1.0)
         elif lanes[S1 + j] < 1.0:
             next_piece(lanes, j, work.knots, b, flags, num)
             lanes[RUNGS + j] = 0.0
