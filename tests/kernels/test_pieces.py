@@ -18,6 +18,7 @@ from vid2ev.sensors.compiled import flags_of, interval_of, numbers_of
 from vid2ev.sensors.presets import load_sensor
 
 LANES = 500
+LOADED = Y0, RISE, C1, C2, A, LAST, UPPER, LOWER
 SENSORS = {
     "two poles": (),
     "one pole": ("follower_tau_us=0",),
@@ -58,7 +59,7 @@ def loaded(rng: np.random.Generator, poles: int, rates: np.ndarray, iv: Interval
     c1, c2 = np.vectorize(response_terms)(rise, e1, e2, rates, iv.b, poles == 2) if poles else (0.0, 0.0)
     start = light - (0.0, e1, e2)[poles]
     last = start + rise + c1 * np.expm1(-rates) + c2 * np.expm1(-iv.b)
-    for plane, values in ((Y0, light), (RISE, rise), (C1, e1), (C2, e2), (A, rates), (LAST, last)):
+    for plane, values in zip(LOADED[:6], (light, rise, e1, e2, rates, last), strict=True):
         work.lanes[plane : plane + LANES] = values
     work.lanes[UPPER : UPPER + LANES], work.lanes[LOWER : LOWER + LANES] = -np.inf, np.inf
     return work
@@ -93,6 +94,27 @@ def test_signals_go_one_way_from_turn_to_turn(settings):
                     start = end
                 turned += count > 1
     assert turned > (0 if poles == 0 else 100)  # (light that falls as the leak rises, within 4 ms)
+
+
+def test_turns_of_a_lane_do_not_depend_on_who_else_is_there():
+    spec = load_sensor("paper", ("leak_rate_hz=1",))
+    flags, num = flags_of(spec, False), numbers_of(spec, 1, 0)
+    rng, iv = np.random.default_rng(1), interval_of(flags, num, 0, 200_000, 0, 0, False)
+    work = loaded(rng, 2, np.full(LANES, iv.a), iv, num.curve)
+    planes = [work.lanes[plane : plane + LANES].copy() for plane in LOADED]
+
+    def ends_of(lanes: np.ndarray) -> np.ndarray:
+        for plane, values in zip(LOADED, planes, strict=True):
+            work.lanes[plane : plane + len(lanes)] = values[lanes]
+        ends = np.ones((len(lanes), KNOTS, 3))
+        pieces_of(work, len(lanes), ends, iv.b, flags, num, iv)
+        return ends
+
+    alone = [ends_of(np.array([j]))[0] for j in range(LANES)]
+    turning = np.array([j for j in range(LANES) if alone[j][0, 0] < 1.0])
+    for one, others in zip(turning, rng.permutation(turning), strict=True):
+        assert np.array_equal(ends_of(np.array([one] + 63 * [others]))[0], alone[one])
+    assert len(turning) > 100
 
 
 def signal(work: Work, j: int, s: np.ndarray, b: float, curve: Curve, log: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -65,12 +65,13 @@ def split_drifting(work, count, b, flags, num):
         lanes[REACHED + j] = 1.0 - lanes[STEADY + j]
     some = reached_lanes(lanes, count, live)
     slopes_to_jobs(work, some, b, num)
-    R.approach(work.levels, work.when, work.steps, work.jobs, work.guesses, some, b, flags.poles, (), num)
+    left = R.approach(work.levels, work.when, work.steps, work.jobs, work.guesses, some, b, flags.poles, (), num)
     for k in range(some):
-        j, turns = live[k], work.jobs[R.WAY + k]
-        once = (turns == ONCE) & (work.steps[k] < R.ENOUGH)
-        if once:
-            enter(lanes, j, 0.0, lanes[Y0 + j], work.when[k], b)
+        j, turns, turn = live[k], work.jobs[R.WAY + k], work.when[k]
+        if turns == ONCE:
+            if not work.steps[k] < R.ENOUGH:
+                turn = R.finish(work.levels, work.jobs, turn, k, b, flags.poles, (), num, left)
+            enter(lanes, j, 0.0, lanes[Y0 + j], turn, b)
         elif turns != NEVER:
             knots_of_lane(lanes, j, work.knots, b, num)
             enter(lanes, j, 0.0, lanes[Y0 + j], first_after(0.0, work.knots), b)
@@ -96,14 +97,12 @@ def slopes_to_jobs(work, some, b, num):
         ratio = -(b * k2) / (a * k1)
         usable = (ratio > 1e-300) & (ratio < 1e300)
         bend = log64(ratio if usable else 1.0) / (b - a)
-        inside = usable & (bend > 0.0) & (bend < 1.0)
-        bend = bend if inside else 0.0
+        bend = bend if usable & (bend > 0.0) & (bend < 1.0) else 0.0
         middle, end = response(bend, start, rise, c1, c2, a, b), response(1.0, start, rise, c1, c2, a, b)
-        opposite, before = (start > 0.0) != (end > 0.0), inside & ((middle > 0.0) != (start > 0.0))
+        opposite, before = (start > 0.0) != (end > 0.0), (middle > 0.0) != (start > 0.0)
         simple = (abs(drift) < DRIFTS) & (num.curve.knee == 0.0)
-        late = opposite & inside & (before == False)  # noqa: E712 (vectorises, `not` does not)
         jobs[R.Y0 + k], jobs[R.RISE + k], jobs[R.C1 + k], jobs[R.C2 + k], jobs[R.A + k] = start, rise, c1, c2, a
-        jobs[R.FROM_S + k], jobs[R.FROM_Y + k] = bend if late else 0.0, middle if late else start
+        jobs[R.FROM_S + k], jobs[R.FROM_Y + k] = 0.0 if before else bend, start if before else middle
         jobs[R.TO_S + k], jobs[R.TO_Y + k] = bend if before else 1.0, middle if before else end
         jobs[R.WAY + k] = (ONCE if opposite else (MORE if before else NEVER)) if simple else MORE
         work.levels[k] = 0.0
@@ -123,7 +122,7 @@ def knots_of_lane(lanes, j, knots, b, num):
 def first_after(s, knots):
     """Where the piece ends that begins at s; 1.0 if none does."""
     for knot in knots:
-        if knot > s or knot >= 1.0:
+        if knot > s:
             return knot
     return 1.0
 
