@@ -33,7 +33,7 @@ SENSORS = {
 
 @compiled
 def pieces_of(work, count, ends, b, flags, num, iv):
-    """The end of each piece of the loaded lanes, the response there and what is seen of it, into ends [count, .., 3]."""
+    """The end of each piece of the lanes, the response there and what is seen of it, into ends [count, ..., 3]."""
     prepare_responses(work, count, b, flags, num, iv)
     for j in range(count):
         for k in range(ends.shape[1]):
