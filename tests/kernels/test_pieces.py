@@ -28,6 +28,7 @@ SENSORS = {
     "after the log": ("filter=after",),
     "two poles, no leak": ("leak_rate_hz=0",),
     "one pole, no leak": ("leak_rate_hz=0", "follower_tau_us=0"),
+    "a first pole as fast as the light, no leak": ("leak_rate_hz=0", "bandwidth=light"),
 }
 
 
@@ -54,8 +55,11 @@ def loaded(rng: np.random.Generator, poles: int, rates: np.ndarray, iv: Interval
     light = 10 ** rng.uniform(-3, 0.5, LANES)
     rise = np.where(rng.random(LANES) < 0.3, 0.0, light * rng.uniform(-0.9, 2, LANES))
     e1, e2 = light * rng.uniform(-0.8, 0.8, (2, LANES)) * 10 ** rng.uniform(-6, 0, LANES)
-    follows, per_nat = rng.random(LANES) < 0.3, np.where(light < curve.knee, curve.floor, light + curve.dark)
-    rise = np.where(follows, np.maximum((iv.leak0 - iv.leak1) * per_nat * rng.uniform(0.5, 1.5, LANES), -light), rise)
+    follows, drift = rng.random(LANES) < 0.3, iv.leak1 - iv.leak0
+    per_nat = np.where(light < curve.knee, curve.floor, light + curve.dark)
+    little = np.minimum(abs(drift) * per_nat, 0.5 * light)
+    rise = np.where(follows, -np.sign(drift) * little * rng.uniform(0.5, 1.5, LANES), rise)
+    e1, e2 = np.where(follows, little * rng.uniform(-1, 1, (2, LANES)), (e1, e2))
     c1, c2 = np.vectorize(response_terms)(rise, e1, e2, rates, iv.b, poles == 2) if poles else (0.0, 0.0)
     start = light - (0.0, e1, e2)[poles]
     last = start + rise + c1 * np.expm1(-rates) + c2 * np.expm1(-iv.b)
