@@ -59,6 +59,7 @@ def loaded(rng: np.random.Generator, poles: int, rates: np.ndarray, iv: Interval
     per_nat = np.where(light < curve.knee, curve.floor, light + curve.dark)
     little = np.minimum(abs(drift) * per_nat, 0.5 * light)
     rise = np.where(follows, -np.sign(drift) * little * rng.uniform(0.5, 1.5, LANES), rise)
+    e1, e2 = np.where(rng.random(LANES) < 0.1, 0.0, (e1, e2))  # (from rest)
     e1, e2 = np.where(follows, little * rng.uniform(-1, 1, (2, LANES)), (e1, e2))
     c1, c2 = np.vectorize(response_terms)(rise, e1, e2, rates, iv.b, poles == 2) if poles else (0.0, 0.0)
     start = light - (0.0, e1, e2)[poles]
@@ -96,6 +97,7 @@ def test_signals_go_one_way_from_turn_to_turn(settings):
                     assert there == pytest.approx(light[0], rel=1e-9, abs=1e-12)
                     assert seen == pytest.approx(nats[0], abs=1e-9)
                     start = end
+                assert start == 1.0
                 turned += count > 1
     assert turned > (0 if poles == 0 else 100)  # (light that falls as the leak rises, within 4 ms)
 
