@@ -9,7 +9,7 @@ from vid2ev.compiling.compiler import compiled
 from vid2ev.kernels.crossing import UP
 from vid2ev.kernels.ladder import END, REACHED
 from vid2ev.kernels.lanes import BASE, C1, C2, DRIFT, F0, F1, RISE, S0, S1, Y0, A
-from vid2ev.kernels.roots import batch_times, lane_times
+from vid2ev.kernels.roots import batch_times, finish, gather_jobs, lane_times, to_signals
 from vid2ev.kernels.work import Work, new_work
 from vid2ev.physics.log_curve import Curve
 from vid2ev.physics.photoreceptor import response_terms
@@ -40,6 +40,16 @@ def batched(work, size, count, lanes, b, flags, num):
 def in_place(work, alive, count, lanes, b, flags, num):
     """Times of one crossing of each lane that is reached, in the place of the lane."""
     lane_times(work.levels, work.when, work.steps, work.guesses, work.live, alive, count, lanes, b, flags, num)
+
+
+@compiled
+def searched(work, count, lanes, b, flags, num):
+    """The same of those that vector code has not settled."""
+    to_signals(work.levels, count, flags, num)
+    gather_jobs(work.jobs, work.who, count, lanes, flags)
+    for k in range(count):
+        middle = 0.5 * (lanes[S0 + work.who[k]] + lanes[S1 + work.who[k]])
+        work.when[k] = finish(work.levels, work.jobs, middle, k, b, flags.poles, flags.drift, num, 0)
 
 
 def loaded(rng: np.random.Generator, poles: int, drifts: bool, log_input: bool, b: float, curve: Curve) -> Work:
@@ -109,3 +119,10 @@ def test_a_signal_is_at_its_level_at_the_time_that_is_said(settings):
         work.live[: len(reached)], work.levels[:LANES] = reached, levels
         in_place(work, len(reached), LANES, lanes, b, flags, num)
         assert np.array_equal(work.when[: len(reached)], when[reached])
+        work.who[:LANES], work.levels[:LANES] = who, levels[who]
+        searched(work, LANES, lanes, b, flags, num)
+        assert missed(work.when[np.argsort(who)]).max() < 3e-9
+        ups = np.where(lanes[UP : UP + LANES] > 0, 1e-9, -1e-9)  # the end that levels go by may be rounded
+        work.who[:LANES], work.levels[:LANES] = np.arange(LANES), lanes[END : END + LANES] + ups
+        batched(work, LANES, LANES, lanes, b, flags, num)
+        assert np.array_equal(work.when[:LANES], lanes[S1 : S1 + LANES])
