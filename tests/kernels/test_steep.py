@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vid2ev.compiling.compiler import compiled
-from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH, last_light, stride_of
+from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LOW, PITCH, last_light, stride_of
 from vid2ev.kernels.scan import commit, scan
 from vid2ev.kernels.scratch import NEW, SCRATCH
 from vid2ev.kernels.steep import forget_rests, new_lag, note_rests, old_lag
@@ -17,6 +17,8 @@ from vid2ev.sensors.presets import load_sensor
 PIXELS, FRAMES = 2000, 14
 SENSORS = {
     "two poles": (),
+    "noise": ("photoreceptor_noise=0.03",),
+    "a slow second pole": ("photoreceptor_tau_us=10", "follower_tau_us=100000"),
     "one pole": ("follower_tau_us=0",),
     "a first pole as fast as the light": ("bandwidth=light",),
     "the only pole as fast as the light": ("bandwidth=light", "follower_tau_us=0"),
@@ -84,6 +86,29 @@ def test_the_response_is_known_to_what_the_logarithm_sees(settings):
                 large |= np.abs(lags[: len(flags.poles)]).max(axis=0) > 2.01 * (now + num.curve.floor)
                 assert found[2, large & ~bad].all() and not found[2, bad].any()
                 steep += large.sum()
+                if flags.noise:  # (what is seen of the response is kept)
+                    seen = block[(LAG1 + 4) * PITCH : (LAG1 + 4) * PITCH + PIXELS]
+                    np.testing.assert_allclose(seen, np.log(now + num.curve.dark), atol=2e-6)
                 for ours, theirs in ((found[0], was), (found[1], now)):
                     worst = max(worst, (np.abs(ours - theirs) / (theirs + num.curve.floor)).max())
     assert worst < 1e-6 and steep > 1000
+
+
+def test_a_pixel_is_as_it_is_whatever_its_neighbours_are():
+    spec = load_sensor("paper", ())
+    flags, num = flags_of(spec, False), numbers_of(spec, 1, 0)
+    rng, calm = np.random.default_rng(1), PIXELS // 2
+    light = rng.uniform(0.5, 1.0, (FRAMES, PIXELS)).astype(np.float32)
+    flashes = np.concatenate([light[:, :calm], light_of(rng, 6.0)[:, calm:]], axis=1)
+    states = []
+    for seen in (light, flashes):
+        block, rest = np.zeros(stride_of(flags), np.float32), np.zeros(2 * PITCH, np.float32)
+        scratch, flagged, found = np.zeros(SCRATCH, np.float32), np.zeros(PITCH, np.uint8), np.empty((3, PIXELS))
+        block[INPUT * PITCH : INPUT * PITCH + PIXELS] = seen[0]
+        block[HIGH * PITCH : (HIGH + 1) * PITCH], block[LOW * PITCH : (LOW + 1) * PITCH] = 3e38, -3e38
+        for k in range(1, FRAMES):
+            iv = interval_of(flags, num, 0, 200_000, 0, 0, False)
+            stepped(block, rest, scratch, flagged, seen[k], found, flags, num, iv)
+            states.append(np.concatenate([found[:, :calm], block.reshape(-1, PITCH)[:, :calm]]))
+    for alone, beside in zip(states[: FRAMES - 1], states[FRAMES - 1 :], strict=True):
+        assert np.array_equal(alone, beside)

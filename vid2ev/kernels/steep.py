@@ -24,7 +24,7 @@ FALLEN = 8.0  # times 9e-8, the rounding of a step, is 7e-7 nat
 def forget_rests(scratch):
     """Of another block no lag has anything beyond its float32 yet."""
     if scratch[REFINED] > F(0.0):
-        for i in range(OLD_REST1, REFINED + 1):
+        for i in range(OLD_REST1, REFINED):
             scratch[i] = F(0.0)
 
 
