@@ -114,3 +114,15 @@ def test_a_blind_time_that_ends_with_a_frame_to_the_nanosecond_ends_as_one_befor
     assert 0 < last_ns < t_ns[4] and len(sent[0]) > 1
     assert sent[0].p.tolist() == sent[1].p.tolist()
     np.testing.assert_allclose(sent[0].t, sent[1].t, atol=1.0)
+
+
+def test_work_is_bounded_whatever_the_contrast():
+    """Of a flash of 33 decades with a threshold of 1e-4 and a blind time of 1 ns, what is beyond `max_crossings` of an
+    interval is one crossing, which takes the memory to the signal."""
+    light = np.array([0, 1e30, 1e30], np.float32)[:, None, None] * np.ones((1, 1, 3), np.float32)
+    blind, pixel = {"refractory_us": 0.001, "refractory": "track"}, Pixel(1e-4, 1e-4, *TAUS_US)
+    dvs = start(sensor(pixel, leak_rate_hz=LEAKS_HZ[0], **blind), light)
+    sent = feed(dvs, [0, 1_000_000, 2_000_000], light)
+    assert dvs.counts["capped"] == 3 * 2 and len(sent) == 3 * 2 * (dvs.spec.max_crossings + 1)
+    end = signal_of(pixel, light[:, 0, 0], LEAKS_HZ[0] * 1e-4 * 1e-6)(np.array([2000.0]))
+    np.testing.assert_allclose(dvs.state()["memory"], end[0], atol=1e-4)
