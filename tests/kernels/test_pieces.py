@@ -108,6 +108,34 @@ def test_signals_go_one_way_from_turn_to_turn(settings):
     assert turned > (0 if poles == 0 else 100)  # (light that falls as the leak rises, within 4 ms)
 
 
+@pytest.mark.parametrize("settings", [(), ("follower_tau_us=0",), ("bandwidth=light",)], ids=["two", "one", "by light"])
+def test_a_level_that_is_reached_between_two_ends_has_an_end_beyond_it(settings):
+    """Turns are looked for only where they may matter: near levels."""
+    spec = load_sensor("paper", ("leak_rate_hz=0", *settings))
+    flags, num = flags_of(spec, False), numbers_of(spec, 1, 0)
+    poles, rng, s = len(flags.poles), np.random.default_rng(2), np.linspace(0, 1, 2000)
+    met = unsplit = 0
+    for dt_us in (50, 200, 1000, 5000):
+        iv = interval_of(flags, num, 0, dt_us * 1000, 0, 0, False)
+        b, rates = iv.b if poles == 2 else 0.0, np.full(LANES, iv.a)
+        rates = rates * 10 ** rng.uniform(-1, 1, LANES) if flags.light_bandwidth else rates
+        work, ends = loaded(rng, poles, rates, iv, num.curve), np.ones((LANES, KNOTS, 3))
+        first = work.lanes[Y0 : Y0 + LANES] - (0.0, work.lanes[C1 : C1 + LANES], work.lanes[C2 : C2 + LANES])[poles]
+        last, away = work.lanes[LAST : LAST + LANES], 10 ** rng.uniform(-6, -1, (2, LANES)) * first
+        upper, lower = np.maximum(first, last) + away[0], np.minimum(first, last) - away[1]
+        work.lanes[UPPER : UPPER + LANES], work.lanes[LOWER : LOWER + LANES] = upper, lower
+        pieces_of(work, LANES, ends, b, flags, num, iv)
+        for j in range(3, LANES):
+            y = response_of(work, j, s, b)
+            count = int(np.argmax(ends[j, :, 0] >= 1.0)) + 1
+            reached = [y.max() > upper[j] + 1e-7 * first[j], y.min() < lower[j] - 1e-7 * first[j]]
+            there = np.array([first[j], *ends[j, :count, 1]])
+            assert not reached[0] or there.max() >= upper[j]
+            assert not reached[1] or there.min() <= lower[j]
+            met, unsplit = met + any(reached), unsplit + (count == 1)
+    assert met > 100 and unsplit > 500
+
+
 def test_turns_of_a_lane_do_not_depend_on_who_else_is_there():
     spec = load_sensor("paper", ("leak_rate_hz=1",))
     flags, num = flags_of(spec, False), numbers_of(spec, 1, 0)
