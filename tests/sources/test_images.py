@@ -94,6 +94,17 @@ def test_times_go_to_the_images_that_their_lines_name(tmp_path: Path) -> None:
         open_source(tmp_path)
 
 
+def test_times_may_be_called_as_hs_ergb_calls_them(tmp_path: Path) -> None:
+    write(tmp_path, ["1.png", "2.png"])
+    (tmp_path / "timestamp.txt").write_text("1000\n7666\n")
+    source = open_source(tmp_path)
+    assert [frame.t_ns for frame in source.frames()] == [1_000_000, 7_666_000]
+    assert ["begin timestamp.txt with" in warning for warning in source.warnings] == [True]
+    (tmp_path / "timestamps.txt").write_text("# us\n0\n40\n")  # our own name wins
+    source = open_source(tmp_path)
+    assert [frame.t_ns for frame in source.frames()] == [0, 40_000] and source.warnings == []
+
+
 def test_start_skips_without_changing_what_follows(tmp_path: Path) -> None:
     write(tmp_path, [f"{k}.png" for k in range(5)], stamps="0\n40\n40\n80\n120\n")
     source = open_source(tmp_path)

@@ -2,11 +2,11 @@
 
 8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
-rule for its unit), for `stack.tif` from `stack_timestamps.npy` or `.txt` beside it, or from fps: one after the other
-then, whatever their numbers, with a remark where numbers are missing.  Codes are sRGB, 16-bit ones too, unless a
-transfer is given, or `frames.json`, the manifest of the frame camera whose folder it is, or the first PNG says one;
-that manifest also says of how many bits codes are that do not fill theirs.  Floating point is linear light, 1.0 white
-as it stands.  Transparency is ignored.
+rule for its unit; HS-ERGB and BS-ERGB call it `timestamp.txt`), for `stack.tif` from `stack_timestamps.npy` or `.txt`
+beside it, or from fps: one after the other then, whatever their numbers, with a remark where numbers are missing.
+Codes are sRGB, 16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose
+folder it is, or the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs.
+Floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from vid2ev.sources.times import (
 from vid2ev.stream.frames import Colour, Frame
 from vid2ev.untrusted import json_of, read_text
 
-TIMESTAMPS = "timestamps.txt"
+TIMESTAMPS, OF_ERGB = "timestamps.txt", "timestamp.txt"  # the other is what HS-ERGB and BS-ERGB call it
 FRAMES = "frames.json"  # what `vid2ev interpolate` and `reconstruct` say of frames that they have made
 
 
@@ -77,7 +77,7 @@ class Images:
         self._unit: str | None = None
         if fps is None:
             self._stamps, self._unit = self._read_stamps()
-            file = self.path / TIMESTAMPS if self.path.is_dir() else times_beside(self.path)
+            file = _times_in(self.path) if self.path.is_dir() else times_beside(self.path)
             self.warnings += remarks_on_unit(self._unit, file)
         elif self.path.is_dir():
             self.warnings += _remarks_on_gaps([file for file, _ in self._places])
@@ -142,7 +142,7 @@ class Images:
     def _read_stamps(self) -> tuple[list[Fraction], str]:
         if not self.path.is_dir():
             return stamps_beside(self.path, len(self._places))
-        file = self.path / TIMESTAMPS
+        file = _times_in(self.path)
         if not file.exists():
             raise UsageError(
                 f"{self.path}: images without times; give --fps, or a {TIMESTAMPS} with one line per image"
@@ -151,6 +151,12 @@ class Images:
         if len(stamps) != len(self._places):
             raise DataError(f"{file}: {len(stamps)} times for {len(self._places)} images; expected one per image")
         return stamps, unit
+
+
+def _times_in(folder: Path) -> Path:
+    """Where the times in a folder are, or would be."""
+    ours, other = folder / TIMESTAMPS, folder / OF_ERGB
+    return other if other.exists() and not ours.exists() else ours
 
 
 def _said(folder: Path) -> tuple[str | None, int | None]:
