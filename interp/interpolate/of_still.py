@@ -24,11 +24,11 @@ from interp.representation.dead_time import look_back_us, stated
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import is_mat
 from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
 from vid2ev.recording.manifest import identity
 
-MAT = b"MATLAB 5.0 MAT-file"
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 COLUMNS = 4
 SHORTEST_US = 100  # of exposures whose times have fractions: what is shorter is in seconds
@@ -105,14 +105,6 @@ class OfStill:
     @property
     def _span_us(self) -> int:
         return max(1, int(self._events.t[-1] - self._events.t[0]))
-
-
-def is_mat(path: Path) -> bool:
-    """Whether a file is one of MATLAB's, by its first bytes."""
-    if not path.is_file():
-        return False
-    with open(path, "rb") as file:
-        return file.read(len(MAT)) == MAT
 
 
 def picture_beside(path: Path) -> Path:

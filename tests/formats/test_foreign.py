@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from recordings import all_events, assert_same, dense, events_of, recording_of, written
+from scipy.io import loadmat, savemat
 
 from vid2ev.errors import DataError
 from vid2ev.formats import (
@@ -27,6 +28,7 @@ from vid2ev.formats import (
 )
 from vid2ev.formats.event_file import EventFile
 from vid2ev.formats.sequential import Unwrapped, pieces
+from vid2ev.sources import open_source
 from vid2ev.stream.events import Events
 
 NMNIST = Path(__file__).parents[2] / ".." / "shared" / "data" / "events" / "nmnist_sample.bin"
@@ -452,3 +454,27 @@ def test_times_of_any_length_come_back_from_text(tmp_path: Path, name: str) -> N
     t = np.sort((edges[:, None] + np.arange(-2, 3)).ravel())
     path = written(format_named(name), recording_of(events_of(t, (50, 40)), (50, 40), int(t[0])), tmp_path)
     assert [row[0] for row in rows(open_events(path))] == t.tolist()
+
+
+@pytest.mark.parametrize("version", ["5.0", "7.3"])
+def test_a_file_of_matlab_says_how_its_events_become_some_that_are_read(tmp_path: Path, version: str) -> None:
+    path, events = tmp_path / "recorded.mat", events_of(np.arange(0, 3000, 7), (12, 9))
+    table = np.stack([events.t, events.x, events.y, events.p], 1).astype(np.int64)
+    if version == "5.0":
+        savemat(path, {"events": table})
+        found = loadmat(path)["events"]
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["events"] = table.T  # (columns first, as MATLAB counts)
+        path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + path.read_bytes()[512:])
+        with h5py.File(path) as file:
+            found = np.array(file["events"]).T
+    for read in (describe_events, open_source):
+        with pytest.raises(DataError, match=r"MATLAB.*savez\('recorded\.npz', t=t, x=x, y=y, p=p\)") as refused:
+            read(path)
+        said = str(refused.value)
+        assert ("scipy.io.loadmat" in said, "h5py.File" in said) == (version == "5.0", version == "7.3")
+        assert ("interpolate" in said) == (version == "5.0")
+    t, x, y, p = found.T
+    np.savez(tmp_path / "recorded.npz", t=t, x=x, y=y, p=p)
+    assert_same(Events.concatenate(read_events(tmp_path / "recorded.npz")), events)

@@ -28,10 +28,12 @@ __all__ = [
     "event_cameras",
     "format_named",
     "holds_events",
+    "is_mat",
     "of_only_camera",
     "open_events",
     "read_events",
     "recognise",
+    "refuse_mat",
     "survey",
 ]
 
@@ -57,6 +59,7 @@ FORMATS = {
 
 LONG_SILENCE_US = 3_600_000_000  # before the first event: the file counts from another instant than it begins
 DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
+MAT, MAT_OF_HDF5 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"  # (5 is what versions 5 to 7.2 of MATLAB write)
 
 
 def format_named(name: str) -> Format:
@@ -230,6 +233,31 @@ def recognise(path: str | Path) -> Format | None:
     return next((kind for kind in kinds if kind.open and kind.recognises(head, path)), None)
 
 
+def is_mat(path: Path) -> bool:
+    """Whether a file is one of MATLAB's that scipy reads, by its first bytes."""
+    return _begins(path, MAT)
+
+
+def refuse_mat(path: Path) -> None:
+    """Raise DataError for a file of MATLAB's, which says how its events become such that can be read."""
+    if not (old := is_mat(path)) and not _begins(path, MAT_OF_HDF5):
+        return
+    raise DataError(
+        f"{path} is a file of MATLAB's, which calls its tables as it likes; read them with"
+        f" {'scipy.io.loadmat' if old else 'h5py.File'}, and save events with numpy.savez('{path.stem}.npz', t=t, x=x,"
+        " y=y, p=p), t in whole microseconds"
+        + f"; `vid2ev interpolate` takes it as it is, with {path.stem}.png beside it"
+        * old
+    )
+
+
+def _begins(path: Path, magic: bytes) -> bool:
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(magic)) == magic
+
+
 def holds_events(folder: Path) -> bool:
     """Whether a folder has events itself, as that of a recording or of a ROS 2 bag has."""
     return (folder / "metadata.yaml").exists() or any(folder.glob("events.*"))
@@ -255,6 +283,7 @@ def _opened(path: str | Path) -> tuple[Format, EventFile]:
     path = _within(path) if path.is_dir() else path
     kind = recognise(path)
     if kind is None or kind.open is None:
+        refuse_mat(path)
         raise DataError(f"{path} is no event file of a known format; expected one of {', '.join(FORMATS)}")
     return kind, kind.open(path)
 

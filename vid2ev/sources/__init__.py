@@ -113,8 +113,10 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
 
 
 def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
+    from vid2ev.formats import refuse_mat
     from vid2ev.light.recognise import recognise
 
+    refuse_mat(path)
     match recognise(path):
         case "picture":
             from vid2ev.sources.images import Images
