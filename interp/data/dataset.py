@@ -137,8 +137,9 @@ def make_scene(scene: Scene, folder: Path, layout: str, multiple: int, tell: Tel
                 write_sequence(Own(source), target, layout)
                 shutil.rmtree(source)
         return Made(scene.name, facts_of(target, multiple, scene))
-    except DiskError:
-        raise
+    except DiskError as error:  # (its own remedy is for who chose the folder of this recording alone)
+        reason = getattr(error.__cause__, "strerror", None) or "the disk does not take it"
+        raise DiskError(f"{target} cannot be written: {reason}; make room or access there, then --resume") from error
     except (DataError, UsageError) as error:
         return Made(scene.name, {}, str(error))
 

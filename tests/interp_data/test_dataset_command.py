@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -24,6 +26,7 @@ from interp.data.settings import ClipSettings
 from vid2ev import DataError, UsageError, open_source
 from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DiskError
+from vid2ev.recording.disk import writing
 from vid2ev.recording.exposures import write_codes
 from vid2ev.recording.held import Held
 
@@ -188,11 +191,12 @@ def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypa
         made.append(arguments)
         if len(made) == 2:
             (tmp_path / "set.partial" / "begun.partial").mkdir()
-            raise DiskError("no room")
+            with writing(tmp_path / "begun", "choose another folder with -o"):  # (which no data set has)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         real(*arguments, **options)
 
     monkeypatch.setattr(module, "convert", full)
-    with pytest.raises(DiskError):
+    with pytest.raises(DiskError, match=r"No space left on device; make room or access there, then --resume$"):
         write_dataset(tmp_path / "set", spec)
     assert not (tmp_path / "set").exists()
     facts = write_dataset(tmp_path / "set", spec, resume=True)

@@ -99,7 +99,7 @@ def _locked(folder: Path) -> int:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(handle)
-        raise UsageError(f"another vid2ev is writing {folder}; wait for it, or choose another folder with -o") from None
+        raise UsageError(f"another vid2ev is writing {folder}; wait for it, or choose another folder") from None
     if _is_at(handle, folder / LOCK):
         return handle
     os.close(handle)  # (who held it has removed it since it was opened, and others may hold a new one)
