@@ -139,6 +139,8 @@ def test_the_line_counts_what_is_done_fails_and_runs(capsys: pytest.CaptureFixtu
     live.watch("a", {"share": 0.5, "events": 1000})
     live.watch("b", {"begun": True})
     assert live.text.startswith("0/3 clips, 2 running, 1,000 events, 0/s")  # (what was there before is no speed)
+    live.watch("b", {"compiling": True})
+    assert live.text.startswith("0/3 clips, 2 running, 1 compiling kernels, once, 1,000 events")
     live.end("b", True, None, "b: broken")
     assert live.text.startswith("0/3 clips, 1 failed, 1 running, 1,000 events")
     live.end("a", False, 5000, "a: 5,000 events")

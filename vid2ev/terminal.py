@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
 NAME = 10  # width of the names
+COMPILING = "compiling kernels, once"  # it takes seconds to minutes
 
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:

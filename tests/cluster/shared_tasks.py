@@ -27,6 +27,14 @@ def waits(tell: Tell, name: str, seconds: float) -> str:
     return name
 
 
+def compiles(tell: Tell) -> None:
+    """Waits for what another process compiles."""
+    from vid2ev.compiling.heard import waiting
+
+    with waiting():
+        pass
+
+
 def gives_its_process(tell: Tell) -> int:
     """Where it was done."""
     return os.getpid()

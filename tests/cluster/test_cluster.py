@@ -57,7 +57,7 @@ def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names = ("fails_once", "always_fails", "is_refused", "is_mistaken")
+    names = ("fails_once", "always_fails", "is_refused", "is_mistaken", "compiles")
     tasks = [Task(name, getattr(made, name)) for name in names]
     tasks.append(Task("clip", partial(made.waits, name="made", seconds=0.05)))
     told: list[tuple[str, dict[str, Any]]] = []
@@ -68,6 +68,7 @@ def test_a_task_that_fails_is_tried_again_but_not_one_that_cannot_be_meant(
     assert isinstance(found["is_mistaken"].error, ZeroDivisionError)
     assert {name for name, facts in told if facts.get("begun")} == {task.name for task in tasks}
     assert [facts["events"] for name, facts in told if name == "clip" and "events" in facts] == [7]
+    assert [facts["compiling"] for name, facts in told if name == "compiles" and "compiling" in facts] == [True, False]
 
 
 def test_a_worker_that_is_killed_costs_no_task_its_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

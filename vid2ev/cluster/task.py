@@ -52,6 +52,8 @@ def done_on_worker(task: Task, folder: str, topic: str) -> Any:
     """What the task gives, perhaps `GoOn`, or `Refused`; its errors go to Dask, which tries again."""
     from distributed import get_worker
 
+    from vid2ev.compiling.heard import telling_of
+
     worker = get_worker()
     key = worker.get_current_task()
     told_s = 0.0
@@ -77,6 +79,7 @@ def done_on_worker(task: Task, folder: str, topic: str) -> Any:
         )
     os.chdir(folder)
     try:
-        return task.call(tell)
+        with telling_of(lambda begins: log({"compiling": begins})):
+            return task.call(tell)
     except UsageError as error:
         return Refused(error)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 OUT_OF_MEMORY = "worker-restart-memory"  # under which Dask's nannies say whom they ended
 REMEDY = "give each worker more (--memory here), or run fewer at a time (--jobs)"
 
-Watch = Callable[[str, Mapping[str, Any]], object]  # the name of a task, and what it tells; {"begun": True} at first
+Watch = Callable[[str, Mapping[str, Any]], object]  # a task's name, and what it tells, such as {"begun": True} at first
 
 
 class WorkerLost(DataError):

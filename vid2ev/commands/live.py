@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from vid2ev.commands import INTERRUPTED, tidy
+from vid2ev.terminal import COMPILING
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
@@ -29,6 +30,7 @@ class _Task:
     events: int = 0
     events_before: int = 0
     running: bool = False
+    compiling: bool = False
     told: bool = False
 
 
@@ -49,10 +51,11 @@ class Live:
         self._show()
 
     def watch(self, name: str, facts: Mapping[str, Any]) -> None:
-        """What a task tells: `begun`, its `share`, its `events`."""
+        """What a task tells: `begun`, its `share`, its `events`, whether it is `compiling`."""
         with self._lock:
             task = self._tasks.setdefault(name, _Task())
             task.running, task.share = True, facts.get("share", task.share)
+            task.compiling = facts.get("compiling", task.compiling and not facts.get("begun"))
             if "events" in facts:
                 task.events = facts["events"]
                 task.events_before = task.events_before if task.told else task.events
@@ -65,7 +68,7 @@ class Live:
             task = self._tasks.setdefault(name, _Task())
             if events is not None:
                 task.events, task.events_before = events, task.events_before if task.told else events
-            task.running, task.share = False, 1.0
+            task.running, task.compiling, task.share = False, False, 1.0
             self._failed, self._done = self._failed + failed, self._done + (not failed)
             if not self._bar.disable:
                 self._bar.clear()
@@ -83,6 +86,8 @@ class Live:
         parts = [f"{self._done}/{self._count} {self._noun}"]
         parts += [f"{self._failed} failed"] * bool(self._failed)
         parts.append(f"{sum(task.running for task in tasks)} running")
+        if compiling := sum(task.compiling for task in tasks):
+            parts.append(f"{compiling} {COMPILING}")
         if events := sum(task.events for task in tasks):
             made = sum(task.events - task.events_before for task in tasks)
             parts += [f"{events:,} events", f"{made / (time.monotonic() - self._began_s):,.0f}/s"]

@@ -16,7 +16,7 @@ from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError, SavedError
 from vid2ev.interrupts import is_lost
-from vid2ev.terminal import counting
+from vid2ev.terminal import COMPILING, counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -92,10 +92,14 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Progress], bool]]:
-    """A progress bar on a terminal: frames, time left, events per second, and time against the clip's."""
+    """A progress bar on a terminal: frames, time left, events per second, and time against the clip's; or that kernels
+    are compiled."""
     from tqdm import tqdm
 
+    from vid2ev.compiling.heard import telling_of
+
     shown: tqdm | None = None
+    waiting: tqdm | None = None
 
     def report(recipe: Recipe, done: Progress) -> bool:
         nonlocal shown
@@ -108,8 +112,20 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
         shown.update(done.frames - shown.n)
         return check()
 
+    def compiling(begins: bool) -> None:
+        nonlocal waiting
+        if waiting is not None:
+            waiting.close()
+            waiting = None
+        if shown is not None:
+            shown.set_postfix_str(COMPILING * begins)
+        elif begins:
+            said = f"{COMPILING}, which takes seconds to minutes"
+            waiting = tqdm(bar_format=said, leave=False, disable=quiet or None)
+
     try:
-        yield report
+        with telling_of(compiling):
+            yield report
     finally:
         if shown is not None:
             shown.refresh()

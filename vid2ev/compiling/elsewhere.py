@@ -19,6 +19,8 @@ from typing import Any
 
 from numba.core import serialize
 
+from vid2ev.compiling.heard import waiting
+
 _SERVE = f"import sys, pickle; sys.path[:] = pickle.load(sys.stdin.buffer); from {__name__} import serve; serve()"
 _begun: dict[Any, Popen] = {}  # by kernel and types
 
@@ -43,7 +45,8 @@ class Elsewhere:
     def wait(self) -> None:
         """Until the other process has ended, whatever it came to."""
         if process := _begun.get(self._key):
-            _end(process)
+            with waiting():
+                _end(process)
             _begun.pop(self._key, None)
 
 
