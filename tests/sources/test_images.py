@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.transfer import code_table
+from vid2ev.light.transfer import CURVES, code_table
 from vid2ev.sources import open_source
 
 
@@ -159,8 +159,15 @@ def test_refusals(tmp_path: Path) -> None:
     (tmp_path / "timestamps.txt").write_text("0\n33\n66\n")
     with pytest.raises(DataError, match="3 times for 2 images"):
         open_source(tmp_path)
-    with pytest.raises(UsageError, match="transfer"):
-        open_source(tmp_path, fps=1, transfer="nonsense")
+
+
+def test_a_transfer_that_is_none_names_all_that_are(tmp_path: Path) -> None:
+    write(tmp_path, ["0.png"], np.uint16)
+    with pytest.raises(UsageError, match=r"'Linear' \(did you mean linear\?\): expected auto, ") as refused:
+        open_source(tmp_path, fps=1, transfer="Linear")
+    for name in ("auto", *CURVES, "gamma:2.2", "linear:10bit"):
+        assert name in str(refused.value)
+        open_source(tmp_path, fps=1, transfer=name)
 
 
 def test_an_image_of_another_size_is_named(tmp_path: Path) -> None:

@@ -538,8 +538,11 @@ def test_paths_that_cannot_be_meant(tmp_path: Path, name: str) -> None:
 
 def test_options_that_cannot_be_meant(encode) -> None:
     path = encode("a.mkv", flat([10]))
-    with pytest.raises(UsageError, match="transfer"):
+    with pytest.raises(UsageError, match=r"transfer 'sgrb' \(did you mean srgb\?\): expected auto, ") as refused:
         open_source(path, transfer="sgrb")
+    assert "bit" not in str(refused.value)
+    with pytest.raises(UsageError, match=r"a video says of how many bits"):
+        open_source(path, transfer="linear:10bit")
     with pytest.raises(UsageError, match="fps"):
         open_source(path, fps=0)
 

@@ -10,7 +10,7 @@ from vid2ev.errors import UsageError
 from vid2ev.light.colour import rgb_of_rgb
 from vid2ev.light.luminance import luminance_of_rgb
 from vid2ev.light.primaries import BT709, Primaries, primaries_of
-from vid2ev.light.transfer import parse_transfer
+from vid2ev.light.transfer import KNOWN, parse_transfer
 from vid2ev.stream.frames import Colour
 
 TYPES = "uint8, uint16 or floating point"
@@ -18,6 +18,7 @@ UNIT = "bit"  # of `linear:10bit`
 MOST = 16  # bits of codes
 IDENTITY = np.eye(3)
 SENSORS = 12  # bits of sensors whose codes are stored as they are, at the most; 10 of many
+OF_CODES = f"{KNOWN}; or linear:10bit, of codes that do not fill 16 bits"
 
 
 class PictureReader:
@@ -35,7 +36,7 @@ class PictureReader:
     def __init__(self, transfer: str, colour: Colour = "luminance", bits: int | None = None):
         self.transfer, said = with_bits(transfer)
         self.bits, self.colour = said or bits, colour
-        self._curve = parse_transfer(self.transfer)
+        self._curve = parse_transfer(self.transfer, f"auto, {OF_CODES}")
         self._tables: dict[int, np.ndarray] = {}
 
     def light(self, picture: np.ndarray, primaries: Primaries | None = None) -> np.ndarray:

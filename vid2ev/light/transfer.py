@@ -33,7 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import UsageError, nearest
 from vid2ev.light import hdr
 from vid2ev.light.hdr import Curve
 from vid2ev.requests import number_of
@@ -56,8 +56,9 @@ class Transfer:
     to_signal: Curve
 
 
-def parse_transfer(name: str) -> Transfer:
-    """The curve of a name: one of `CURVES`, or `gamma:G` with 0.1 <= G <= 10.  Raises UsageError."""
+def parse_transfer(name: str, known: str = KNOWN) -> Transfer:
+    """The curve of a name: one of `CURVES`, or `gamma:G` with 0.1 <= G <= 10.  Raises UsageError for others; who takes
+    other words as well says what is `known`."""
     if name in CURVES:
         return Transfer(name, *CURVES[name])
     if str(name).startswith("gamma:"):
@@ -67,7 +68,7 @@ def parse_transfer(name: str) -> Transfer:
             lambda signal: _not_negative(signal) ** gamma,
             lambda light: _not_negative(light) ** (1 / gamma),
         )
-    raise UsageError(f"transfer '{name}': expected {KNOWN}")
+    raise UsageError(f"transfer '{name}'{nearest(str(name).lower(), CURVES)}: expected {known}")
 
 
 def signal_of_codes(codes: np.ndarray, bits: int, full_range: bool = True) -> np.ndarray:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.light.pictures import TYPES, PictureReader
-from vid2ev.light.transfer import KNOWN
+from vid2ev.light.pictures import OF_CODES, TYPES, PictureReader
 from vid2ev.sources.stacks import NpyStack, NpzStack, Stack
 from vid2ev.sources.times import (
     Clock,
@@ -61,7 +60,7 @@ class ArrayStack:
         if dtype.newbyteorder("=") not in (np.uint8, np.uint16) and dtype.kind != "f":
             raise DataError(f"{self.path}: array of type {dtype}, expected {TYPES}")
         if transfer == "auto" and dtype.kind != "f":
-            raise UsageError(f"{self.path}: {dtype} codes that may mean anything; say what with --transfer {KNOWN}")
+            raise UsageError(f"{self.path}: {dtype} codes that may mean anything; say what with --transfer {OF_CODES}")
         self._reader = PictureReader("linear" if transfer == "auto" else transfer, colour)
         with stack.opened() as read:
             self.warnings += self._reader.remarks_on(read(0))

@@ -17,9 +17,10 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.colour import rgb_of_rgb, rgb_of_yuv
 from vid2ev.light.luminance import YuvCode, luminance_of_rgb, luminance_of_yuv, signal_table
+from vid2ev.light.pictures import with_bits
 from vid2ev.light.primaries import primaries_of
 from vid2ev.light.tags import is_full_range, matrix_of, transfer_of
-from vid2ev.light.transfer import code_table, parse_transfer
+from vid2ev.light.transfer import KNOWN, code_table, parse_transfer
 from vid2ev.sources.footage import Footage, stamp_of
 from vid2ev.sources.planes import codes_of, halvings_of, orientation_of, planar, upright
 from vid2ev.sources.times import Clock, parse_fps
@@ -54,7 +55,9 @@ class Video:
         self.warnings: list[str] = []
         self._fps = None if fps is None else parse_fps(fps)
         if transfer != "auto":
-            parse_transfer(transfer)
+            if with_bits(transfer)[1]:
+                raise UsageError(f"transfer '{transfer}': a video says of how many bits its codes are; leave them out")
+            parse_transfer(transfer, f"auto, {KNOWN}")
         self._footage, self._colour = footage, colour
         self.path, self.rewindable, self.kept = footage.name, footage.rewindable, footage.kept
         first = footage.first
