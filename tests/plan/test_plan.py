@@ -449,6 +449,14 @@ def test_events_that_hot_pixels_do_not_send_of_light_are_as_dense_as_these() -> 
 
 
 @pytest.mark.long
+def test_pixels_that_send_nothing_of_light_leave_the_bounds_of_other_effects_true() -> None:
+    """Even where most are cold: events of light and those that effects add are counted in all pixels."""
+    bad = {"hot_probability": 0.4, "hot_rate_hz": 20.0, "cold_probability": 0.7}
+    spec = clean(random_phase=True, threshold_on=0.1, threshold_off=0.1, shot_rate_hz=0.5, leak_rate_hz=0.2, **bad)
+    held(spec, (64, 48), trembling(0.3, 120), "shot", "leak", "hot", "cold")
+
+
+@pytest.mark.long
 def test_where_nothing_moves_the_photoreceptors_noise_sends_events() -> None:
     """Which move with thresholds, are swallowed, missing and late; and auto leaves out nothing that they depend on."""
     frames = [Frame(np.full((24, 32), 0.3, np.float32), k * 1_000_000) for k in range(40)]

@@ -111,7 +111,11 @@ def taus_of(scene: Scene, spec: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def light_events(scene: Scene, spec: Any) -> float:
-    """How many events of light there are at least, on average."""
+    """How many events of light there are at least, on average, in a sensor without hot and cold pixels.
+
+    These send neither events of light nor those that an effect adds, nearly all of which bounds count in all pixels,
+    too; and it is the ratio of both that they hang on.
+    """
     return crossings(scene) * (1.0 - unsent(scene, spec).share)
 
 
