@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -232,8 +233,10 @@ def test_rigs_camera_by_camera() -> None:
     assert text.count("distance  0 at 1 ms") == 2 and "camera    right" in text
     with pytest.raises(UsageError, match="left, top"):
         compare("one", "three")
-    with pytest.raises(UsageError, match="left"):
+    with pytest.raises(UsageError, match="of the cameras aps, left, right; give one: one/left or one/right"):
         compare("one", "two/left")
+    shutil.rmtree("one/right")
+    assert compare("two/left", "one")["distance"] == compare("two/left", "one/left")["distance"] > 0
     assert compare("one/left", "two/left")["distance"] == found["left"]["distance"]
 
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from vid2ev.errors import UsageError
+from vid2ev.formats import of_only_camera
 from vid2ev.recording.manifest import as_stated, read_manifest
 
 
 def pairs(recording: str | Path, reference: str | Path) -> dict[str, tuple[Path, Path]]:
-    """What to compare with what: the event cameras of two rigs by their names, or else the two themselves, as ''.
+    """What to compare with what: the event cameras of two rigs by their names, or else the two themselves, as '', of a
+    rig with one event camera that one.
 
     Raises UsageError for rigs whose event cameras have other names.
     """
     one, other = Path(recording), Path(reference)
     if not (is_rig(one) and is_rig(other)):
+        one, other = (of_only_camera(path) if is_rig(path) else path for path in (one, other))
         return {"": (one, other)}
     names, other_names = event_cameras(one), event_cameras(other)
     if names != other_names or not names:
