@@ -203,7 +203,7 @@ def test_every_public_name_is_there() -> None:
     import vid2ev
 
     assert all(getattr(vid2ev, name) is not None for name in vid2ev.__all__)
-    assert set(vid2ev.__all__) <= set(dir(vid2ev))
+    assert set(vid2ev.__all__) <= set(dir(vid2ev)) and len(set(dir(vid2ev))) == len(dir(vid2ev))
 
 
 def effects() -> dict[str, type]:

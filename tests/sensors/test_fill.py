@@ -15,7 +15,6 @@ from vid2ev.sensors.batch import DvsBatch
 from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.views.grid import NetCounts, Windows
-from vid2ev.views.requests import parse_representation
 
 SIZE, FRAMES = (61, 37), 40  # (two blocks of pixels; more frames than go through the walk at a time)
 SENSORS = {
@@ -42,7 +41,7 @@ def grids(events_us: np.ndarray, rng: np.random.Generator) -> list:
     edges = np.unique(some)
     windows = [[first - 1, last], [first, first], *np.sort(rng.choice(some, (3, 2)), axis=1), [last + 10, last + 20]]
     counts = [NetCounts(SIZE, edges), NetCounts(SIZE, edges, dtype=np.int16, polarity=True)]
-    return [*counts, *(Windows(SIZE, parse_representation(kind), windows) for kind in KINDS)]
+    return [*counts, *(Windows(SIZE, kind, windows) for kind in KINDS)]
 
 
 @sensors
@@ -135,7 +134,7 @@ def test_the_newest_event_is_the_newest_after_a_flash_of_many_decades() -> None:
     events = Events.concatenate(Dvs(spec, (1, 1)).steps(light, t_ns))
     assert len(events) > 900 and len(np.unique(events.t[-20:])) < 10
     ends = np.unique(events.t)
-    grid = Windows((1, 1), parse_representation("sae"), [[0, end] for end in ends])
+    grid = Windows((1, 1), "sae", [[0, end] for end in ends])
     Dvs(spec, (1, 1)).fill(grid, light, t_ns)
     np.testing.assert_array_equal(grid.take().max(axis=(1, 2, 3)), ends)
 
@@ -158,7 +157,9 @@ def test_what_cannot_be_is_said() -> None:
     with pytest.raises(UsageError, match="expected int8 or int16"):
         NetCounts(SIZE, [0, 5], dtype=np.uint8)
     with pytest.raises(UsageError, match="a start and a later stop"):
-        Windows(SIZE, parse_representation("counts"), [[3, 2]])
+        Windows(SIZE, "counts", [[3, 2]])
+    with pytest.raises(UsageError, match="expected counts, frame:2, voxel:5"):
+        Windows(SIZE, "voxels", [[2, 3]])
 
 
 def test_a_time_for_each_frame_or_nothing_is_seen() -> None:

@@ -22,6 +22,7 @@ from vid2ev.compiling.cache import cached
 from vid2ev.errors import UsageError
 from vid2ev.stream.events import Events
 from vid2ev.views.representation import check_within
+from vid2ev.views.requests import parse_representation
 
 if TYPE_CHECKING:
     from vid2ev.views.representation import Kind
@@ -69,9 +70,11 @@ class NetCounts:
 
 
 class Windows:
-    """A representation of `kind` (`views.requests`) of a sensor of `size` in each of `windows_us` [n, 2]."""
+    """A representation of `kind`, such as "voxel:5" (`views.requests`), of a sensor of `size` in each of `windows_us`
+    [n, 2]."""
 
-    def __init__(self, size: tuple[int, int], kind: Kind, windows_us: Sequence[Sequence[int]] | np.ndarray):
+    def __init__(self, size: tuple[int, int], kind: Kind | str, windows_us: Sequence[Sequence[int]] | np.ndarray):
+        kind = parse_representation(kind) if isinstance(kind, str) else kind
         self.windows_us = windows_of(windows_us)
         self._views = [kind(size) for _ in self.windows_us]
 
