@@ -191,6 +191,8 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("made", f"{path}: {frames} of {width}x{height} as {kind}{film}")]
     keys = f"{made['key_frames']:,} key frame{'s' * (made['key_frames'] != 1)}"
     facts.append(("from", f"{keys}, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
+    if made["hdr"]:
+        facts.append(("hdr", f"all frames, by {Path(made['hdr']['weights']).stem}"))
     if made["tiles"] != "none":
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():

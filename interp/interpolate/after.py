@@ -51,7 +51,9 @@ class After:
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
-            raise UsageError(f"HDR with {path}, which was trained with events, and there are none; leave it out")
+            raise UsageError(
+                f"HDR by {path.stem} needs events, with which it was trained; give some with --events, or leave it out"
+            )
         self._state: HdrState | None = None
         self._rest: torch.Tensor | None = None  # events since the key frame that the state is of
         self._shot = 0

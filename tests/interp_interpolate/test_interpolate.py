@@ -244,7 +244,7 @@ def test_of_coarse_events_the_closed_form_makes_more() -> None:
         (["a", "--network", "weights.safetensors"], 1, "cannot be read as weights"),
         (["a", "--network", "hdr.safetensors"], 2, "rebuilds no frames"),
         (["a", "--network", "events.safetensors"], 2, "network 'events.safetensors' needs events"),
-        (["a", "--hdr-network", "hdr.safetensors"], 2, "leave it out"),
+        (["a", "--hdr-network", "hdr.safetensors"], 2, "HDR by hdr needs events"),
         (["b", "--hdr-network", "events.safetensors"], 2, "network hdr"),
         (["b", "--start", "9"], 2, "expected a part of its"),
         (["b", "--start", "9", "--stop", "0"], 2, "from 9 s to 0 s; expected a part of its"),
@@ -476,7 +476,12 @@ def test_hdr_stands_anywhere_among_the_arguments(tmp_path: Path, monkeypatch: py
     recording(tmp_path / "b", moving(2))
     result = CliRunner().invoke(command, ["--hdr", "b", "-x", "2", "--method", "bridge", "--json"])
     assert result.exit_code == 0, result.output
-    assert Path(json.loads(result.output)["hdr"]["weights"]).stem in pretrained.HDR
+    weights = Path(json.loads(result.output)["hdr"]["weights"]).stem
+    assert weights in pretrained.HDR
+    said = CliRunner().invoke(command, ["--hdr", "b", "-x", "2", "--method", "bridge", "--overwrite"]).output
+    assert re.search(rf"^hdr +all frames, by {weights}$", said, re.MULTILINE)
+    without = CliRunner().invoke(command, ["b", "-x", "2", "--method", "bridge", "--overwrite"]).output
+    assert not re.search("^hdr ", without, re.MULTILINE)
 
 
 def test_grey_frames_move_as_those_of_one_colour_do(tmp_path: Path) -> None:
