@@ -169,6 +169,15 @@ def test_a_silence_before_the_first_event_is_left_out_where_nothing_says_when_th
     assert (made["start_us"], made["frames"], made["events"]) == (5_000_000_000, 2, 2)
 
 
+@pytest.mark.parametrize(("first_us", "begins_us"), [(60_000, 0), (399_001, 399_001)])
+def test_a_short_recording_that_says_no_beginning_begins_with_its_first_event(first_us: int, begins_us: int) -> None:
+    """Such as the events of one exposure; not where it may have been still for a moment."""
+    np.savez("a.npz", t=[first_us, first_us + 5000], x=[1, 2], y=[3, 4], p=[0, 1])
+    assert render("a.npz", "-o", "film.mp4", "--by", "duration:1ms")["start_us"] == begins_us
+    np.savez("b.npz", t=[first_us, first_us + 5000], x=[1, 2], y=[3, 4], p=[0, 1], start_us=0)
+    assert render("b.npz", "-o", "said.mp4", "--by", "duration:1ms")["start_us"] == 0
+
+
 def test_folders_of_recordings_and_defaults() -> None:
     write(scattered(), "clip_events/events.h5")
     assert render("clip_events")["path"] == "clip_events.mp4"

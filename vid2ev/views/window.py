@@ -13,16 +13,19 @@ from vid2ev.formats.event_file import BLOCK, EventFile, Picture, Recording
 from vid2ev.stream.events import Events
 
 LONG_US = 1_000_000  # a silence that says that a file counts from another instant than it begins
+LONG_UNSAID_US = 100_000  # the same where the file does not say from which, and has no frames
 
 
 def beginning_us(file: EventFile) -> int:
-    """Where a recording begins: where its file counts from, but with the first event if that comes a second later.
+    """Where a recording begins: where its file counts from, but with the first event if that comes a second later, or a
+    tenth of one where nothing says from when the file counts.
 
-    Files of cameras often count from when the camera was switched on, or do not say from when.  Some events come late:
-    the first is the earliest of the first million.
+    Files of cameras often count from when the camera was switched on.  Some events come late: the first is the earliest
+    of the first million.
     """
+    long_us = LONG_US if file.says_start or file.has_frames else LONG_UNSAID_US
     first = next((int(events.t.min()) for events in file.events() if len(events)), file.start_us)
-    return first if first - file.start_us > LONG_US else min(first, file.start_us)
+    return first if first - file.start_us > long_us else min(first, file.start_us)
 
 
 def window(
