@@ -16,6 +16,7 @@ from interp.evaluate.protocol import Protocol
 from interp.evaluate.recordings import Recording
 from interp.evaluate.simulated import Simulated
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import recognise
 from vid2ev.sources import SCENE_PREFIX, is_scene
 from vid2ev.sources.many import sources_in
 
@@ -104,6 +105,7 @@ def _opened(
 def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
     """Recordings, or films by what they are opened with; and what cannot be used."""
     if is_scene(dataset) or not Path(dataset).is_dir():
+        _refuse_events(dataset)
         return [dataset], {}
     try:
         found, unusable = opened_in(dataset)
@@ -114,6 +116,15 @@ def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
     recordings = {Path(dataset), *(each.folder for each in found), *map(Path, unusable)}
     beside = [each for each in sources_in(dataset) if Path(each) not in recordings]
     return [*found], unusable | dict.fromkeys(beside, "no recording, in a folder of such; give it by itself")
+
+
+def _refuse_events(dataset: str) -> None:
+    """Raise UsageError for an event file, which has no frames that could be rebuilt and compared."""
+    if not is_scene(dataset) and Path(dataset).is_file() and (kind := recognise(dataset)):
+        raise UsageError(
+            f"{dataset} is an event file ({kind.name}), and what is scored are frames; give a recording of both, a"
+            " video or a scene; `vid2ev reconstruct` makes pictures of events alone"
+        )
 
 
 def _called(place: str | Recorded) -> str:

@@ -365,6 +365,12 @@ def test_videos_in_a_folder_of_recordings_are_named(tmp_path: Path) -> None:
     }
 
 
+def test_a_file_of_events_alone_is_refused_as_what_it_is(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", t=[1, 2], x=[1, 2], y=[3, 4], p=[0, 1])
+    with pytest.raises(UsageError, match=r"a\.npz is an event file \(npz\), and what is scored are frames; "):
+        footage_of([str(tmp_path / "a.npz")], Protocol(), Simulated.of("clean"))
+
+
 def test_predictions_of_16_bits_are_brought_to_the_nearest_of_8(tmp_path: Path) -> None:
     truth = pictures(13)
     write_hsergb(tmp_path / "seq", truth)
