@@ -184,6 +184,9 @@ def test_folders_of_recordings_and_defaults() -> None:
     assert render("clip_events/events.h5")["path"] == "events.mp4"
     shown = CliRunner().invoke(command, ["clip_events", "-o", "new/deep/a.png"], catch_exceptions=False)
     assert "a.png" in shown.stdout and "events" in shown.stdout and Path("new/deep/a.png").exists()
+    assert "polarity by duration:33.3333ms" in shown.stdout
+    shown = CliRunner().invoke(command, ["clip_events", "-o", "c.png", "--by", "duration:20ms"], catch_exceptions=False)
+    assert "polarity by duration:20000us" in shown.stdout
     assert CliRunner().invoke(command, ["clip_events", "-o", "b.png", "-q"], catch_exceptions=False).stdout == ""
 
 

@@ -89,14 +89,24 @@ def _default(events: str) -> Path:
     return Path(f"{path.name if path.is_dir() else path.stem}.mp4")
 
 
+def _of_people(by: str) -> str:
+    """How it was sliced, in milliseconds where that is no whole number of microseconds."""
+    from vid2ev.views.requests import parse_slicing
+    from vid2ev.views.slices import Duration
+
+    slicing = parse_slicing(by)
+    fraction = isinstance(slicing, Duration) and slicing.us.denominator > 1
+    return f"duration:{float(slicing.us) / 1000:.6g}ms" if fraction else by
+
+
 def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
     many, (width, height) = made["frames"], made["size"]
     pictures = f"{many:,} picture{'s' * (many > 1)} of {width}x{height}"
     film = f", {made['fps']:g} per second: {many / made['fps']:.3g} s" if made["kind"] == "mp4" else ""
-    each = f"{made['view']} by {made['by']}" + (f", the densest of {made['slices']:,}" if many < made["slices"] else "")
+    densest = f", the densest of {made['slices']:,}" if many < made["slices"] else ""
     return [
         ("made", f"{made['path']}: {pictures}{film}"),
-        ("shows", each),
+        ("shows", f"{made['view']} by {_of_people(made['by'])}{densest}"),
         ("events", f"{made['events']:,} in {made['duration_us'] / 1e6:.6g} s"),
         *(("warning", text) for text in made["warnings"]),
     ]
