@@ -95,8 +95,9 @@ def _of_people(by: str) -> str:
     from vid2ev.views.slices import Duration
 
     slicing = parse_slicing(by)
-    fraction = isinstance(slicing, Duration) and slicing.us.denominator > 1
-    return f"duration:{float(slicing.us) / 1000:.6g}ms" if fraction else by
+    if isinstance(slicing, Duration) and slicing.us.denominator > 1:
+        return f"duration:{float(slicing.us) / 1000:.6g}ms"
+    return by
 
 
 def _facts(made: dict[str, Any]) -> list[tuple[str, str]]:
