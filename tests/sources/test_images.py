@@ -150,6 +150,13 @@ def test_a_folder_of_sources_or_recordings_says_which_could_be_given(
         open_source(tmp_path, fps=30)
 
 
+def test_a_folder_of_event_files_is_one_of_event_files(tmp_path: Path) -> None:
+    for name in ("000000.npz", "000001.npz"):
+        np.savez(tmp_path / name, t=[1], x=[1], y=[1], p=[1])
+    with pytest.raises(DataError, match=r"give one of the event files in it, such as .*/000000\.npz$"):
+        open_source(tmp_path)
+
+
 def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"no images in this folder; expected \.png, "):
         open_source(tmp_path, fps=30)

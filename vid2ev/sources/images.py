@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import recognise
 from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader, bits_of
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
@@ -184,9 +185,11 @@ def _of_camera(said: Any, folder: str) -> tuple[str, int | None]:
 
 def _instead(folder: Path) -> str:
     """What to give in place of a folder without pictures."""
-    held = sources_in(str(folder)) if folder.is_dir() else []
+    held = [Path(source) for source in sources_in(str(folder))] if folder.is_dir() else []
+    held = [path for path in held if path != folder][:1]
+    events = any(path.is_file() and recognise(path) for path in held)
     for kind, first in (
-        ("videos or folders of images", next((source for source in held if Path(source) != folder), None)),
+        ("event files" if events else "videos or folders of images", next(iter(held), None)),
         ("recordings", next((path.parent for path in sorted(folder.glob("*/manifest.json"))), None)),
     ):
         if first is not None:
