@@ -371,6 +371,8 @@ def test_what_lacks_an_option_is_served_and_what_cannot_be_read_is_not(
     assert [setup.source for setup in served] == [str(tmp_path), str(tmp_path / "photo.png")]
     refused = CliRunner().invoke(gui, [str(tmp_path / "torn.mp4")]).exception
     assert isinstance(refused, DataError) and "not a video that can be read" in str(refused) and len(served) == 2
+    refused = CliRunner().invoke(gui, ["synthetic:ramps", "--port", "0"]).exception
+    assert isinstance(refused, UsageError) and "expected one of ramp, " in str(refused) and len(served) == 2
 
 
 @pytest.mark.parametrize(

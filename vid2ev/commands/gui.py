@@ -22,8 +22,9 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     SOURCE is a video, a folder of images or a scene (scene:NAME), as for `vid2ev convert`; another can be opened on the
     page.  Needs the extra: pip install 'vid2ev[gui]'.
     """
-    from contextlib import suppress
+    from contextlib import nullcontext, suppress
     from importlib.util import find_spec
+    from pathlib import Path
 
     from vid2ev.errors import UsageError
 
@@ -34,7 +35,8 @@ def gui(source: str, rig: str | None, host: str, port: int, browser: bool) -> No
     from vid2ev.gui.setup import setup_of
 
     setup = setup_of(source, rig)
-    with suppress(UsageError):  # (options that are entered on the page may put that right, such as times of images)
+    # (options that are entered on the page may put a file or a folder right, such as by times of images)
+    with suppress(UsageError) if Path(setup.source).exists() else nullcontext():
         duration_s(setup)  # (what cannot be read is refused at once)
     port = free_port(host, port)
     shown = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::") else host
