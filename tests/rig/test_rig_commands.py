@@ -83,7 +83,7 @@ def test_what_is_left_out_is_named() -> None:
     ("exit_code", "sentence", "arguments"),
     [
         (2, "out.yaml does not say its format; give --as rig|opencv|kalibr|dsec|dv", ["rig.toml", "out.yaml"]),
-        (2, "none.yaml: no such file; `vid2ev init rig.toml` writes a rig file", ["none.yaml", "out.toml"]),
+        (2, "none.yaml: no such file; give a rig file, such as", ["none.yaml", "out.toml"]),
         (1, "is no calibration file of a known format", ["text.yaml", "out.toml"]),
         (2, "camchain.yaml counts in m; leave --unit mm out", ["camchain.yaml", "out.toml", "--unit", "mm"]),
         (2, "rig.toml exists; --overwrite replaces it", ["camchain.yaml", "rig.toml"]),

@@ -365,6 +365,16 @@ def test_a_dry_run_prints_the_scene_and_does_nothing() -> None:
         assert vid2ev("scene", "parallax", "--dry-run", *wrong).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    "name", ["scene:parallax,seed=4,size=64x48,duration_s=0.5", "parallax,seed=4,camera.size=[64,48]"]
+)
+def test_a_scene_is_named_as_convert_takes_it(name: str) -> None:
+    asked = ["parallax", "--seed", "4", "--size", "64x48", "--set", "duration_s=0.5"]
+    said = vid2ev("scene", name, "--dry-run", "--set", "duration_s=0.5").stdout
+    assert said and said == vid2ev("scene", *asked, "--dry-run").stdout
+    assert said != vid2ev("scene", *asked, "--seed", "5", "--dry-run").stdout
+
+
 def test_the_listing_loads_no_renderer() -> None:
     import subprocess
 

@@ -109,15 +109,19 @@ def _file(name: str, options: dict[str, Any]) -> SceneFile:
     """The scene file with its settings; what is wrong with it is said at once."""
     from vid2ev.errors import UsageError
     from vid2ev.scenes.scene_file import plain_size, read_scene
+    from vid2ev.scenes.source import parse_request
+    from vid2ev.sources import SCENE_PREFIX
 
-    settings = [plain_size(setting) for setting in options["settings"]]
+    request = parse_request(name.removeprefix(SCENE_PREFIX))  # (as `convert` takes it)
+    options["seed"] = options["seed"] or request.seed
+    settings = [*request.settings, *(plain_size(setting) for setting in options["settings"])]
     if options["size"]:
         settings.append(plain_size(f"size={options['size']}"))
         if settings[-1].startswith("size"):
             raise UsageError(f"size '{options['size']}': expected WIDTHxHEIGHT, such as 640x480")
     if options["duration"]:
         settings.append(f"duration_s={options['duration']}")
-    return read_scene(name, settings)
+    return read_scene(request.name, settings)
 
 
 def _contents(options: dict[str, Any]) -> Contents:

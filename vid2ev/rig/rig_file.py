@@ -105,7 +105,7 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise UsageError(
-            f"{path}: no such file; `vid2ev init rig.toml` writes a rig file, with --from one of a calibration file"
+            f"{path}: no such file; give a rig file, such as `vid2ev init rig.toml` writes, or a calibration file"
         ) from error
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: not UTF-8 text; give a rig file or a calibration file") from error
