@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from interp import pretrained
-from interp.commands.making import bar, contrast_of, device_option, event_options, kept, run_options, what_options
+from interp.commands.making import (
+    bar,
+    contrast_of,
+    device_option,
+    event_options,
+    film_text,
+    kept,
+    run_options,
+    what_options,
+)
 from vid2ev.commands.options import Finite
 from vid2ev.commands.worker_options import worker_options
 
@@ -186,9 +194,8 @@ def _number(text: str | None, option: str) -> Any:
 
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
-    film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
     frames = f"{made['frames']:,} frame{'s' * (made['frames'] != 1)}"
-    facts = [("made", f"{path}: {frames} of {width}x{height} as {kind}{film}")]
+    facts = [("made", f"{path}: {frames} of {width}x{height} as {kind}{film_text(made)}")]
     keys = f"{made['key_frames']:,} key frame{'s' * (made['key_frames'] != 1)}"
     facts.append(("from", f"{keys}, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
     if made["hdr"]:

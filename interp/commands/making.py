@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from vid2ev.commands import INTERRUPTED, tidy
 from vid2ev.commands.options import Finite, adding
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import number_of
+
+SHORT_S, SLOW = 0.5, 30  # a film that is over before it is seen, and pictures per second that are seen
 
 
 def what_options(output: str, play: str) -> Callable[..., Any]:
@@ -55,6 +58,16 @@ run_options = adding(  # what becomes of what is there, and what is printed
     click.option("--json", "as_json", is_flag=True, help="Print the manifest as JSON for programs."),
     click.option("-q", "--quiet", is_flag=True, help="Print errors only."),
 )
+
+
+def film_text(made: Mapping[str, Any]) -> str:
+    """How fast and how long the film of a manifest plays, and how it plays for longer where nobody would see it."""
+    if not made["film_rate"]:
+        return ""
+    rate = float(Fraction(made["film_rate"]))
+    seconds = made["frames"] / rate
+    slower = f"; --play {SLOW} shows it slowly" if seconds < SHORT_S and rate > SLOW else ""
+    return f", {rate:g} per second: {seconds:.3g} s{slower}"
 
 
 def contrast_of(text: str | None) -> tuple[float, float] | None:

@@ -5,13 +5,21 @@ from __future__ import annotations
 import ctypes
 import json
 import sys
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import click
 
-from interp.commands.making import bar, contrast_of, device_option, event_options, kept, run_options, what_options
+from interp.commands.making import (
+    bar,
+    contrast_of,
+    device_option,
+    event_options,
+    film_text,
+    kept,
+    run_options,
+    what_options,
+)
 from vid2ev.commands.options import Finite
 
 M_TRIM_THRESHOLD, M_MMAP_MAX, LARGEST_INT = -1, -4, 2**31 - 1  # of glibc's malloc.h
@@ -86,11 +94,12 @@ def _default(events: str, kind: str | None) -> Path:
 
 
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
+    from vid2ev.terminal import counted
+
     (width, height), kind, run = made["size"], made["format"].partition(" ")[0], made["run"]
-    film = f", {float(Fraction(made['film_rate'])):g} per second" if made["film_rate"] else ""
     span_s, seconds = (made["stop_us"] - made["start_us"]) / 1e6, max(run["seconds"], 1e-9)
     return [
-        ("made", f"{path}: {made['frames']:,} pictures of {width}x{height} as {kind}{film}"),
+        ("made", f"{path}: {counted(made['frames'], 'picture')} of {width}x{height} as {kind}{film_text(made)}"),
         ("from", f"{made['events']:,} events, {span_s:.6g} s"),
         ("speed", f"{run['frames'] / seconds:.3g} pictures/s, {run['seconds']:.3g} s"),
         *(("warning", text) for text in made["remarks"]),

@@ -374,7 +374,11 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     assert result.exit_code == 0, result.output
     by = pretrained.first(pretrained.OF_EVENTS)
     assert by and f"by {by.stem}: " in result.output
-    assert "a_seen.mp4: 30 pictures of 40x24 as mp4, 30 per second" in result.output
+    assert "a_seen.mp4: 30 pictures of 40x24 as mp4, 30 per second: 1 s\n" in result.output
+    soon = CliRunner().invoke(command, ["a.npz", "-o", "soon.mp4", "--fps", "300", "--stop", "0.1"])
+    assert "30 pictures of 40x24 as mp4, 300 per second: 0.1 s; --play 30 shows it slowly\n" in soon.output
+    slow = CliRunner().invoke(command, ["a.npz", "-o", "slow.mp4", "--stop", "0.03", "--play", "30"])
+    assert "1 picture of 40x24 as mp4, 30 per second: 0.0333 s\n" in slow.output
     again = CliRunner().invoke(command, ["a.npz", "--resume", "--json"])
     assert json.loads(again.output)["events"] == 5000
 
