@@ -17,7 +17,7 @@ from interp.evaluate.recordings import Recording
 from interp.evaluate.simulated import Simulated
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import recognise
-from vid2ev.sources import SCENE_PREFIX, is_scene
+from vid2ev.sources import SCENE_PREFIX, check_there, is_scene
 from vid2ev.sources.many import sources_in
 
 
@@ -105,7 +105,7 @@ def _opened(
 def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
     """Recordings, or films by what they are opened with; and what cannot be used."""
     if is_scene(dataset) or not Path(dataset).is_dir():
-        _refuse_events(dataset)
+        _check(dataset)
         return [dataset], {}
     try:
         found, unusable = opened_in(dataset)
@@ -118,8 +118,14 @@ def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:
     return [*found], unusable | dict.fromkeys(beside, "no recording, in a folder of such; give it by itself")
 
 
-def _refuse_events(dataset: str) -> None:
-    """Raise UsageError for an event file, which has no frames that could be rebuilt and compared."""
+def _check(dataset: str) -> None:
+    """Raise UsageError for what is not there, and for events, of which no frames could be rebuilt and compared."""
+    try:
+        check_there(dataset)
+    except UsageError as error:
+        raise UsageError(
+            f"{dataset}: no such file or folder; give a recording of vid2ev, HS-ERGB or BS-ERGB, a video or scene:NAME"
+        ) from error
     if not is_scene(dataset) and Path(dataset).is_file() and (kind := recognise(dataset)):
         raise UsageError(
             f"{dataset} is an event file ({kind.name}), and what is scored are frames; give a recording of both, a"

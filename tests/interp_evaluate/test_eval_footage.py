@@ -365,7 +365,9 @@ def test_videos_in_a_folder_of_recordings_are_named(tmp_path: Path) -> None:
     }
 
 
-def test_a_file_of_events_alone_is_refused_as_what_it_is(tmp_path: Path) -> None:
+def test_what_is_not_there_and_events_alone_are_refused_as_such(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no such file or folder; give a recording of vid2ev, HS-ERGB or "):
+        footage_of([str(tmp_path / "none")], Protocol(), Simulated.of("clean"))
     np.savez(tmp_path / "a.npz", t=[1, 2], x=[1, 2], y=[3, 4], p=[0, 1])
     with pytest.raises(UsageError, match=r"a\.npz is an event file \(npz\), and what is scored are frames; "):
         footage_of([str(tmp_path / "a.npz")], Protocol(), Simulated.of("clean"))
