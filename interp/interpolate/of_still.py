@@ -24,7 +24,7 @@ from interp.representation.dead_time import look_back_us, stated
 from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats import is_mat
+from vid2ev.formats.matlab import is_mat
 from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
 from vid2ev.recording.manifest import identity

@@ -172,8 +172,8 @@ def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
     from interp.interpolate.of_sequence import OfSequence
     from interp.interpolate.of_source import OfSource
     from interp.interpolate.of_still import OfStill, picture_beside
-    from vid2ev.formats import is_mat
     from vid2ev.formats import recognise as recognise_events
+    from vid2ev.formats.matlab import is_mat
     from vid2ev.light.recognise import recognise
 
     path = Path(path)

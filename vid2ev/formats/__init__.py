@@ -17,6 +17,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import BLOCK, HEAD, EventFile, Format, Recording, regrouped
+from vid2ev.formats.matlab import refuse_mat
 from vid2ev.formats.order import Disorder, ordered
 from vid2ev.stream.events import Events
 from vid2ev.untrusted import check_file, limit_for, most_bytes
@@ -28,12 +29,10 @@ __all__ = [
     "event_cameras",
     "format_named",
     "holds_events",
-    "is_mat",
     "of_only_camera",
     "open_events",
     "read_events",
     "recognise",
-    "refuse_mat",
     "survey",
 ]
 
@@ -59,7 +58,6 @@ FORMATS = {
 
 LONG_SILENCE_US = 3_600_000_000  # before the first event: the file counts from another instant than it begins
 DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
-MAT, MAT_OF_HDF5 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"  # (5 is what versions 5 to 7.2 of MATLAB write)
 
 
 def format_named(name: str) -> Format:
@@ -231,31 +229,6 @@ def recognise(path: str | Path) -> Format | None:
         raise DataError(f"{path} cannot be read: {error.strerror}; give an event file") from error
     kinds = (format_named(name) for name in FORMATS)
     return next((kind for kind in kinds if kind.open and kind.recognises(head, path)), None)
-
-
-def is_mat(path: Path) -> bool:
-    """Whether a file is one of MATLAB's that scipy reads, by its first bytes."""
-    return _begins(path, MAT)
-
-
-def refuse_mat(path: Path) -> None:
-    """Raise DataError for a file of MATLAB's, which says how its events become such that can be read."""
-    if not (old := is_mat(path)) and not _begins(path, MAT_OF_HDF5):
-        return
-    raise DataError(
-        f"{path} is a file of MATLAB's, which calls its tables as it likes; read them with"
-        f" {'scipy.io.loadmat' if old else 'h5py.File'}, and save events with numpy.savez('{path.stem}.npz', t=t, x=x,"
-        " y=y, p=p), t in whole microseconds"
-        + f"; `vid2ev interpolate` takes it as it is, with {path.stem}.png beside it"
-        * old
-    )
-
-
-def _begins(path: Path, magic: bytes) -> bool:
-    if not path.is_file():
-        return False
-    with open(path, "rb") as file:
-        return file.read(len(magic)) == magic
 
 
 def holds_events(folder: Path) -> bool:

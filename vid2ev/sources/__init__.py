@@ -113,7 +113,7 @@ def _opened(name: str, transfer: str, fps: float | Fraction | None, colour: Colo
 
 
 def _file(path: Path, transfer: str, fps: float | Fraction | None, colour: Colour) -> Source:
-    from vid2ev.formats import refuse_mat
+    from vid2ev.formats.matlab import refuse_mat
     from vid2ev.light.recognise import recognise
 
     refuse_mat(path)
