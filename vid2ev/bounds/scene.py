@@ -84,6 +84,7 @@ OF_TILES = (
     "bend",
     "bend_at_turns",
     "off_peaks",
+    "off_peaks_often",
 )
 OF_BARE = ("bare_apart", "bare_frozen", "bare_travel")
 SPREAD = (
@@ -144,7 +145,8 @@ class Scene:
     turns                     [tiles] how often pushing ended
     travelled_when_s, pushed_when_s, turned_when_s   [tiles] the mean time of each since a shot began, 0 of none
     bend, bend_at_turns       [tiles] sum |d slope| where the signal bends while pushed, and at turns and ends [nat/s]
-    off_peaks                 [tiles] what the second pole takes from peaks, as often as there are levels in it [nat]
+    off_peaks                 [tiles] what the second pole takes from peaks [nat]
+    off_peaks_often           [tiles] the same as often as there are levels in it [nat]
     by_slope                  [2, quarters of octaves] travel, and what its events have near them, by the slope there
                               [nat/s]
     by_turns, by_bends, by_peaks   the same by the number of turns before it, by the sum of the bends at these, and of
@@ -186,6 +188,7 @@ class Scene:
     bend: np.ndarray
     bend_at_turns: np.ndarray
     off_peaks: np.ndarray
+    off_peaks_often: np.ndarray
     by_slope: np.ndarray
     by_turns: np.ndarray
     by_bends: np.ndarray

@@ -50,6 +50,7 @@ from vid2ev.kernels.measured import (
     LOST,
     MOVED,
     OFF_PEAKS,
+    OFF_PEAKS_OFTEN,
     PEAKS,
     PER_MS,
     PER_MS2,
@@ -106,7 +107,7 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     where it goes another way or none, a turn.
     """
     # (sums in numbers of their own: an entry of an array would go through memory each time)
-    travelled = at_least = pushed_s = turns = bends = turn_bends = off_peaks = 0.0
+    travelled = at_least = pushed_s = turns = bends = turn_bends = off_peaks = off_peaks_often = 0.0
     mean, dt = F(num.half), num.dt_s
     for k in range(count):
         i, pushed, half = np.uintp(hits[k]), lanes[k + PUSHED], lanes[k + AT_HALF]
@@ -128,7 +129,8 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
             nat = lowered(i, num, own, scratch)
             lower = weight * nat
             turn_bends += turned
-            off_peaks += lower * (F(1.0) + np.floor(nat / (half + half)))  # (levels between, squared)
+            off_peaks += lower
+            off_peaks_often += lower * (F(1.0) + np.floor(nat / (half + half)))  # (levels between, squared)
             felt = scratch[IF_TURNED + i] * reach / (half + half)
             if felt > F(1.0):
                 note(spread, BY_FELT_AT_TURNS, felt, turned)
@@ -176,6 +178,7 @@ def add_up(count, hits, curve, num, own, scratch, lanes, tile, spread):
     tile[BEND] += bends
     tile[TURN_BEND] += turn_bends
     tile[OFF_PEAKS] += off_peaks
+    tile[OFF_PEAKS_OFTEN] += off_peaks_often
 
 
 @inner
@@ -204,7 +207,8 @@ def end_measure(num, state, tiles, spread):
             felt = bends * reach_behind(tau1, tau2) / width
             tiles[k, TURNED] += weight
             tiles[k, TURN_BEND] += weight * bends
-            tiles[k, OFF_PEAKS] += weight * late * (F(1.0) + np.floor(late / width))
+            tiles[k, OFF_PEAKS] += weight * late
+            tiles[k, OFF_PEAKS_OFTEN] += weight * late * (F(1.0) + np.floor(late / width))
             if felt > F(1.0):
                 note(spread[k], BY_FELT_AT_TURNS, felt, weight * bends)
 

@@ -40,7 +40,7 @@ def omission_of_follower(scene: Scene, spec: Any) -> Omission:
     left_out = LeftOut(
         spec.follower_tau_us,
         np.full(len(scene.travel), tau2_s**2),
-        scene.off_peaks,
+        scene.off_peaks_often,
         scene.by_peaks,
         0.5 * tau2_s**2 * steeper(scene.by_felt, share),
         0.0,  # (of peaks that is counted)
