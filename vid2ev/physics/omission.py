@@ -130,8 +130,8 @@ def sent_share(scene: Scene, spec: Any) -> float:
 
 
 def set_anew(scene: Scene, spec: Any, share: float) -> float:
-    """Bound on the distance where memories are set to the signal in a share of the pixels [mean], which go on from
-    there, so that all their events may be others.
+    """Bound on the distance where memories have been set to the signal before a share of the events [mean], which may
+    all be others then.
 
     Two memories on one signal take turns, one event of this after one of that, and so each two cost no more than one
     by itself.  Where a pixel is blind after an event, not all are sent, and of either recording others: then one may
