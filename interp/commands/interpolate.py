@@ -193,11 +193,12 @@ def _number(text: str | None, option: str) -> Any:
 
 
 def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
+    from vid2ev.terminal import counted
+
     (width, height), kind = made["size"], made["format"].partition(" ")[0]
-    frames = f"{made['frames']:,} frame{'s' * (made['frames'] != 1)}"
-    facts = [("made", f"{path}: {frames} of {width}x{height} as {kind}{film_text(made)}")]
-    keys = f"{made['key_frames']:,} key frame{'s' * (made['key_frames'] != 1)}"
-    facts.append(("from", f"{keys}, {(made['stop_us'] - made['start_us']) / 1e6:.6g} s"))
+    facts = [("made", f"{path}: {counted(made['frames'], 'frame')} of {width}x{height} as {kind}{film_text(made)}")]
+    span_s = (made["stop_us"] - made["start_us"]) / 1e6
+    facts.append(("from", f"{counted(made['key_frames'], 'key frame')}, {span_s:.6g} s"))
     if made["hdr"]:
         facts.append(("hdr", f"all frames, by {Path(made['hdr']['weights']).stem}"))
     if made["tiles"] != "none":

@@ -122,7 +122,7 @@ class Fit:
             devices=self.machines.devices,
             num_nodes=self.machines.nodes,
             precision=self._precision(),  # type: ignore[arg-type]
-            max_steps=steps.plans[-1][1] if steps else -1,
+            max_steps=steps.last if steps else -1,
             max_epochs=-1,
             val_check_interval=steps.validate_every if steps else NEVER,
             check_val_every_n_epoch=None,

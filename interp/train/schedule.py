@@ -30,6 +30,11 @@ class Steps:
     plans: Plans
     validate_every: int
 
+    @property
+    def last(self) -> int:
+        """The step with which training ends."""
+        return self.plans[-1][1]
+
 
 @dataclass(frozen=True, slots=True)
 class Schedule:

@@ -127,7 +127,7 @@ class Session(Callback):
     def _take_up(self, trainer: Trainer, steps: Steps) -> None:
         self.steps = steps
         self.planned(steps)
-        last_step(trainer, steps.plans[-1][1])
+        last_step(trainer, steps.last)
 
 
 def validate_every(steps: int, validations: int) -> int:
