@@ -1,16 +1,20 @@
-"""What a terminal shows, of commands and of long work within: facts in a column, and a bar."""
+"""What is seen of commands, and of long work within: facts in a column, and a bar, or lines in a log."""
 
 from __future__ import annotations
 
+import re
+import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from tqdm import tqdm
 
 NAME = 10  # width of the names
 COMPILING = "compiling kernels, once"  # it takes seconds to minutes
+SELDOM_S, MORE = 10.0, 0.1  # between lines of a log at least, and of the time that is gone
 
 
 def lines(facts: Iterable[tuple[str, str]]) -> str:
@@ -25,17 +29,44 @@ def counted(count: int, name: str) -> str:
     return f"{count:,} {name}{'s' * (count != 1)}"
 
 
-@contextmanager
-def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[..., None]]:
-    """A progress bar on a terminal; what this yields is told how many are done, of how many, and perhaps a name."""
+def bar_of(quiet: bool, bar_format: str, **look: Any) -> tqdm:
+    """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then."""
     from tqdm import tqdm
 
+    if quiet or sys.stderr is None or sys.stderr.isatty():
+        return tqdm(bar_format=bar_format, leave=False, disable=quiet or sys.stderr is None, **look)
+    told = re.sub(r"{bar(:\d+)?} ", "", bar_format)
+    return tqdm(bar_format=told, leave=False, file=Log(sys.stderr), mininterval=1.0, **look)
+
+
+class Log:
+    """Where what a bar shows goes to in lines: the first after 10 s, then one whenever a tenth more time is gone."""
+
+    def __init__(self, file: TextIO):
+        self._file = file
+        self._began_s = self._told_s = time.monotonic()
+
+    def write(self, text: str) -> None:
+        """What the bar shows now, or nothing where it is taken away."""
+        line, now_s = text.strip(), time.monotonic()
+        if line and now_s - self._told_s >= max(SELDOM_S, MORE * (now_s - self._began_s)):
+            self._told_s = now_s
+            with suppress(OSError):  # (nobody reads it any more; the work goes on)
+                print(line, file=self._file, flush=True)
+
+    def flush(self) -> None:
+        """Lines are whole as they are written."""
+
+
+@contextmanager
+def counting(quiet: bool, bar_format: str, **look: Any) -> Iterator[Callable[..., None]]:
+    """A bar; what this yields is told how many are done, of how many, and perhaps a name."""
     shown: tqdm | None = None
 
     def report(done: int, count: int | None, name: str = "") -> None:
         nonlocal shown
         if shown is None:
-            shown = tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, **look)
+            shown = bar_of(quiet, bar_format, **look)
         shown.total = count
         shown.set_postfix_str(name, refresh=False)
         shown.update(done - shown.n)

@@ -15,6 +15,7 @@ from vid2ev.commands import INTERRUPTED, tidy
 from vid2ev.commands.options import Finite, adding
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import number_of
+from vid2ev.terminal import bar_of
 
 SHORT_S, SLOW = 0.5, 30  # a film that is over before it is seen, and pictures per second that are seen
 
@@ -100,10 +101,8 @@ def kept(path: Path) -> Iterator[None]:
 
 @contextmanager
 def bar(quiet: bool, bar_format: str, unit: str) -> Iterator[Callable[[int, int | None], None]]:
-    """A progress bar on a terminal: how much is done, of how much, how fast, and the time left."""
-    from tqdm import tqdm
-
-    with tqdm(total=None, bar_format=bar_format, leave=False, disable=quiet or None, unit=unit) as shown:
+    """A progress bar: how much is done, of how much, how fast, and the time left."""
+    with bar_of(quiet, bar_format, unit=unit) as shown:
 
         def report(done: int, total: int | None) -> None:
             if shown.total is None:

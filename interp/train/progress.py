@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lightning.pytorch import Callback, LightningModule, Trainer
-from tqdm import tqdm
+
+from vid2ev.terminal import bar_of
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 STEPS = "{percentage:3.0f}% {bar} step {n_fmt}/{total_fmt}, {elapsed} gone, {remaining} left{postfix}"
 UNKNOWN = "step {n_fmt}, {elapsed} gone{postfix}"
@@ -14,7 +18,7 @@ SMOOTHING = 0.05  # of the newest step, in loss and speed
 
 
 class Bar(Callback):
-    """A progress bar on a terminal; logs speed and waiting for samples.
+    """A progress bar; logs speed and waiting for samples.
 
     batch   samples per step, of all processes together
     """
@@ -60,7 +64,7 @@ class Bar(Callback):
         total = None if trainer.max_steps == -1 else trainer.max_steps
         if self._shown is None:
             first = trainer.global_step - 1
-            self._shown = tqdm(initial=first, total=total, leave=False, disable=self.quiet or None, bar_format=UNKNOWN)
+            self._shown = bar_of(self.quiet, UNKNOWN, initial=first, total=total)
         self._shown.total, self._shown.bar_format = total, UNKNOWN if total is None else STEPS
         skipped = f", {module.skipped} skipped" if module.skipped else ""
         self._shown.set_postfix_str(f"loss {self._loss:.4f}, {speed:.3g} samples/s{skipped}", refresh=False)

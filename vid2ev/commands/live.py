@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from vid2ev.commands import INTERRUPTED, tidy
-from vid2ev.terminal import COMPILING
+from vid2ev.terminal import COMPILING, bar_of
 
 if TYPE_CHECKING:
     from vid2ev.cluster.task import Task
@@ -41,13 +41,11 @@ class Live:
     """
 
     def __init__(self, count: int, noun: str, quiet: bool):
-        from tqdm import tqdm
-
         self._count, self._noun = count, noun
         self._tasks: dict[str, _Task] = {}
         self._done = self._failed = 0
         self._began_s, self._lock = time.monotonic(), threading.Lock()
-        self._bar = tqdm(total=count, bar_format=LINE, leave=False, disable=quiet or None)
+        self._bar = bar_of(quiet, LINE, total=count)
         self._show()
 
     def watch(self, name: str, facts: Mapping[str, Any]) -> None:

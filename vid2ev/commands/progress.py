@@ -16,12 +16,14 @@ from vid2ev.commands import INTERRUPTED, asks_to_end
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError, SavedError
 from vid2ev.interrupts import is_lost
-from vid2ev.terminal import COMPILING, counting
+from vid2ev.terminal import COMPILING, bar_of, counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
     from types import FrameType
+
+    from tqdm import tqdm
 
     from vid2ev.cost.turns import Report
     from vid2ev.formats.event_file import Recording
@@ -92,10 +94,8 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Progress], bool]]:
-    """A progress bar on a terminal: frames, time left, events per second, and time against the clip's; or that kernels
-    are compiled."""
-    from tqdm import tqdm
-
+    """A progress bar: frames, time left, events per second, and time against the clip's; or that kernels are
+    compiled."""
     from vid2ev.compiling.heard import telling_of
 
     shown: tqdm | None = None
@@ -105,7 +105,7 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
         nonlocal shown
         if shown is None:
             total, first = recipe.source.frames_expected, done.frames - 1
-            shown = tqdm(total=total, initial=first, bar_format=FRAMES, leave=False, disable=quiet or None)
+            shown = bar_of(quiet, FRAMES, total=total, initial=first)
         seconds, video_s = done.seconds or 1.0, max(done.end_ns - done.start_ns, 1) / 1e9
         text = f"{done.events / seconds:,.0f} events/s, {of_the_clip(seconds, video_s)}"
         shown.set_postfix_str(text, refresh=False)
@@ -121,7 +121,7 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
             shown.set_postfix_str(COMPILING * begins)
         elif begins:
             said = f"{COMPILING}, which takes seconds to minutes"
-            waiting = tqdm(bar_format=said, leave=False, disable=quiet or None)
+            waiting = bar_of(quiet, said)
 
     try:
         with telling_of(compiling):
@@ -134,13 +134,13 @@ def bar(quiet: bool, check: Callable[[], bool]) -> Iterator[Callable[[Recipe, Pr
 
 @contextmanager
 def event_bar(quiet: bool) -> Iterator[Callable[[Recording, int], None]]:
-    """A progress bar on a terminal: events."""
+    """A progress bar: events."""
     with counting(quiet, EVENTS, unit_scale=True) as report:
         yield lambda recording, events: report(events, recording.count)
 
 
 def pass_bar(quiet: bool) -> AbstractContextManager[Report]:
-    """A progress bar on a terminal: passes."""
+    """A progress bar: passes."""
     return counting(quiet, PASSES)
 
 
