@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -48,14 +49,14 @@ def orientation_of(picture: Any) -> tuple[bool, bool, bool]:
 
 def _display_matrix(picture: Any) -> tuple[float, float, float, float]:
     """a, b, c, d."""
-    matrix = next((data for data in _beside(picture) if data.type.name == "DISPLAYMATRIX"), None)
+    matrix = _beside(picture).get("DISPLAYMATRIX")
     if matrix is None:
         return 1, 0, 0, 1
     a, b, _, c, d = np.frombuffer(matrix, np.int32)[:5].tolist()
     return a, b, c, d
 
 
-def _beside(picture: Any) -> list[Any]:
+def _beside(picture: Any) -> Mapping[Any, Any]:
     """What FFmpeg says beside a picture, but for colour profiles, of which PyAV frees the name that a PNG gives them
     twice, and for kinds that it has no name for, such as EXIF: it gives nothing at all beside these.  FFmpeg takes
     them away, one after the other."""
@@ -63,7 +64,7 @@ def _beside(picture: Any) -> list[Any]:
     picture = _without(picture, "ICC_PROFILE")
     while True:
         try:
-            return list(picture.side_data)
+            return picture.side_data
         except ValueError as error:
             number = re.match(r"\d+", str(error))
             if number is None or number[0] in taken:
