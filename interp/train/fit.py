@@ -16,6 +16,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from interp.train.batches import Feed
 from interp.train.checkpoints import Saves, WholeFiles, read_checkpoint
 from interp.train.curves import Curves
+from interp.train.heard import HeardAsBefore
 from interp.train.keeping import Keeping
 from interp.train.learner import Learner, means
 from interp.train.machines import Machines
@@ -130,6 +131,7 @@ class Fit:
             log_every_n_steps=LOG_EVERY,
             logger=[Curves(path, step), board],
             callbacks=[
+                HeardAsBefore(),
                 session,
                 Bar(recipe.batch, self.quiet),
                 Keeping(self.folder, self.name),

@@ -2,8 +2,9 @@
 
     python small_run.py FOLDER resume=1 devices=2 killed_at_step=7 ...
 
-`killed_at_step` is the step after which it is killed as by `kill -9`, `killed_at_write` the thing that lasts (a file
-brought to the disk or renamed) at which, `killed_at_validation` the step whose validation does not end.
+`asked` lets SIGTERM end it after a step, as of the command; `killed_at_step` is the step after which it is killed as
+by `kill -9`, `killed_at_write` the thing that lasts (a file brought to the disk or renamed) at which,
+`killed_at_validation` the step whose validation does not end.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -110,12 +112,13 @@ def _die() -> None:
 
 def _program() -> None:
     from interp.train.learner import Learner
+    from vid2ev.commands.progress import heard
 
     options = {name: json.loads(value) for name, value in (text.split("=") for text in sys.argv[2:])}
     last_step, last_write, last_validation = (
         options.pop(f"killed_at_{name}", 0) for name in ("step", "write", "validation")
     )
-    done = {"steps": 0, "writes": 0}
+    done, asked = {"steps": 0, "writes": 0}, options.pop("asked", 0)
 
     def counted(function: Any) -> Any:
         def count(*arguments: Any, **named: Any) -> Any:
@@ -141,7 +144,8 @@ def _program() -> None:
         Learner.conclude_validation = concluded  # type: ignore[method-assign]
     os.fsync, Path.replace = counted(os.fsync), counted(Path.replace)  # type: ignore[method-assign]
     torch.set_num_threads(1)
-    outcome = session(Path(sys.argv[1]), bool(options.pop("resume", 0)), stop=stop, **options)
+    with heard(gently=True) if asked else nullcontext(stop) as check:
+        outcome = session(Path(sys.argv[1]), bool(options.pop("resume", 0)), stop=check, **options)
     print(outcome.step, done["writes"])
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+import small_run
 import torch
 from safetensors.torch import load_file
 from small_run import STEPS_OF_RUN, in_a_process, kept, session
@@ -104,3 +108,26 @@ def test_a_run_killed_at_whatever_lasts_goes_on_to_the_same_bits(undisturbed: Pa
         begun = (folder / "run.json").exists()  # (killed before that, there is nothing to go on with)
         assert session(folder, resume=begun).finished
         assert same(folder, undisturbed), write
+
+
+@pytest.mark.parametrize("devices", [1, 2])
+def test_a_run_whose_processes_are_all_asked_to_end_does_so_after_a_step(tmp_path: Path, devices: int) -> None:
+    """As by a cluster; wherever each of them is just then."""
+    folder = tmp_path / "run"
+    for _ in range(3):
+        begun = (folder / "checkpoint.ckpt").exists()
+        before = kept_step(folder) if begun else 0
+        command = [sys.executable, small_run.__file__, str(folder), f"resume={int(begun)}", "asked=1", "steps=100000"]
+        run = subprocess.Popen([*command, f"devices={devices}"], start_new_session=True, stderr=subprocess.PIPE)
+        try:
+            while run.poll() is None and not ((folder / "checkpoint.ckpt").exists() and kept_step(folder) > before + 2):
+                time.sleep(0.05)
+            os.killpg(run.pid, signal.SIGTERM)
+            _, said = run.communicate(timeout=120)
+        finally:
+            run.kill()
+        assert run.returncode == 0 and kept_step(folder) > before + 2, said
+
+
+def kept_step(folder: Path) -> int:
+    return torch.load(folder / "checkpoint.ckpt", weights_only=True)["global_step"]
