@@ -118,7 +118,9 @@ def test_a_run_whose_processes_are_all_asked_to_end_does_so_after_a_step(tmp_pat
         begun = (folder / "checkpoint.ckpt").exists()
         before = kept_step(folder) if begun else 0
         command = [sys.executable, small_run.__file__, str(folder), f"resume={int(begun)}", "asked=1", "steps=100000"]
-        run = subprocess.Popen([*command, f"devices={devices}", "workers=1"], start_new_session=True, stderr=subprocess.PIPE)
+        run = subprocess.Popen(
+            [*command, f"devices={devices}", "workers=1"], start_new_session=True, stderr=subprocess.PIPE
+        )
         try:
             while run.poll() is None and not ((folder / "checkpoint.ckpt").exists() and kept_step(folder) > before + 2):
                 time.sleep(0.05)
