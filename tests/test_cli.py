@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import shutil
@@ -554,6 +555,27 @@ def test_control_c_counts_during_compiled_code(within: str) -> None:
     asked.join()
 
 
+@posix
+@pytest.mark.parametrize("within", ["heard", "tidy"])
+def test_what_goes_wrong_after_a_control_c_that_is_lost_is_one(within: str) -> None:
+    """As in a callback of who compiles, which then complains that it was not served."""
+
+    @ctypes.CFUNCTYPE(None)
+    def serve() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+        served.append(True)
+
+    served: list[bool] = []
+    with pytest.raises(KeyboardInterrupt), progress.heard() if within == "heard" else tidy():
+        serve()
+        if not served:
+            raise RuntimeError("no compiled object yet")
+    assert not served
+    with pytest.raises(RuntimeError), progress.heard() if within == "heard" else tidy():
+        raise RuntimeError("of something else")
+
+
 @njit(nogil=True)
 def busy(out, rounds):  # type: ignore[no-untyped-def]
     """What it was given, after a while of arithmetic."""
@@ -563,7 +585,7 @@ def busy(out, rounds):  # type: ignore[no-untyped-def]
 
 
 @posix
-def test_a_terminal_shows_progress_and_a_file_does_not() -> None:
+def test_a_terminal_shows_progress() -> None:
     import pty
     import termios
 

@@ -35,7 +35,7 @@ def bar_of(quiet: bool, bar_format: str, **look: Any) -> tqdm:
 
     if quiet or sys.stderr is None or sys.stderr.isatty():
         return tqdm(bar_format=bar_format, leave=False, disable=quiet or sys.stderr is None, **look)
-    told = re.sub(r"{bar(:\d+)?} ", "", bar_format)
+    told = re.sub(r" {bar(:\d+)?}", "", bar_format)
     return tqdm(bar_format=told, leave=False, file=Log(sys.stderr), mininterval=1.0, **look)
 
 

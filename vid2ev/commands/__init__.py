@@ -21,7 +21,7 @@ from typing import Any
 import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.interrupts import found_again
+from vid2ev.interrupts import never_lost
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
@@ -45,7 +45,7 @@ def tidy() -> Iterator[None]:
     for each in heard:
         signal.signal(each, signal.default_int_handler)
     try:
-        with found_again():
+        with never_lost():
             yield
     finally:
         for each in heard:
@@ -75,7 +75,7 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Errors meant for people become one line; what else goes wrong keeps its traceback."""
         try:
-            with found_again():
+            with never_lost():
                 return super().invoke(ctx)
         except Vid2evError as error:
             click.echo(f"error: {error}", err=True)

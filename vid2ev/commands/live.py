@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vid2ev.cluster.work import Outcome
     from vid2ev.cluster.workers import Workers
 
-LINE = "{percentage:3.0f}% {bar:12} {postfix}, {elapsed} gone, {remaining} left"
+LINE = "{percentage:3.0f}% {bar:12}{postfix}, {elapsed} gone, {remaining} left"
 
 
 @dataclass

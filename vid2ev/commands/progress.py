@@ -86,6 +86,10 @@ def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
     sys.unraisablehook, tell_before = tell, sys.unraisablehook
     try:
         yield check
+    except Exception as error:
+        if asked > gently:  # (what was interrupted in its midst may complain of anything)
+            raise KeyboardInterrupt from error
+        raise
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
