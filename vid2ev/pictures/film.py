@@ -115,7 +115,7 @@ def join_films(path: Path, pieces: Iterable[tuple[Path, int]], rate: Fraction | 
                 stream = stream or whole.add_stream_from_template(part.streams.video[0])
                 for packet in part.demux(video=0):
                     if packet.dts is not None and packet.pts is not None and packet.time_base:
-                        shift = round(first / (rate * packet.time_base))
+                        shift = round(first / (rate * Fraction(packet.time_base)))
                         packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
                         packet.stream = stream
                         whole.mux(packet)

@@ -193,11 +193,8 @@ def video_stream(container: Any, name: str) -> Any:
 
 def _said_of(stream: Any) -> tuple[Fraction | None, Fraction, str]:
     """What a stream says of itself: nominal frames per second, width of a pixel by its height, and its codec."""
-    return (
-        stream.average_rate or stream.guessed_rate,
-        stream.sample_aspect_ratio or Fraction(1),
-        stream.codec_context.name,
-    )
+    rate = stream.average_rate or stream.guessed_rate
+    return Fraction(rate) if rate else None, Fraction(stream.sample_aspect_ratio or 1), stream.codec_context.name
 
 
 def stamp_of(picture: Any) -> Fraction | None:
@@ -239,7 +236,7 @@ def _sought(
 ) -> Iterator[Any] | None:
     """The pictures from a key frame at or before `since_s` on; None if the file does not lead to one."""
     try:
-        container.seek(int(target_s // stream.time_base), stream=stream, backward=True)
+        container.seek(int(target_s // Fraction(stream.time_base)), stream=stream, backward=True)
     except av.FFmpegError:
         return None
     coming = _decoded(container, stream, 0, remarks)
