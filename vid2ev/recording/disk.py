@@ -103,7 +103,8 @@ def write_npy(file: IO[bytes], array: np.ndarray) -> None:
     file, does not."""
     content = BytesIO()
     np.lib.format.write_array(content, array, allow_pickle=False)
-    file.write(content.getbuffer())
+    with content.getbuffer() as written:
+        file.write(written)
 
 
 def put_in_place(made: Path, path: Path, replaced: Path) -> None:

@@ -105,7 +105,7 @@ class VideoFile:
                 raise DataError(f"{self.path}: named as a picture is, but not one that can be read; {REMEDY}")
             if container.format.name == "webp_pipe" and recognise(self.path) == "video":
                 raise DataError(
-                    f"{self.path}: an animated WebP, of which FFmpeg decodes nothing; make a video, an animated PNG or"
+                    f"{self.path}: an animated WebP, of which this FFmpeg decodes nothing; make a video, an animated PNG or"
                     " a folder of pictures of it"
                 )
             if container.format.name.endswith("_pipe"):
