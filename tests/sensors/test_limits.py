@@ -28,6 +28,19 @@ def test_a_size_that_cannot_be_is_refused(size: Any, expected: str) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", [np.uint8, np.int8, np.int16, np.uint16])
+def test_a_size_may_be_of_numbers_whose_product_is_beyond_their_type(kind: type) -> None:
+    width, height = (400, 300) if kind(0).nbytes == 2 else (100, 90)
+    size: Any = np.array([width, height], kind)
+    light = np.ones((2, height, width), np.float32) * [[[0.1]], [[0.9]]]
+    dvs, cis = Dvs(load_sensor("ideal"), size), Cis(load_cis("ideal", ["colour=false", "exposure_us=0"]), size)
+    assert len(dvs.steps(light, [0, 10**6])[1]) == len(
+        Dvs(load_sensor("ideal"), (width, height)).steps(light, [0, 1])[1]
+    )
+    assert cis.step(light[0], 0)[0].codes.shape == (height, width)
+
+
 @pytest.mark.parametrize("overrides", ["threshold_on=0.2", [("threshold_on", 0.2)], [1]])
 def test_overrides_that_are_no_list_of_texts_are_refused(overrides: Any) -> None:
     with pytest.raises(UsageError, match=r"expected a list of texts, such as \['threshold_on="):

@@ -47,7 +47,7 @@ class DvsBatchOnCard:
         """Become other sensors, without light yet.  Raises UsageError as when made."""
         cameras, size = cameras_of(specs, seeds, cameras), self.size
         for seed, camera in zip(seeds, cameras, strict=True):
-            check_sensor(size, seed, camera, 1)
+            size = check_sensor(size, seed, camera, 1)
         for spec in specs:
             check_spec(spec, DvsSpec, "load_sensor('ideal')")
         self._flags = flags_of(specs[0], self.labels)

@@ -61,9 +61,8 @@ class Cis:
         linear: bool = False,
     ):
         check_spec(spec, CisSpec, "load_cis('ideal')")
-        check_sensor(size, seed, camera, threads)
-        width, height = size
-        self.spec, self.size, self.seed, self.camera, self.linear = spec, (width, height), seed, camera, linear
+        self.size = width, height = check_sensor(size, seed, camera, threads)
+        self.spec, self.seed, self.camera, self.linear = spec, seed, camera, linear
         self.effects = spec.effects()
         shape = (height, width * (3 if spec.colour else 1))
         if spec.in_flight(height) * shape[0] * shape[1] * 8 > OPEN_BYTES:
@@ -74,7 +73,7 @@ class Cis:
         self._row_ns = whole_parts_ns(np.arange(height) * spec.line_us)
         self._exposure_ns = float(whole_parts_ns(spec.exposure_us))
         self._numbers = numbers_of(spec, seed, camera)
-        frozen = frozen_of(spec, self._numbers, size)
+        frozen = frozen_of(spec, self._numbers, self.size)
         self._rows: Any = Rows(shape, self._numbers, frozen, threads, colour=spec.colour, linear=linear)
         self._t_ns: int | None = None
         self._first_ns = self._next = self._made = self._unfinished = 0

@@ -67,12 +67,12 @@ class Dvs:
         part: Part = WHOLE,
         origin_ns: int | None = None,
     ):
-        check_sensor(size, seed, camera, threads)
-        self.size, self.labels, self.transfer = (size[0], size[1]), labels, transfer
+        self.size, self.labels, self.transfer = check_sensor(size, seed, camera, threads), labels, transfer
         self._intake = Intake(self.size, transfer)
         self._pixels = Pixels(self.size, labels, threads, skip, part)
         self._first_ns = origin_ns
-        self.at_once = max(1, min(MOST, AT_ONCE_PX // (size[0] * size[1])))  # frames best given together to `see_all`
+        pixels = self.size[0] * self.size[1]
+        self.at_once = max(1, min(MOST, AT_ONCE_PX // pixels))  # frames best given together to `see_all`
         self._be(spec, seed, camera)
 
     def _be(self, spec: DvsSpec, seed: int, camera: int) -> None:

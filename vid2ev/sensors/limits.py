@@ -17,8 +17,8 @@ def check_spec(spec: Any, kind: type, example: str) -> None:
         raise UsageError(f"spec {spec!r}: expected a {kind.__name__}, such as {example} gives")
 
 
-def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) -> None:
-    """Raise UsageError for what no sensor can be."""
+def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) -> tuple[int, int]:
+    """The size as plain numbers, whose products are exact; raises UsageError for what no sensor can be."""
     try:
         width, height = map(operator.index, size)
     except (TypeError, ValueError) as error:
@@ -33,6 +33,7 @@ def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) ->
         raise UsageError(f"camera {camera!r}: expected a whole number from 0 to 2**24 - 1")
     if not is_whole(threads, 1):
         raise UsageError(f"threads {threads!r}: expected a whole number of at least 1; leave it out for one")
+    return width, height
 
 
 def check_seed(seed: int) -> None:
