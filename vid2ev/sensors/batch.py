@@ -10,6 +10,7 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.limits import check_threads
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import Tiles
 from vid2ev.stream.events import Events
@@ -57,6 +58,7 @@ class DvsBatch:
         labels: bool = False,
         transfer: str | None = None,
     ):
+        check_threads(threads)
         self.size, options = size, {"labels": labels, "transfer": transfer, "skip": False}
         self._sensors = [
             Dvs(spec, size, seed, camera=camera, **options)  # type: ignore[arg-type]

@@ -31,9 +31,14 @@ def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) ->
     check_seed(seed)
     if not is_whole(camera, 0, (1 << 24) - 1):
         raise UsageError(f"camera {camera!r}: expected a whole number from 0 to 2**24 - 1")
+    check_threads(threads)
+    return width, height
+
+
+def check_threads(threads: int) -> None:
+    """Raise UsageError for what is no number of threads."""
     if not is_whole(threads, 1):
         raise UsageError(f"threads {threads!r}: expected a whole number of at least 1; leave it out for one")
-    return width, height
 
 
 def check_seed(seed: int) -> None:
