@@ -147,6 +147,19 @@ def test_frames_seen_together_are_those_seen_one_by_one(memory):
 
 
 @memories
+def test_a_sensor_of_one_pixel_is_that_of_a_cpu(memory):
+    """At its first frame and after a cut, with the draws and the blind times that follow."""
+    light = np.exp(np.random.default_rng(9).normal(0, 1.5, (12, 1, 1))).astype(np.float32)
+    frames = [Frame(light[k], 10**6 * k, cut=k == 6) for k in range(len(light))]
+    cpu = Dvs(COMPILED["paper"], (1, 1), 5, origin_ns=0)
+    card = DvsOnCard(COMPILED["paper"], (1, 1), 5, memory=memory, origin_ns=0)
+    ours, theirs = card.see_all(frames), cpu.see_all(frames)
+    assert_same(ours, theirs)
+    assert_same_state(cpu, card)
+    assert sum(map(len, ours[7:])) > 0 and card.counts == cpu.counts
+
+
+@memories
 @two_specs
 def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(name, memory):
     rng, base, labels = np.random.default_rng(4), COMPILED[name].model_dump(), LABELS[name]

@@ -71,17 +71,19 @@ class CardWalk:
     def settle(self, light: Any, t_ns: Sequence[int], counts: Sequence[int]) -> None:
         """Settle each sensor in a frame of its light [clips, height, width] at its t_ns, where crossings are counted
         from its count."""
-        if len(self._planes.count) > 1:
-            for k, count in enumerate(counts):
-                first = self.memory.put(np.array([as_counted(count)]))
-                self._planes.count[k * self._pixels : (k + 1) * self._pixels] = first
+        for k, count in enumerate(counts):
+            first = self.memory.put(np.array([as_counted(count)]))
+            self._planes.count[self._of(k, self._planes.count)] = first
         start = Start(self.memory.put(np.array(t_ns, np.int64)), self._bad, self._phase)
         seen = self._clips(self.memory.light(light).reshape(1, len(self._numbers), self._pixels), [], np.zeros((1, 1)))
         self.memory.launch(self._kernels.settle, self._total, seen, start, self._planes, self._totals)
-        if len(self._planes.t_last) > 1:
-            for k, (num, t) in enumerate(zip(self._numbers, t_ns, strict=True)):
-                since = max(int(t) - num.refractory_ns - 1, int(np.iinfo(np.int64).min))
-                self._planes.t_last[k * self._pixels : (k + 1) * self._pixels] = since
+        for k, (num, t) in enumerate(zip(self._numbers, t_ns, strict=True)):
+            since = max(int(t) - num.refractory_ns - 1, int(np.iinfo(np.int64).min))
+            self._planes.t_last[self._of(k, self._planes.t_last)] = since
+
+    def _of(self, k: int, plane: Any) -> slice:
+        """Where sensor k's entries are of a plane; all of one that nothing uses."""
+        return slice(k * self._pixels, (k + 1) * self._pixels) if len(plane) == self._total else slice(None)
 
     def walk(self, light: Any, steps: list[list[Step]]) -> CardEvents:
         """Advance through frames of light [frames, clips, height, width], by the steps [clips][frames]."""
