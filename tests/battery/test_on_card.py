@@ -146,6 +146,14 @@ def test_frames_seen_together_are_those_seen_one_by_one(memory):
     assert_same_state(cpu, card)
 
 
+def test_frames_of_codes_seen_together_are_those_seen_one_by_one():
+    codes = np.random.default_rng(8).integers(0, 256, (9, *SIZE[::-1])).astype(np.uint8)
+    frames = [Frame(codes[k], 10**6 * k) for k in range(len(codes))]
+    cpu, card = both("paper", Clip(np.zeros(1), codes, 0, 3))
+    assert_same([cpu.see(frame) for frame in frames], card.see_all(frames))
+    assert_same_state(cpu, card)
+
+
 @memories
 def test_a_sensor_of_one_pixel_is_that_of_a_cpu(memory):
     """At its first frame and after a cut, with the draws and the blind times that follow."""
@@ -157,6 +165,15 @@ def test_a_sensor_of_one_pixel_is_that_of_a_cpu(memory):
     assert_same(ours, theirs)
     assert_same_state(cpu, card)
     assert sum(map(len, ours[7:])) > 0 and card.counts == cpu.counts
+
+
+def test_frames_hours_apart_are_seen_as_on_a_cpu():
+    """More of them than the key of an event has microseconds for."""
+    frames = np.exp(np.random.default_rng(5).normal(0, 0.7, (7, *SIZE[::-1]))).astype(np.float32)
+    clip = Clip(np.arange(7) * 4 * 3600 * 10**9, frames, 1, 3)
+    cpu, card = both("paper", clip)
+    assert_same(seen(cpu, clip), card.steps(clip.frames, clip.t_ns))
+    assert_same_state(cpu, card)
 
 
 @memories
@@ -267,6 +284,8 @@ def test_what_cannot_be_is_said():
     card = DvsOnCard(COMPILED["paper"], SIZE, 1, memory=Simulated())
     with pytest.raises(UsageError, match="light of shape"):
         card.steps(np.zeros((2, 3, 3), np.float32), [0, 1])
+    with pytest.raises(UsageError, match="light of shape"):
+        card.see_all([Frame(np.ones(shape, np.float32), k) for k, shape in enumerate([SIZE[::-1], SIZE[::-1], SIZE])])
     if missing_for_cuda():
         with pytest.raises(UsageError, match=r"device cuda: .*; use device cpu"):
             memory_of("cuda")

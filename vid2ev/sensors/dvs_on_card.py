@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from vid2ev.views.grid import Grid
 
 FRAMES = 16  # at a time: the state of a pixel is read and written once for as many
+LONGEST_NS = 1 << 36  # of these, but for a first that is longer: keys count microseconds, and forced events want room
 
 
 class DvsOnCard(Dvs):
@@ -72,9 +74,11 @@ class DvsOnCard(Dvs):
         sent, times = [], self._times_of(light[:, None], t_ns)
         if self._t_ns is None and times:
             sent.append(self.restart(light[0], times[0]))
-        for first in range(len(sent), len(times), FRAMES):
-            some = slice(first, first + FRAMES)
-            sent += self._some(light[some], times[some])
+        while len(sent) < len(times):
+            assert self._t_ns is not None
+            first, until_ns = len(sent), max(times[len(sent)], self._t_ns + LONGEST_NS)
+            last = first + bisect_right(times[first : first + FRAMES], until_ns)
+            sent += self._some(light[first:last], times[first:last])
         return sent
 
     def fill(self, grid: Grid, light: Any, t_ns: Sequence[int]) -> None:
@@ -83,8 +87,10 @@ class DvsOnCard(Dvs):
             grid.add(events)
 
     def _see_shot(self, frames: Sequence[Frame]) -> list[Events]:
-        light = self._memory.joined([self._memory.light(frame.light)[None] for frame in frames])
-        return self.steps(light, [frame.t_ns for frame in frames])
+        for frame in frames:
+            self._intake.check(np.shape(frame.light))
+        lights = [self._memory.light(self._light(frame.light)[0])[None] for frame in frames]
+        return self.steps(self._memory.joined(lights), [frame.t_ns for frame in frames])
 
     def _some(self, light: Any, t_ns: list[int]) -> list[Events]:
         seen, _ = self._light(light)
