@@ -11,6 +11,7 @@ from against.judge import assert_one_to_one, judge_clip
 from against.reference import LIGHT_MAX, Pixel
 
 from vid2ev.errors import UsageError
+from vid2ev.sensors.cis import Cis, CisSpec
 from vid2ev.sensors.dvs import Dvs, DvsSpec
 
 SHAPE = (5, 7)
@@ -137,6 +138,21 @@ def test_odd_values_with_every_effect_on_stay_finite():
         feed(dvs, t_ns[-1] + np.array([1, 2, 3]) * 100_000_000, calm)
         late = feed(dvs, [int(t_ns[-1]) + 400_000_000], calm[:1])
         assert len(late) < 33 * 35 * 4 * 918 // 10
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_lens_that_shades_beyond_all_numbers_makes_finite_light(sign):
+    """r is up to 1000 in a picture of one column, and its 16th power beyond float32; the brightest light is 1e30."""
+    shading = (0.0,) * 15 + (sign * 1e6,)
+    light = np.stack([np.full((2000, 1), level) for level in (0.0, np.inf, 0.0, 1.0)]).astype(np.float32)
+    dvs = Dvs(EVERYTHING.model_copy(update={"shading": shading}), (1, 2000))
+    cis = Cis(CisSpec(colour=False, shading=shading, exposure_us=0.0, frame_rate_hz=1000.0), (1, 2000))
+    for k, frame in enumerate(light):
+        sent, made = dvs.step(frame, 10**6 * k), cis.step(frame, 10**6 * k)
+        assert np.all(sent.y < 2000) and all(np.isfinite(plane).all() for plane in dvs.inside(np.arange(2000)))
+        assert len(made) == 1 and (made[0].codes[[0, -1]] > 1000).all() == (sign > 0 and frame.any())
+    assert np.isfinite(dvs.maps()["shading"]).all() and np.isfinite(cis.maps()["shading"]).all()
 
 
 def test_a_level_that_returns_exactly_does_not_drift():

@@ -1,6 +1,6 @@
 """Lens shading (vignetting): light falls off towards the corners.
 
-    gain(r) = 1 + c1 r + c2 r^2 + ...,   r = distance from the image centre / image width,   gain >= 0
+    gain(r) = 1 + c1 r + c2 r^2 + ...,   r = distance from the image centre / image width,   0 <= gain <= 10^6
 
 What leaving it out changes: ln(light + dark) by
 
@@ -32,7 +32,7 @@ from vid2ev.physics.fixed_pattern import greatest_gain
 from vid2ev.physics.omission import echoes, light_events, omitted, reset, set_anew
 from vid2ev.physics.photoreceptor_omission import lag_s, otherwise_late
 
-GREATEST = 1e6  # of a coefficient
+GREATEST = 1e6  # of a coefficient, and of the gain: the brightest light is then within float32 yet
 
 
 class Shading(BaseModel, frozen=True, extra="forbid"):
@@ -50,8 +50,11 @@ def shading_map(coefficients: tuple[float, ...], width: int, height: int) -> np.
     x = np.arange(width) - (width - 1) / 2
     y = np.arange(height) - (height - 1) / 2
     r = np.hypot(x[None, :], y[:, None]) / width
-    gain = np.polynomial.polynomial.polyval(r, (1.0, *coefficients))
-    return np.maximum(gain, 0.0).astype(np.float32)
+    return _gain(coefficients, r).astype(np.float32)
+
+
+def _gain(coefficients: tuple[float, ...], r: np.ndarray) -> np.ndarray:
+    return np.clip(np.polynomial.polynomial.polyval(r, (1.0, *coefficients)), 0.0, GREATEST)
 
 
 def omission_of_levels(seen: Exposed, spec: Any) -> LevelChange:
@@ -64,7 +67,7 @@ def omission(scene: Scene, spec: Any) -> Omission:
     """The shading; the scene's light is what arrives behind it, and that before it was measured beside it."""
     width, height = scene.size
     radii = np.linspace(0.0, np.hypot(width - 1, height - 1) / 2 / width, 65)
-    gains = np.maximum(np.polynomial.polynomial.polyval(radii, (1.0, *spec.shading)), 1e-6)
+    gains = np.maximum(_gain(spec.shading, radii), 1e-6)
     figure = f"light x {gains.min():.2g} to {gains.max():.2g} from the centre to the corners"
     mean = bare(scene, echoes=echoes(spec))
     if spec.bandwidth == "light" and spec.photoreceptor_tau_us > 0:
