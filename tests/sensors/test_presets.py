@@ -10,7 +10,7 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sensors.dvs import Dvs
-from vid2ev.sensors.presets import load_sensor, preset_names, read_sensor
+from vid2ev.sensors.presets import CIS, DVS, Kind, load, load_sensor, preset_names, read_sensor
 from vid2ev.sensors.spec import DvsSpec
 
 NAMES = preset_names()
@@ -115,6 +115,7 @@ def test_the_last_override_wins_and_the_others_stay() -> None:
         ("random_phase=maybe", ["random_phase = 'maybe'", "it must be a valid boolean (default True)"]),
         ("shading=[0, a]", ["shading"]),
         ("shading=3", ["shading = 3", "it must be"]),
+        ("shading=[0, true]", ["shading = [0, true]", "a list of numbers"]),
         ("frame_rate_hz=-5", ["frame_rate_hz = -5", "greater than or equal to 0"]),
     ],
 )
@@ -126,6 +127,15 @@ def test_a_wrong_override_is_refused_in_one_sentence(override: str, parts: list[
     assert "pydantic" not in sentence and sentence.endswith(".")
     if "\n" not in override:
         assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("kind", [DVS, CIS])
+def test_true_is_neither_a_number_nor_a_word(kind: Kind) -> None:
+    fields = kind.spec.model_fields
+    for key in [key for key, field in fields.items() if field.annotation is not bool]:
+        with pytest.raises(UsageError, match=rf"^{key} = [tT]rue in sensor ideal is impossible: it must be "):
+            load(kind, "ideal", [f"{key}=true"])
+    assert len(fields) > 15
 
 
 def test_values_that_do_not_go_together_are_refused_in_one_sentence() -> None:

@@ -13,7 +13,7 @@ import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -96,15 +96,22 @@ def load(kind: Kind, name_or_path: str | Path, overrides: Sequence[str] = ()) ->
         values[key.removeprefix(f"{kind.table}.")] = value
     for key, value in values.items():
         field = kind.spec.model_fields.get(key)
-        if isinstance(value, bool) and field is not None and field.annotation in (int, float):  # (pydantic: 1 or 0)
+        truth = any(isinstance(each, bool) for each in (value if isinstance(value, list) else [value]))
+        if truth and field is not None and _takes_numbers(field.annotation):  # (pydantic: 1 or 0)
+            what = "list of numbers" if get_origin(field.annotation) is tuple else "number"
             raise UsageError(
-                f"{key} = {str(value).lower()} in sensor {sensor.name} is impossible: it must be a number"
+                f"{key} = {str(value).lower()} in sensor {sensor.name} is impossible: it must be a {what}"
                 f" (default {field.default!r})."
             )
     try:
         return kind.spec(**values)
     except ValidationError as error:
         raise UsageError(_sentence(error, sensor.name, kind)) from error
+
+
+def _takes_numbers(annotation: Any) -> bool:
+    """Whether numbers are of a type, or in what it holds."""
+    return annotation in (int, float) or any(map(_takes_numbers, get_args(annotation)))
 
 
 def check_overrides(overrides: Any, kind: Kind = DVS) -> None:
