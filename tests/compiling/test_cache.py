@@ -108,3 +108,18 @@ def test_all_files_that_kernels_are_made_of_count() -> None:
     for path in made_of:
         rooms = path.parent, *(PACKAGE / each for each in KERNELS)
         assert f"{path.parent.name}/{path.name}" in {name for name, _, _ in cache._versions(*rooms)}
+
+
+@pytest.mark.parametrize("found", [None, b"", b"of others", b"\xff\x00 of a disk that fails"])
+def test_kernels_of_other_sources_are_deleted_whatever_is_found_in_place_of_their_stamp(
+    found: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "_PACKAGE", tmp_path)
+    kept = tmp_path / "physics" / "__pycache__"
+    kept.mkdir(parents=True)
+    if found is not None:
+        (kept / "kernels.stamp").write_bytes(found)
+    for left in (False, True):
+        (kept / "law.nbc").touch()
+        cache.drop_stale_kernels()
+        assert (kept / "law.nbc").exists() is left

@@ -75,17 +75,17 @@ def _save_if_possible(cache: IndexDataCacheFile, key: Any, data: Any) -> None:
 def drop_stale_kernels() -> None:
     """Delete the cached kernels if the sources are not those that they were compiled from; never fails."""
     folders = [_PACKAGE / room for room in KERNELS]
-    stamp = hashlib.sha256(repr(_versions(*folders)).encode()).hexdigest()
+    stamp = hashlib.sha256(repr(_versions(*folders)).encode()).hexdigest().encode()
     stamp_file = _PACKAGE / KERNELS[0] / "__pycache__" / "kernels.stamp"
     # A folder that cannot be written is not one in which sources change: numba then keeps its cache elsewhere.
     with contextlib.suppress(OSError):
-        if stamp_file.exists() and stamp_file.read_text() == stamp:
+        if stamp_file.exists() and stamp_file.read_bytes() == stamp:
             return
         for folder in folders:
             for cached in (*folder.glob("__pycache__/*.nbi"), *folder.glob("__pycache__/*.nbc")):
                 cached.unlink(missing_ok=True)
         stamp_file.parent.mkdir(exist_ok=True)
-        stamp_file.write_text(stamp)
+        stamp_file.write_bytes(stamp)
 
 
 _mark_ours()
