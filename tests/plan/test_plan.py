@@ -540,3 +540,14 @@ def test_a_change_of_every_event_is_its_mean_however_few_there_are() -> None:
     seen = scene_of(POLES, size, frames)
     for mean in (1e-9, 1e-6, 1e-3, 0.5):
         assert surely(seen, mean) >= mean
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("more", [{}, {"refractory": "track"}, {"shading": (0.0, -0.5)}, {"bandwidth": "light"}])
+def test_of_light_that_jumps_beyond_all_slopes_nothing_is_known(more: dict) -> None:
+    """From the dark to the brightest light in a nanosecond: a slope beyond float32, of which no bound is a number."""
+    spec = DvsSpec(leak_rate_hz=0.1, shot_rate_hz=1.0, **more)
+    frames = [Frame(np.full((3, 4), level, np.float32), k) for k, level in enumerate((0.0, np.inf, 0.5, 0.5, 0.2))]
+    plan = plan_of(scene_of(spec, (4, 3), frames), spec, 1.0)
+    assert plan.spec == spec and {row.omission.kind for row in plan.rows} == {"no bound yet"}
+    assert "jumps" in str(plan) and json.dumps(plan.describe(), allow_nan=False)

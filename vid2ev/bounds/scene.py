@@ -65,6 +65,7 @@ Sources: M. van Rossum, "A novel spike distance", Neural Computation 13(4), 2001
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -237,13 +238,19 @@ class Scene:
         """Whether nothing is expected to be sent."""
         return self.events == 0.0
 
+    @property
+    def finite(self) -> bool:
+        """Whether all that was measured are numbers: slopes of light that jumps by many decades at once may be none."""
+        return all(np.isfinite(part).all() for part in vars(self).values() if isinstance(part, np.ndarray))
+
     def percentile(self, share: float) -> float:
         """The light that a share of the pixels is below, to an octave."""
         counts = np.cumsum(self.brightness)
         return float(2.0 ** (np.searchsorted(counts, share * counts[-1]) - 20))
 
     def describe(self) -> dict[str, Any]:
-        """The scene in a few numbers, ready for JSON."""
+        """The scene in a few numbers, ready for JSON; None for a slope that is none."""
+        steepest = float(self.slope_max.max())
         return {
             "frames": self.frames,
             "seconds": round(self.seconds, 6),
@@ -253,7 +260,7 @@ class Scene:
                 *map(self.percentile, (0.01, 0.5, 0.99)),
                 float(self.light_max.max()),
             ],
-            "slope_max_nat_per_s": float(self.slope_max.max()),
+            "slope_max_nat_per_s": steepest if math.isfinite(steepest) else None,
             "still_tiles": int(np.count_nonzero(self.travel == 0)),
             "tiles": len(self.travel),
         }

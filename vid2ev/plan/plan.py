@@ -46,6 +46,7 @@ from vid2ev.sensors.spec import DvsSpec
 TOLERANCE = 0.01  # of the distance: a tenth of what 8 bits of a video change, and less
 FEW = 50  # events: their number is what it is said to be to a seventh, the standard deviation
 WORDS = ("auto", "all", "none")
+TOO_STEEP = "light jumps by more, and faster, than is measured"
 
 
 class Effect(NamedTuple):
@@ -173,7 +174,10 @@ def plan_of(
     Raises UsageError for an effect that there is not, or a specification that cannot be without what is left out.
     """
     check_tolerance(tolerance)
-    omissions = {name: _said(EFFECTS[name].omission(scene, spec), scene, spec) for name in spec.effects()}
+    if scene.finite:
+        omissions = {name: _said(EFFECTS[name].omission(scene, spec), scene, spec) for name in spec.effects()}
+    else:
+        omissions = dict.fromkeys(spec.effects(), Omission(None, "no bound yet", "-", TOO_STEEP))
     return _planned(omissions, spec, tolerance, effects, scene.describe(), among)
 
 
