@@ -24,9 +24,10 @@ def scene(by_pixel: np.ndarray) -> Scene:
     """A scene of so many pixels of 0, 1, ... events; they are no more than that."""
     size, frames = clip("edge")
     seen = scene_of(DvsSpec(), size, frames)
-    travel = seen.threshold * by_pixel * np.arange(len(by_pixel))
+    numbers = np.flatnonzero(by_pixel)
+    travel = seen.threshold * by_pixel[numbers] * numbers
     of_all = seen.travel / seen.travel.sum() * travel.sum()
-    return dataclasses.replace(seen, by_pixel=travel, travel=of_all)
+    return dataclasses.replace(seen, by_pixel=np.stack([numbers, travel]), travel=of_all)
 
 
 @pytest.mark.parametrize("whole", [False, True])
@@ -76,7 +77,8 @@ def test_a_coarser_grid_makes_a_bound_no_smaller(most: list[float], means: list[
 
 
 def test_where_nothing_is_sent_a_mean_is_its_bound() -> None:
-    assert surely(dataclasses.replace(scene(np.array([0, 9])), travel=np.zeros(1), by_pixel=np.zeros(1)), 0.1) == 0.1
+    still = dataclasses.replace(scene(np.array([0, 9])), travel=np.zeros(1), by_pixel=np.zeros((2, 0)))
+    assert surely(still, 0.1) == 0.1
 
 
 def test_numbers_of_poisson_are_beyond_their_bounds_in_less_than_one_of_a_thousand_cases() -> None:

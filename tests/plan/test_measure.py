@@ -72,9 +72,10 @@ def test_before_the_log_slopes_are_bounds() -> None:
 def test_travel_is_spread_over_slopes_lights_and_pixels_and_none_is_lost(way: str) -> None:
     spec = clean(filter=way, photoreceptor_tau_us=300, follower_tau_us=100)
     scene = scene_of(spec, SIZE, walk(4))
-    for spread in (scene.by_slope[0], scene.by_light[0], scene.by_pixel):
+    for spread in (scene.by_slope[0], scene.by_light[0], scene.by_pixel[1]):
         assert spread.sum() == pytest.approx(scene.travel.sum(), rel=1e-4)
-    assert len(scene.by_pixel) == int(scene.busiest / scene.threshold) + 1
+    numbers = scene.by_pixel[0]
+    assert (np.diff(numbers) > 0).all() and numbers[-1] == int(scene.busiest / scene.threshold)
     assert 0 < scene.by_turns[0].sum() < scene.travel.sum()  # (what counts of it)
     seen = np.flatnonzero(scene.by_light[0])
     assert QUARTER_EDGES[seen[0] + 1] >= scene.light_min.min() and QUARTER_EDGES[seen[-1]] <= scene.light_max.max()
@@ -395,3 +396,15 @@ def test_memory_is_what_is_said() -> None:
     assert bare == pytest.approx(plain, abs=1)  # (a thread's scratch is half a byte)
     assert bytes_a_pixel("shading=[-0.3]") - bare == pytest.approx(shaded, abs=1)
     assert bytes_a_pixel("refractory=track") - bare == pytest.approx(jumping, abs=1)
+
+
+def test_how_many_events_pixels_have_takes_no_memory_for_each() -> None:
+    """Light of six decades that flickers, in thresholds of a millionth: 300 million events of each pixel."""
+    measure = Measure(clean(threshold_on=1e-6, threshold_off=1e-6), (4, 3))
+    for k in range(41):
+        measure.see(Frame(np.full((3, 4), 1e3 if k % 2 else 0.0, np.float32), k * 1_000_000))
+    tracemalloc.start()
+    scene = measure.scene()
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1_000_000 and scene.most_events > 3e8

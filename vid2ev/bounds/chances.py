@@ -51,11 +51,11 @@ def surely(scene: Scene, mean: float, share: float = 1.0, *, whole: bool = False
 def _pixels(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """How many events pixels send at most, and how many all those together that send so many: of busy ones to three
     digits, so that there are few."""
-    numbers = np.flatnonzero(scene.by_pixel)
-    of = np.where(numbers < FEW, numbers, FEW + np.ceil(FEW * np.log2(np.maximum(numbers, FEW) / FEW)).astype(np.int64))
+    numbers, travel = scene.by_pixel
+    of = np.where(numbers < FEW, numbers, FEW + np.ceil(FEW * np.log2(np.maximum(numbers, FEW) / FEW)))
     _, first, group = np.unique(of[::-1], return_index=True, return_inverse=True)
     most = numbers[::-1][first] + 2.0
-    return most, np.bincount(group, scene.by_pixel[numbers][::-1]) / scene.threshold
+    return most, np.bincount(group, travel[::-1]) / scene.threshold
 
 
 def _chernoff(most: np.ndarray, means: np.ndarray, whole: bool) -> float:

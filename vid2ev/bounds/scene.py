@@ -166,7 +166,7 @@ class Scene:
     by_bare                   the travel that counts, by the sum of |p_a - p_b| at turns before it
     moving                    how many pixels have any travel
     busiest                   the travel of the pixel that has most [nat]
-    by_pixel                  travel of the pixels that have 0, 1, ... whole events
+    by_pixel                  [2, numbers] whole events of pixels, ascending, and the travel of all that have so many
     brightness                pixels in each octave of light from 2**-20 up, of every 16th pixel, now and then
     """
 

@@ -125,7 +125,7 @@ class Measure:
             threshold=2 * self._half,
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
-            by_pixel=np.bincount((travel / (2 * self._half)).astype(np.int64).ravel(), travel.ravel()),
+            by_pixel=_by_events(travel.ravel(), 2 * self._half),
             **dict(zip(SPREAD, _spread(spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
             **dict(zip(OF_TILES, tiles.T.copy(), strict=True)),
@@ -193,6 +193,13 @@ def _spread(found: np.ndarray, count: int) -> np.ndarray:
     sums = np.zeros((count, 2, QUARTERS))
     sums[: found.shape[1]] = np.moveaxis(found.sum(axis=0), 1, 2)
     return sums
+
+
+def _by_events(travel: np.ndarray, threshold: float) -> np.ndarray:
+    """Whole events of pixels with any travel, ascending, and the travel of all with so many [2, numbers]."""
+    moved = travel[travel > 0.0]
+    numbers, of = np.unique(np.floor(moved / threshold), return_inverse=True)
+    return np.stack([numbers, np.bincount(of, moved, len(numbers))])
 
 
 def _scratch() -> tuple[np.ndarray, ...]:
