@@ -262,6 +262,23 @@ def test_aedat2_of_v2e(tmp_path: Path) -> None:
     assert file.size == (640, 480) and len(file.warnings) == 1
 
 
+SETTINGS, LAST = 9000 * "# one setting of many\r\n" + f"# {'long' * 3000}\r\n", "#End Of ASCII Header\r\n"
+
+
+@pytest.mark.parametrize(("more", "last"), [(SETTINGS, ""), (SETTINGS, LAST), ("# User name: José\r\n", LAST)])
+def test_aedat2_has_as_many_lines_as_a_camera_has_settings_and_in_any_letters(
+    tmp_path: Path, more: str, last: str
+) -> None:
+    events = events_of(np.arange(3000) * 7, (346, 260))
+    content = foreign.aedat2(foreign.davis_address(events, (346, 260)), events.t)
+    begin = len(foreign.AEDAT2_HEAD)
+    lines = f"{more}# AEChip: eu.seebetter.ini.chips.davis.Davis346blue\r\n{last}".encode("latin-1")
+    file = opened(tmp_path, content[:begin] + lines + content[begin:], "aedat2")
+    assert_same(Events.concatenate(file.events()), events)
+    assert file.size == (346, 260) and file.warnings == []
+    assert len(file.describe()["header"]) == (foreign.AEDAT2_HEAD.encode("latin-1") + lines).count(b"\n")
+
+
 @pytest.mark.parametrize("pieces", [1, 7, 400])
 def test_a_clock_of_32_bits_is_followed_from_piece_to_piece(pieces: int) -> None:
     t, clock = np.cumsum(np.random.default_rng(0).integers(0, 1 << 31, 400)), Unwrapped()

@@ -8,12 +8,15 @@
     DAVIS           row [30:22], column [21:12], 1 is ON [11], special [10]; [31]: a sample of a frame, or of motion
     640x480 (v2e)   row [20:11], column [10:1], 1 is ON [0]
 
+Among the lines are all settings of the camera, 186 kB of them, and names in whatever letters; newer files say which is
+the last.
+
 jAER mirrors columns, and its rows count from the bottom, so both are turned here: x = width - 1 - column and
 y = height - 1 - row are upright.  Where no line names the camera, the first addresses tell: a DVS128 has 15 bits,
 v2e's 640x480 has 21; else it is a DAVIS of 240x180 if all fit, and of 346x260 if not.
 
-Sources: jAER, DavisChip.java, DavisBaseCamera.java, DVS128.java and SecDvs640Gen2.java
-(https://github.com/SensorsINI/jaer); v2e, v2ecore/output/aedat2_output.py;
+Sources: jAER, AEChip.java, AEFileInputStream.java, DavisChip.java, DavisBaseCamera.java, DVS128.java and
+SecDvs640Gen2.java (https://github.com/SensorsINI/jaer); v2e, v2ecore/output/aedat2_output.py;
 https://docs.inivation.com/software/software-advanced-usage/file-formats/aedat-2.0.html
 """
 
@@ -27,13 +30,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.event_file import HEAD, Format
+from vid2ev.formats.event_file import Format
 from vid2ev.formats.sequential import Sequential, Unwrapped, pieces, reading
 from vid2ev.stream.events import Events
 
 MAGIC = b"#!AER-DAT2.0"
 RECORD = np.dtype([("address", ">u4"), ("t", ">i4")])
-LINE = re.compile(rb"#[\t\x20-\x7e]{0,4000}\r?\n")
+HEAD = 1 << 20  # bytes among which the lines end
+LINE = re.compile(rb"#[\t\x20-\x7e]{0,16000}\r?\n")
+LAST = re.compile(rb"^#[# ]*end of ascii header[^\r\n]*\r?\n", re.IGNORECASE | re.MULTILINE)
 
 
 class Camera(NamedTuple):
@@ -105,15 +110,14 @@ class Aedat2Events(Sequential):
 def _header(head: bytes) -> tuple[list[str], int]:
     """The lines at the start, and the bytes that they are.
 
-    A first address can begin with the byte of #, too; it is told from a line by what follows.
+    Where no line says that it is the last, a first address can begin with the byte of #, too; it is told from a line by
+    what follows.
     """
-    lines, at = [], 0
-    while line := LINE.match(head, at):
-        lines.append(line[0].decode().strip())
+    last, at = LAST.search(head), 0
+    while not last and (line := LINE.match(head, at)):
         at = line.end()
-        if lines[-1].lower().lstrip("# ").startswith("end of ascii header"):
-            break
-    return lines, at
+    at = last.end() if last else at
+    return [line.strip() for line in head[:at].decode("latin-1").split("\n")[:-1]], at
 
 
 def _camera_of(address: np.ndarray) -> Camera:
