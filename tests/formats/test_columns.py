@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vid2ev import DataError
-from vid2ev.formats import open_events
+from vid2ev.formats import describe_events, open_events
 
 Columns = dict[str, Any]
 
@@ -30,7 +30,7 @@ def as_dsec(path: Path, columns: Columns) -> Path:
 
 def as_table(path: Path, columns: Columns) -> Path:
     with h5py.File(path / "table.h5", "w") as file:
-        file["events"] = np.stack([columns[name] for name in "txyp"], axis=1)
+        file["events"] = np.stack([columns[name].astype(columns["t"].dtype) for name in "txyp"], axis=1)
     return path / "table.h5"
 
 
@@ -70,6 +70,61 @@ def test_what_no_event_has_is_refused(
 ) -> None:
     path = write(tmp_path, columns_of("int64", **others))
     with pytest.raises(DataError, match=said):
+        [*open_events(path).events()]
+
+
+@pytest.mark.parametrize("values", [[300, 0, 0], [-1, 0, 0], [0.5, 0, 0], [np.nan, 0, 0]])
+@stored
+def test_labels_that_no_event_has_are_refused(
+    write: Callable[[Path, Columns], Path], values: list[float], tmp_path: Path
+) -> None:
+    path = write(tmp_path, columns_of("int64", label=values))
+    with pytest.raises(DataError, match=r"labels that are no whole numbers within 0 ... 255"):
+        [*open_events(path).events()]
+
+
+@pytest.mark.parametrize("kind", ["uint8", "int64", "float32"])
+@stored
+def test_labels_of_any_type_are_those_that_they_are(
+    write: Callable[[Path, Columns], Path], kind: str, tmp_path: Path
+) -> None:
+    events = next(open_events(write(tmp_path, columns_of("int64", label=np.array([0, 3, 255], kind)))).events())
+    assert events.label is not None and events.label.tolist() == [0, 3, 255] and events.label.dtype == np.uint8
+
+
+@pytest.mark.parametrize(
+    ("t", "sound"),
+    [
+        (np.array([-(2**63), 0, 2**63 - 1]), True),
+        (np.array([0, 1, 2**63 + 1], np.uint64), False),
+        (np.array([0, 1, 2.0**63]), False),
+    ],
+)
+@stored
+def test_times_are_those_that_they_are_or_refused(
+    write: Callable[[Path, Columns], Path], t: np.ndarray, sound: bool, tmp_path: Path
+) -> None:
+    path = write(tmp_path, columns_of("int64", t=t))
+    if sound:
+        found = describe_events(path)
+        assert [found["first_us"], found["last_us"], found["times_going_back"]] == [*t[[0, -1]].tolist(), 0]
+        return
+    with pytest.raises(DataError, match="times of more than 64 bits"):
+        [*open_events(path).events()]
+
+
+@pytest.mark.parametrize("start_us", [np.int64(2**63 - 20), np.uint64(2**63 + 5), np.int64(-(2**63))])
+@pytest.mark.parametrize("counted", [as_dsec, as_table])
+def test_times_are_counted_from_no_instant_that_makes_others_of_them(
+    counted: Callable[[Path, Columns], Path], start_us: Any, tmp_path: Path
+) -> None:
+    path = counted(tmp_path, columns_of("int64", t=np.array([-1, 0, 20]) if start_us < 0 else np.array([0, 1, 20])))
+    with h5py.File(path, "r+") as file:
+        if counted is as_dsec:
+            file["t_offset"] = start_us
+        else:
+            file.attrs["start_us"] = start_us
+    with pytest.raises(DataError, match="times of more than 64 bits"):
         [*open_events(path).events()]
 
 

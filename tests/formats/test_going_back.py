@@ -38,6 +38,28 @@ def test_any_disorder_is_put_in_order(t: list[int], block: int) -> None:
         np.testing.assert_array_equal(getattr(result, name), getattr(whole, name)[order])
 
 
+far = st.sampled_from([0, 1, 2**62, 2**62 + 5, 2**63 - 1]).flatmap(lambda at: st.sampled_from([at, -at, -at - 1]))
+
+
+@given(st.lists(far, max_size=9), st.integers(1, 4))
+@settings(max_examples=150)
+def test_how_far_any_times_go_back_is_counted(t: list[int], block: int) -> None:
+    disorder = Disorder()
+    for at in range(0, len(t), block):
+        disorder.add(np.array(t[at : at + block], np.int64))
+    assert disorder.depth_us == max((max(t[: k + 1]) - at for k, at in enumerate(t)), default=0)
+    assert disorder.places == sum(b < a for a, b in pairwise(t))
+
+
+@pytest.mark.parametrize("t", [[-(2**62), 0], [0, 2**62], [-(2**63), 2**63 - 1], [2**63 - 1, -(2**63)]])
+def test_times_of_no_year_are_not_compared_or_written_anew(tmp_path: Path, t: list[int]) -> None:
+    """Their differences, or twice as much, would be other numbers."""
+    none = np.zeros(2, np.uint8)
+    np.savez(tmp_path / "events.npz", t=np.array(t, np.int64), x=none, y=none, p=none)
+    with pytest.raises(DataError, match=r"times beyond 146,000 years|go back by"):
+        survey(open_events(tmp_path / "events.npz"))
+
+
 def test_events_wait_no_longer_than_they_must() -> None:
     blocks = blocks_of(list(range(0, 10_000, 10)), 100)
     longest = seen = 0

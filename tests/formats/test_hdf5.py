@@ -237,6 +237,31 @@ def test_what_is_no_event_file_is_refused(tmp_path: Path) -> None:
     assert "differ in length" in refused(tmp_path / "uneven.h5")
 
 
+BESIDE: dict[str, Any] = {
+    "frames/t of two axes": ("frames/t", np.ones((2, 2), np.int64)),
+    "frames/t that are no times": ("frames/t", np.array([1.0, np.nan])),
+    "frames/t that go back": ("frames/t", np.array([5, 3, 7])),
+    "frames/t beyond all": ("frames/t", np.array([0, 2**63], np.uint64)),
+    "several t_offset": ("t_offset", np.array([1, 2])),
+    "no t_offset in its place": ("t_offset", np.empty(0, np.int64)),
+    "a t_offset that is no whole number": ("t_offset", 1.5),
+    "fewer labels": ("events/label", np.zeros(2, np.uint8)),
+    "labels of two axes": ("events/label", np.zeros((3, 3), np.uint8)),
+    "labels that are no numbers": ("events/label", np.array([b"on", b"off", b"on"])),
+}
+
+
+@pytest.mark.parametrize("what", BESIDE)
+def test_what_is_beside_the_events_is_sound_or_refused(tmp_path: Path, what: str) -> None:
+    """Whoever reads the events later relies on it."""
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        for name in "txyp":
+            file[f"events/{name}"] = np.arange(3)
+        name, values = BESIDE[what]
+        file[name] = values
+    refused(tmp_path / "other.h5")
+
+
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.9, 0.999])
 def test_a_file_cut_short_is_refused(tmp_path: Path, share: float) -> None:
     write(tmp_path / "events.h5", events_at(np.sort(np.random.default_rng(3).integers(0, 10**6, 200_000))))

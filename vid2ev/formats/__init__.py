@@ -57,6 +57,7 @@ FORMATS = {
 
 
 LONG_SILENCE_US = 3_600_000_000  # before the first event: the file counts from another instant than it begins
+LATEST_US = 1 << 62  # which times are nearer to 0 than: differences of two, and twice as much, still fit into 64 bits
 DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
 
 
@@ -126,7 +127,8 @@ def survey(file: EventFile) -> Recording:
 
     Where the file does not state its size, that is the smallest that holds all events; where it counts from an instant
     long before its first event (such as 1970), the recording begins with that.  Times that go back are put in order,
-    with a warning.  Raises DataError for events outside of the size stated, or minutes out of order.
+    with a warning.  Raises DataError for events outside of the size stated, minutes out of order, or further away than
+    any year.
     """
     count, first_us, width, height, disorder = 0, None, 0, 0, Disorder()
     for events in file.events():
@@ -143,6 +145,8 @@ def survey(file: EventFile) -> Recording:
             " the file is damaged"
         )
     _note_disorder(file, disorder)
+    if max(abs(file.start_us), abs(first_us or 0), abs(disorder.latest_us or 0)) >= LATEST_US:
+        raise DataError(f"{file.path}: times beyond 146,000 years; the file is damaged")
     start_us = file.start_us if first_us is None else min(file.start_us, first_us)
     if first_us is not None and first_us - start_us > LONG_SILENCE_US:
         start_us = first_us

@@ -9,11 +9,23 @@ import numpy as np
 from vid2ev.errors import DataError
 
 
-def whole_us(path: Path, t: np.ndarray) -> np.ndarray:
-    """Times that are stored in microseconds, as int64.  Raises DataError for fractions and what is no number."""
-    if t.dtype.kind == "f" and not (np.array_equal(t, np.rint(t)) and np.all(np.abs(t) < 1 << 62)):
+def whole_us(path: Path, t: np.ndarray, from_us: int = 0) -> np.ndarray:
+    """Times that are stored in microseconds after from_us, as int64.
+
+    Raises DataError for fractions, what is no number, and times of more than 64 bits."""
+    if t.dtype.kind == "f" and not (np.array_equal(t, np.rint(t)) and np.isfinite(t).all()):
         raise DataError(f"{path} has times that are no whole microseconds; write them as such")
-    return t.astype(np.int64)
+    if len(t) and (from_us + t.min().item() < -(1 << 63) or from_us + t.max().item() >= 1 << 63):
+        raise DataError(f"{path} has times of more than 64 bits; get another copy")
+    return t.astype(np.int64) + from_us
+
+
+def labels(path: Path, label: np.ndarray) -> np.ndarray:
+    """Labels, uint8.  Raises DataError for others than such numbers."""
+    with np.errstate(invalid="ignore"):  # (NaN is none)
+        if label.dtype != np.uint8 and not np.array_equal(label, label.astype(np.uint8)):
+            raise DataError(f"{path} has labels that are no whole numbers within 0 ... 255; get another copy")
+    return label.astype(np.uint8)
 
 
 def pixels(path: Path, x: np.ndarray, y: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.columns import pixels, whole_us
+from vid2ev.formats.columns import labels, pixels, whole_us
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.frame_index import FrameIndex
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
@@ -60,10 +60,12 @@ class Hdf5Events:
         self.warnings: list[str] = []
         with opened(path, _check) as file:
             self.says_start = "t_offset" in file
-            self.start_us = int(file["t_offset"][()]) if self.says_start else 0
+            self.start_us = whole_us(path, np.ravel(file["t_offset"][()]))[0].item() if self.says_start else 0
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self.labelled = "label" in file["events"]
-            self.frame_us = file["frames/t"][:] + self.start_us if "frames/t" in file else None
+            self.frame_us = whole_us(path, file["frames/t"][:], self.start_us) if "frames/t" in file else None
+            if self.frame_us is not None and np.any(self.frame_us[1:] < self.frame_us[:-1]):
+                raise DataError(f"{path} is damaged: its frames/t go back; make it again or get another copy")
             self._time_type = str(file["events/t"].dtype)
             # (only `write_events` is known to have put them in order, and to have counted them)
             self._indexed = np.array_equal(file.attrs.get("version"), VERSION) and "ms_to_idx" in file
@@ -92,8 +94,8 @@ class Hdf5Events:
         columns = file["events"]
         for at in range(first, last, block):
             part = slice(at, min(at + block, last))
-            t = whole_us(self.path, columns["t"][part]) + self.start_us
-            label = columns["label"][part] if self.labelled else None
+            t = whole_us(self.path, columns["t"][part], self.start_us)
+            label = labels(self.path, columns["label"][part]) if self.labelled else None
             yield Events(t, *pixels(self.path, *(columns[name][part] for name in "xyp")), label)
 
     def _is_in_order(self, t: h5py.Dataset) -> bool:
@@ -200,12 +202,13 @@ def _check(file: h5py.File, path: Path) -> None:
         check_chunks(each, path)
     if "frames/t" in file:
         check_bytes(path, file["frames/t"].size * 8, "frames/t")
-    if not all(is_whole(each) for each in others) or any(each.size > 1 for each in others if each.name == "/t_offset"):
-        raise DataError(f"{path} is damaged: parts of {', '.join(BESIDE)} are missing; get another copy")
+    shaped = all(each.size == 1 if each.name == "/t_offset" else each.ndim == 1 for each in others)
+    if not shaped or not all(is_whole(each) for each in others):
+        raise DataError(f"{path} is damaged: parts of {', '.join(BESIDE)} are missing or of no use; get another copy")
     if not all(is_whole(column) for column in columns):
         raise DataError(f"{path} is damaged: parts of events/t, x, y, p are missing; get another copy")
-    if len({len(column) for column in columns}) > 1:
-        raise DataError(f"{path} is damaged: events/t, x, y, p differ in length; make it again or get another copy")
+    if len({len(column) for column in [*columns, *(each for each in others if each.name == "/events/label")]}) > 1:
+        raise DataError(f"{path} is damaged: its columns of events differ in length; make it again or get another copy")
 
 
 FORMAT = Format(

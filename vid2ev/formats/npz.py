@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import DataError, read_as
-from vid2ev.formats.columns import pixels
+from vid2ev.formats.columns import labels, pixels, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array
 from vid2ev.formats.sequential import Sequential, reading
@@ -97,10 +97,8 @@ class NpzEvents(Sequential):
         t = column["t"]
         if t.dtype.kind == "f":
             t = np.rint(t.astype(np.float64) * self._scale)
-            if not np.all(np.abs(t) < 1 << 62):
-                raise DataError(f"{self.path} has times that are no number of microseconds; get another copy")
-        label = column["label"].astype(np.uint8) if self.labelled else None
-        return Events(t.astype(np.int64), *pixels(self.path, *(column[name] for name in "xyp")), label)
+        label = labels(self.path, column["label"]) if self.labelled else None
+        return Events(whole_us(self.path, t), *pixels(self.path, *(column[name] for name in "xyp")), label)
 
     @contextmanager
     def _opened(self) -> Iterator[dict[str, Array]]:

@@ -26,9 +26,10 @@ class Disorder:
         """Count a block of times, at least one."""
         latest_us = int(t[0]) if self.latest_us is None else self.latest_us
         before = t[0] if self.latest_us is None else self._last_us
-        self.places += int(np.count_nonzero(np.diff(t, prepend=before) < 0))
+        self.places += int(np.count_nonzero(t[1:] < t[:-1])) + int(t[0] < before)
         latest = np.maximum(np.maximum.accumulate(t), latest_us)
-        self.depth_us = max(self.depth_us, int((latest - t).max()))
+        # (64 bits without a sign hold the difference of any two times)
+        self.depth_us = max(self.depth_us, int((latest.view(np.uint64) - t.view(np.uint64)).max()))
         self.latest_us, self._last_us = int(latest[-1]), int(t[-1])
 
 

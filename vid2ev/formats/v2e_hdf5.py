@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vid2ev.errors import DataError
-from vid2ev.formats.columns import pixels
+from vid2ev.formats.columns import pixels, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
 from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
 from vid2ev.formats.sequential import Sequential
@@ -40,7 +40,8 @@ class V2eEvents(Sequential):
     def __init__(self, path: Path):
         super().__init__(path)
         with opened(path, _check) as file:
-            self.start_us, self.says_start = int(file.attrs.get("start_us", 0)), "start_us" in file.attrs
+            self.says_start = "start_us" in file.attrs
+            self.start_us = whole_us(path, np.ravel(file.attrs.get("start_us", 0)))[0].item()
             self.size = (int(file.attrs["width"]), int(file.attrs["height"])) if "width" in file.attrs else None
             self._shape = file["events"].shape
             self._dtype = str(file["events"].dtype)
@@ -56,7 +57,7 @@ class V2eEvents(Sequential):
             for at in range(0, len(table), PART):
                 rows = table[at : at + PART]
                 t, x, y, p = (rows[:, k] for k in range(COLUMNS))
-                events = Events(t.astype(np.int64) + self.start_us, *pixels(self.path, x, y, p))
+                events = Events(whole_us(self.path, t, self.start_us), *pixels(self.path, x, y, p))
                 events, left = self._inside(events)
                 outside += left
                 yield events
