@@ -14,7 +14,16 @@ from hypothesis import strategies as st
 from recordings import all_events, assert_same, events_of, recording_of, recordings_for, sparse, written
 
 from vid2ev.errors import UsageError
-from vid2ev.formats import FORMATS, describe_events, format_named, open_events, read_events, recognise, survey
+from vid2ev.formats import (
+    FORMATS,
+    check_holds,
+    describe_events,
+    format_named,
+    open_events,
+    read_events,
+    recognise,
+    survey,
+)
 from vid2ev.stream.events import Events
 
 WRITABLE = [name for name in FORMATS if format_named(name).write]
@@ -171,6 +180,16 @@ def test_dat_without_a_line_about_all_of_it_goes_on(tmp_path: Path) -> None:
         part.write_bytes(head + rest)
     file = open_events(path)
     assert len(Events.concatenate(file.events())) == 3 and not file.warnings
+
+
+def test_dat_holds_no_more_files_than_it_is_read_from(tmp_path: Path) -> None:
+    kind = format_named("dat")
+    assert kind.longest_us is not None
+    with pytest.raises(UsageError, match=r"format dat cannot hold .* s; choose --format hdf5"):
+        check_holds(kind, (9, 9), kind.longest_us + 1)
+    check_holds(kind, (9, 9), kind.longest_us)
+    recording = recording_of(events_of(np.array([0, kind.longest_us]), (9, 9)), (9, 9))
+    assert_same(Events.concatenate(read_events(written(kind, recording, tmp_path))), all_events(recording))
 
 
 @pytest.mark.parametrize("after_us", [-1, 0, 1])

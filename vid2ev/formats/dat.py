@@ -29,7 +29,7 @@ from vid2ev.formats.prophesee import Header, read_header
 from vid2ev.formats.sequential import Sequential, Unwrapped, pieces, reading
 from vid2ev.stream.events import Events
 
-PART_US = 1 << 32
+PART_US, MOST_PARTS = 1 << 32, 9999
 KINDS = (b"\x0c\x08", b"\x00\x08")
 RECORD = np.dtype([("t", "<u4"), ("address", "<u4")])
 BITS = {"2": (14, 14), "1": (9, 8)}  # of column and row, by version
@@ -161,5 +161,6 @@ FORMAT = Format(
     write=write_events,
     further=lambda path: DatEvents(path).further(),
     largest=(1 << 14, 1 << 14),
+    longest_us=MOST_PARTS * PART_US - 1,  # (what goes on in more files than are counted is damage)
     keeps=frozenset({"size", "start"}),
 )
