@@ -62,6 +62,10 @@ def test_windows_and_blocks(tmp_path: Path, name: str) -> None:
     blocks = list(read_events(path, start, stop, block=64))
     assert all(0 < len(block) <= 64 for block in blocks)
     assert_same(Events.concatenate(blocks), events.select((events.t >= start) & (events.t < stop)))
+    for kind in (np.int64, np.uint64):
+        same = read_events(path, kind(start), kind(stop), block=64)
+        assert_same(Events.concatenate(same), Events.concatenate(blocks))
+        assert list(read_events(path, kind(0), kind(recording.start_us))) == []
     for none in (0, -5):
         with pytest.raises(UsageError, match=f"block {none}: expected at least 1"):
             list(read_events(path, block=none))

@@ -86,7 +86,9 @@ def read_events(
             raise UsageError(f"{name} {t_us!r}: expected a whole number of microseconds")
     if block < 1:
         raise UsageError(f"block {block}: expected at least 1 event at a time")
-    yield from open_events(path).events(start_us, stop_us, block)
+    # (unsigned numbers of numpy have no differences below 0)
+    first_us, end_us = (None if t_us is None else int(t_us) for t_us in (start_us, stop_us))
+    yield from open_events(path).events(first_us, end_us, block)
 
 
 def describe_events(path: str | Path) -> dict[str, Any]:
