@@ -133,6 +133,13 @@ def test_which_column_of_the_times_counts(tmp_path: Path, text: str, first_us: i
     assert stamps[0] == Fraction(first_us, 10**6)
 
 
+@pytest.mark.parametrize("text", ["0\n33333\n66666\n99999\n", "1 2 3\n4 5 6\n", "0 1\n2 3\n4\n", "0 1\n2 three\n"])
+def test_lines_that_are_no_two_times_are_no_spans(tmp_path: Path, text: str) -> None:
+    (tmp_path / "timestamps.txt").write_text(text)
+    with pytest.raises(DataError, match="expected two times in us on every line"):
+        read_spans(tmp_path / "timestamps.txt")
+
+
 @pytest.mark.parametrize("kinds", [["mp4"], ["raw", "mp4"], ["png", "mp4"]])
 @pytest.mark.parametrize("shape", [(33, 46, 3), (32, 46)])
 def test_the_film_plays_the_pictures_in_real_time(tmp_path: Path, kinds: list[str], shape: tuple[int, ...]) -> None:

@@ -137,6 +137,8 @@ def read_spans(path: Path) -> np.ndarray:
     lines = read_lines(path, "two times in us on every line")
     try:
         rows = [[int(word) for word in line.split()] for line in lines if line.strip() and line.lstrip()[0] != "#"]
+        if bad := next((row for row in rows if len(row) != 2), None):
+            raise ValueError(f"{len(bad)} numbers on a line")
         spans = np.array(rows, np.int64).reshape(-1, 2)
     except (ValueError, OverflowError) as error:
         said = first_line(error, 100)
