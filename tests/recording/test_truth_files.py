@@ -107,6 +107,14 @@ def test_a_folder_has_one_scale(tmp_path: Path) -> None:
             read_depth(tmp_path / "0.png")
 
 
+@pytest.mark.parametrize("number", [float, np.float64, np.float32])
+def test_a_scale_may_be_a_number_of_numpy(tmp_path: Path, number: type) -> None:
+    write_depth(tmp_path / "0.png", np.ones((2, 3)), m_per_code=number(0.25))
+    assert (read_depth(tmp_path / "0.png") == 1).all()
+    write_flow(tmp_path / "1.png", np.ones((2, 3, 2)), codes_per_px=np.int64(number(64)))
+    assert (read_flow(tmp_path / "1.png") == 1).all()
+
+
 @pytest.mark.parametrize("suffix", [".npz", ".flo"])
 @given(flow=arrays.arrays(np.float32, FLOWS, elements=st.floats(-(2.0**29), 2.0**29, width=32)))
 def test_flow_reads_back_to_the_bit(tmp_path_factory: pytest.TempPathFactory, suffix: str, flow: np.ndarray) -> None:

@@ -88,7 +88,7 @@ def state_number(path: Path, name: str, value: float) -> None:
     beside = path.with_name(name)
     if not beside.exists():
         with whole_file(beside) as file:
-            file.write(f"{NUMBERS[name][0]} {value!r}\n".encode())
+            file.write(f"{NUMBERS[name][0]} {np.asarray(value).item()!r}\n".encode())
     elif (stated := stated_number(path, name)) != value:
         raise UsageError(f"{beside} says {stated:g}, not {value:g}; write to another folder, or as before")
 
