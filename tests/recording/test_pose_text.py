@@ -98,6 +98,8 @@ def test_what_are_no_poses_is_refused(tmp_path: Path) -> None:
         (np.array([0.5]), np.zeros((1, 3)), one),
         (np.array([0, 1]), np.zeros((1, 3)), one),
         (np.array([0]), np.zeros((1, 2)), one),
+        (np.array([0]), np.zeros((2, 3)), one),
+        (np.array([0]), np.zeros(3), one),
         (np.array([0]), np.full((1, 3), np.nan), one),
         (np.array([0]), np.zeros((1, 3)), 2 * one),
     ):

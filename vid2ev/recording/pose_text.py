@@ -40,9 +40,11 @@ def write_poses(path: Path, t_ns: np.ndarray, positions_m: np.ndarray, quaternio
 
 def pose_lines(t_ns: np.ndarray, positions_m: np.ndarray, quaternions: np.ndarray) -> str:
     """A line for each pose, for a file that grows; the first line of the file is `HEADER`.  Raises UsageError."""
+    shapes = [np.shape(each) for each in (t_ns, positions_m, quaternions)]
+    if shapes != [(n := len(t_ns),), (n, 3), (n, 4)] or np.asarray(t_ns).dtype.kind not in "iu":
+        found = ", ".join(str(list(shape)) for shape in shapes)
+        raise UsageError(f"poses are instants [N] int64, positions [N, 3] and quaternions [N, 4]; found {found}")
     poses = np.c_[positions_m, quaternions].astype(np.float64)
-    if poses.shape != (len(t_ns), 7) or np.asarray(t_ns).dtype.kind not in "iu":
-        raise UsageError(f"poses are instants [N], positions [N, 3] and quaternions [N, 4]; found {list(poses.shape)}")
     if not np.isfinite(poses).all() or any(abs(math.hypot(*pose[3:]) - 1) > NEARLY_ONE for pose in poses.tolist()):
         raise UsageError("poses are finite, and their quaternions of length 1")
     # (+ 0.0: a zero without a sign)
