@@ -197,6 +197,9 @@ def test_frames_that_come_to_lie_on_each_other_are_refused(tmp_path: Path) -> No
     np.save(tmp_path / "a.npy", np.zeros((3, 2, 2), np.float32))
     with pytest.raises(DataError, match="one nanosecond"):
         list(open_source(tmp_path / "a.npy", fps=1e9, slowdown=1000).frames())
+    np.save(tmp_path / "a_timestamps.npy", 1.7e9 + np.arange(3))  # (seconds since 1970)
+    with pytest.raises(DataError, match=r"slowdown 0\.25: a frame at 1\.7e\+09 s .* use more"):
+        list(open_source(tmp_path / "a.npy", slowdown=0.25).frames())
 
 
 # ---------------------------------------------------------------------------------------------------------- crop, size

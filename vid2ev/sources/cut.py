@@ -128,11 +128,17 @@ class Slowed(Edit):
         return {"slowdown": str(self._slowdown)}
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
-        """The frames from index `start` on, each at the nearest nanosecond; DataError if two come to lie on one."""
+        """The frames from index `start` on, each at the nearest nanosecond; DataError if two come to lie on one, or
+        beyond what the clock can say."""
         before_ns: int | None = None
         for frame in self.source.frames(start):
             t_ns = self.slowed_ns(frame.t_ns)
-            if (before_ns is not None and t_ns <= before_ns) or abs(t_ns) > LONGEST_NS:
+            if abs(t_ns) > LONGEST_NS:
+                raise DataError(
+                    f"slowdown {float(self._slowdown):g}: a frame at {frame.t_ns / 1e9:g} s would be beyond 146 years;"
+                    " use more, or times that begin nearer to 0"
+                )
+            if before_ns is not None and t_ns <= before_ns:
                 raise DataError(
                     f"slowdown {float(self._slowdown):g}: two frames come to lie on one nanosecond; use less"
                 )
