@@ -153,8 +153,9 @@ def test_timestamps_in_an_array(tmp_path: Path) -> None:
     file = tmp_path / "t.npy"
     np.save(file, np.array([0, 33333, 66667], np.int64))
     assert read_timestamp_array(file) == ([Fraction(k, 10**6) for k in (0, 33333, 66667)], "us (by spacing)")
-    np.save(file, np.array([0.0, 0.5]))
-    assert read_timestamp_array(file) == ([Fraction(0), Fraction(1, 2)], "s")
+    for kind in (np.float16, np.float64, np.longdouble, ">f4"):
+        np.save(file, np.array([0.0, 0.5], kind))
+        assert read_timestamp_array(file) == ([Fraction(0), Fraction(1, 2)], "s")
     for bad in (np.zeros((2, 2)), np.array([0.0, np.nan]), np.array(["a", "b"])):
         np.save(file, bad)
         with pytest.raises(DataError):

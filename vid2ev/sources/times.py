@@ -238,7 +238,9 @@ def stamps_of_array(stamps: np.ndarray, path: Path, unit: str | None = None) -> 
     values = stamps.tolist()
     guessed = unit is None and stamps.dtype.kind != "f"
     unit = unit or (unit_of_integers(values) if guessed else "s")
-    return _in_seconds([Fraction(value) for value in values], unit, path), f"{unit}{GUESSED * guessed}"
+    # (also of those of more than 64 bits, which are none of Python's)
+    exact = [Fraction(*value.as_integer_ratio()) for value in values]
+    return _in_seconds(exact, unit, path), f"{unit}{GUESSED * guessed}"
 
 
 def remarks_on_unit(unit: str | None, file: Path) -> list[str]:
