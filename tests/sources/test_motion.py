@@ -292,7 +292,8 @@ def test_sizes_that_cannot_be(tmp_path: Path, size: str, said: str) -> None:
 
 @pytest.mark.parametrize("text", [
     "", "0,1,2\n", "0,1,2\n0,3,4\n", "0,1\n1,2\n", "0,0,0\n1,soon,0\n", "0,0,0\n1,nan,0\n", "0,0,0,0,1\n1,0,0,0,0\n",
-    "t,x,z\n0,0,0\n1,1,1\n", "0,0,0\n1,1\n", "0,0,0,0,1,5\n1,0,0,0,1,5\n",
+    "1e12,0,0\n1000000000001,5,0\n", "0,0,0\n1e300,5,0\n", "t,x,z\n0,0,0\n1,1,1\n",
+    "0,0,0\n1,1\n", "0,0,0,0,1,5\n1,0,0,0,1,5\n",
 ])  # fmt: skip
 def test_bad_paths_are_refused_by_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "path.csv").write_text(text)

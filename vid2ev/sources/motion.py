@@ -31,6 +31,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import number_of
+from vid2ev.sources.times import LONGEST_NS
 
 SAMPLES = 4001
 
@@ -217,6 +218,8 @@ def _rows(path: Path) -> list[list[float]]:
                 f"{path}: row {number} is {','.join(words)[:80]}; expected finite numbers, a zoom of 0.01 to 100"
             )
         rows.append([row[name] for name in ("t", "x", "y", "angle", "zoom")])
+    if any(abs(row[0]) * 1e9 > LONGEST_NS for row in rows):
+        raise DataError(f"{path}: a time beyond 146 years; expected seconds")
     if len(rows) < 2 or any(b[0] <= a[0] for a, b in pairwise(rows)):
         raise DataError(f"{path}: expected at least two rows, with times that rise")
     return rows
