@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats.npy_arrays import array_header
 from vid2ev.sources import open_source
 
 STACK = np.random.default_rng(0).uniform(0, 3, (5, 4, 6)).astype(np.float32)
@@ -81,6 +82,13 @@ def test_refusals(tmp_path: Path) -> None:
         open_source(saved(tmp_path, frames=STACK, t=np.array(list("abcde"))))
     with pytest.raises(UsageError, match="fps -1"):
         open_source(saved(tmp_path, frames=STACK, fps=-1.0))
+
+
+def test_a_shape_that_no_array_has_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "clip.npz", "w") as archive:
+        archive.writestr("frames.npy", array_header((-5, 4, 6), np.float32) + bytes(480))
+    with pytest.raises(DataError, match="array of shape"):
+        open_source(tmp_path / "clip.npz", fps=1)
 
 
 def test_no_code_is_run_from_an_archive(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ class ArrayStack:
         self.warnings: list[str] = []
         self._stack = stack = NpyStack(self.path) if stack is None else stack
         shape, dtype = stack.shape, stack.dtype
-        if len(shape) not in (3, 4) or 0 in shape or (len(shape) == 4 and shape[3] != 3):
+        if len(shape) not in (3, 4) or min(shape) < 1 or (len(shape) == 4 and shape[3] != 3):
             raise DataError(f"{self.path}: array of shape {shape}, expected [N, H, W] or [N, H, W, 3]")
         if dtype.newbyteorder("=") not in (np.uint8, np.uint16) and dtype.kind != "f":
             raise DataError(f"{self.path}: array of type {dtype}, expected {TYPES}")
