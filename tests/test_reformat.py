@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -191,6 +194,15 @@ def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.
         "whole.h5",
         "out.csv",
     }
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are text")
+def test_names_that_are_no_text_are_printed_as_they_are(recording: Path) -> None:
+    target = b"\xff.npz"
+    command = [sys.executable, "-m", "vid2ev", "reformat", "--overwrite", recording, target]
+    strict = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}  # (as where people's language is set)
+    done = subprocess.run(command, capture_output=True, env=strict, check=True)
+    assert target in done.stdout and Path(os.fsdecode(target)).exists()
 
 
 def test_every_format_that_is_read_can_be_named() -> None:

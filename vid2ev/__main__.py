@@ -1,5 +1,6 @@
 """`vid2ev` and `python -m vid2ev`: the command line."""
 
+import io
 import sys
 
 from vid2ev import commands
@@ -7,6 +8,8 @@ from vid2ev import commands
 
 def main() -> None:
     """The command line; ends with SystemExit."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape")  # (names of files may be any bytes, and are printed as these)
     try:
         commands.main()
     except SystemExit as ended:
