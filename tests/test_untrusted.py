@@ -28,7 +28,7 @@ from vid2ev.light.recognise import head_of
 from vid2ev.recording.exposures import read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.recording.pose_text import read_poses
-from vid2ev.recording.truth_files import read_depth, read_flow, read_mask
+from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, write_flow
 from vid2ev.rig.calibration import read_calibration
 from vid2ev.rig.depth import DepthScale
 from vid2ev.rig.depth_files import DepthFiles
@@ -185,16 +185,49 @@ def test_a_png_takes_no_room_for_what_it_has_not(tmp_path: Path) -> None:
                 reads(place)
 
 
-@pytest.mark.parametrize(
-    "read", [head_of, read_arrays, recognise, read_text, read_rig, read_poses, read_timestamps, _listed]
-)
-def test_a_pipe_is_said_to_be_one_and_not_waited_for(read: Callable[[Path], object], tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    pipe = os.open(tmp_path / "pipe", os.O_RDWR)
+READERS: dict[str, Callable[[Path], object]] = {
+    "pipe": head_of,
+    "pipe.npz": read_arrays,
+    "events": recognise,
+    "text": read_text,
+    "rig.toml": read_rig,
+    "poses.txt": read_poses,
+    "timestamps.txt": read_timestamps,
+    "timestamps.npy": read_timestamp_array,
+    "list.txt": _listed,
+    "path.csv": lambda path: parse_motion(str(path)),
+    "depth.npy": read_depth,
+    "depth.exr": read_depth,
+    "flow.flo": read_flow,
+    "flow.npz": read_flow,
+    "mask.png": read_mask,
+    "bag.db3": lambda path: open_events(bag_of(path)),
+    "bag.db3.zstd": lambda path: open_events(bag_of(path)),
+}
+
+
+def bag_of(part: Path) -> Path:
+    """A folder that says that it is a bag of ROS 2, and has this part."""
+    (part.parent / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths: [{part.name}]\n")
+    return part.parent
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_is_said_to_be_one_and_not_waited_for(name: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / name)
+    pipe = os.open(tmp_path / name, os.O_RDWR)
     os.write(pipe, bytes(1 << 15))  # (so that whoever reads it all the same does not wait either)
-    with pytest.raises(DataError, match="pipe: a pipe, expected a file"):
-        read(tmp_path / "pipe")
+    with pytest.raises(DataError, match=f"{name}: a pipe, expected a file"):
+        READERS[name](tmp_path / name)
     os.close(pipe)
+
+
+def test_flow_takes_no_more_memory_than_a_file_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_flow(tmp_path / "a.flo", np.zeros((300, 500, 2), np.float32))
+    assert read_flow(tmp_path / "a.flo").shape == (300, 500, 2)
+    monkeypatch.setenv(LARGEST, "1")
+    with pytest.raises(DataError, match="would take 2 MB of memory, and 1 are allowed"):
+        read_flow(tmp_path / "a.flo")
 
 
 def test_yaml_that_says_a_list_a_thousand_times_is_no_calibration(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import DataError
-from vid2ev.untrusted import check_bytes, check_depth, read_text
+from vid2ev.untrusted import check_bytes, check_depth, check_file, read_text
 
 PART = 1 << 20  # bytes unpacked at a time
 LIKELY = 100  # times smaller than what is in them files of events never are
@@ -24,6 +24,8 @@ def check_bag(metadata: Path) -> None:
     except UnicodeDecodeError as error:
         raise DataError(f"{metadata} is no UTF-8 text; get another copy") from error
     check_depth(metadata, text)
+    for part in metadata.parent.iterdir():
+        check_file(part)
     for packed in metadata.parent.glob("*.zstd"):  # (those are unpacked to a temporary folder, as a whole)
         _check_packed(packed)
 

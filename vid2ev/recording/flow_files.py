@@ -31,6 +31,7 @@ from vid2ev.recording.truth_arrays import (
     stated_number,
     write_png,
 )
+from vid2ev.untrusted import check_bytes
 
 FLO, FLO_UNKNOWN, FLO_LARGEST = b"PIEH", 1e10, 1e9  # Middlebury: what is above 1e9 is not known
 ZERO = 1 << 15  # the code of no motion
@@ -80,6 +81,7 @@ def _write_flo(path: Path, flow: np.ndarray) -> None:
 
 def _read_flo(path: Path) -> np.ndarray:
     with reading(path):
+        check_bytes(path, path.stat().st_size)
         content = path.read_bytes()
     width, height = np.frombuffer(content[4:12].ljust(8, b"\0"), "<i4").tolist()
     if not content.startswith(FLO) or width < 1 or height < 1 or len(content) != 12 + 8 * width * height:

@@ -18,7 +18,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.picture_files import decoded
 from vid2ev.recording.disk import whole_file
-from vid2ev.untrusted import read_arrays, read_text
+from vid2ev.untrusted import check_file, read_arrays, read_text
 
 NUMBERS = {"depth.txt": ("m_per_code", 0.001), "flow.txt": ("codes_per_px", 128)}  # what each states, as an example
 SMALLEST, LARGEST = 1e-9, 1e9
@@ -111,6 +111,7 @@ def stated_number(path: Path, name: str) -> float:
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Whatever goes wrong with a file within becomes one sentence: UsageError if it is not there, else DataError."""
+    check_file(path)
     try:
         yield
     except (DataError, UsageError):

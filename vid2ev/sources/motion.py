@@ -32,6 +32,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.requests import number_of
 from vid2ev.sources.times import LONGEST_NS
+from vid2ev.untrusted import read_lines
 
 SAMPLES = 4001
 
@@ -190,16 +191,11 @@ def parse_motion(text: str) -> Motion:
 
 def _rows(path: Path) -> list[list[float]]:
     """Rows t, x, y, angle, zoom of a file, with or without a line of names."""
+    text = read_lines(path, f"{', '.join(MOTIONS)} or a file of rows t,x,y[,angle][,zoom]")
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            lines = [[word.strip() for word in row] for row in csv.reader(file) if row and not row[0].startswith("#")]
-    except FileNotFoundError as error:
-        raise UsageError(
-            f"motion '{path}': no such file; give {', '.join(MOTIONS)} or a file t,x,y[,angle][,zoom]"
-        ) from error
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise DataError(f"{path}: cannot be read as CSV ({why}); expected rows of t,x,y[,angle][,zoom]") from error
+        lines = [[word.strip() for word in row] for row in csv.reader(text) if row and not row[0].startswith("#")]
+    except csv.Error as error:
+        raise DataError(f"{path}: cannot be read as CSV ({error}); expected rows of t,x,y[,angle][,zoom]") from error
     if not lines:
         raise DataError(f"{path}: no rows; expected rows of t,x,y[,angle][,zoom]")
     names = ["t", "x", "y", "angle", "zoom"][: max(map(len, lines))]

@@ -29,7 +29,7 @@ from typing import TypeVar
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.untrusted import first_line, read_array, read_lines
+from vid2ev.untrusted import check_file, first_line, read_array, read_lines
 
 NS_PER_UNIT = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 UNIT_LINE = r"\s*#\s*(?:unit\s*[:=]\s*(\w+)|(s|ms|us|ns)|start_(s|ms|us|ns)[\s,]+end_\3)\s*$"
@@ -220,6 +220,7 @@ def _number(word: str) -> Fraction:
 
 def read_timestamp_array(path: Path) -> tuple[list[Fraction], str]:
     """Stamps [s] of a one-dimensional .npy: floating point is seconds, whole numbers by their spacing (rule above)."""
+    check_file(path)
     try:
         with open(path, "rb") as file:
             stamps = read_array(file, path)
