@@ -310,6 +310,17 @@ def test_a_recording_tells_its_frames_whatever_format_its_events_have(kind: str)
         )
 
 
+def test_frames_of_one_microsecond_are_one_picture() -> None:
+    clip = "synthetic:moving-edge,size=32x24,fps=2e6,duration_s=2e-5,speed=2e5"
+    for name in ("hdf5", "npz"):
+        convert(clip, name, sensor="ideal", formats=[name], preview=False, upsample="none")
+        render(name, "-o", f"{name}-pictures", "--by", "source", "--no-stamp")
+    one, other = (
+        {path.name: path.read_bytes() for path in Path(f"{name}-pictures").iterdir()} for name in ("hdf5", "npz")
+    )
+    assert one == other and len(one) > 9
+
+
 def test_an_index_of_frames_that_is_none_is_refused() -> None:
     write(scattered())
     file = reformat("events.h5", "events.csv")
@@ -317,6 +328,10 @@ def test_an_index_of_frames_that_is_none_is_refused() -> None:
     Path("events.h5").unlink()
     for text in (
         "t_us,events\n5,0\n5,1\n",
+        "t_us,events\n5,0\n4,0\n",
+        "t_us,events\n5,1\n6,0\n",
+        "t_us,events\n5\n6\n",
+        "t_us,events\n5,1,2\n6,1,2\n",
         "t,n\n0,0\n",
         "t_us,events\none,0\n",
         "",
