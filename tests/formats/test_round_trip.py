@@ -82,6 +82,24 @@ def test_what_is_read_and_written_again_is_the_same_file(tmp_path: Path, name: s
     assert written(kind, again, tmp_path / "again").read_bytes() == first
 
 
+@pytest.mark.parametrize("start_us", [-1, -(10**13) - 7, 1_700_000_000_123_456_789, 7 - 2**62, 2**62 - 10**6])
+@pytest.mark.parametrize("name", WRITABLE)
+def test_times_may_be_counted_from_any_instant(tmp_path: Path, name: str, start_us: int) -> None:
+    """Before that of 0, or in nanoseconds since 1970 that are taken for microseconds."""
+    kind, events = format_named(name), events_of(start_us + np.arange(0, 9000, 3), (40, 30))
+    if kind.clock_us:
+        with pytest.raises(UsageError, match=f"format {name} cannot hold times from"):
+            check_holds(kind, (40, 30), 9000, start_us)
+        return
+    path = written(kind, recording_of(events, (40, 30), start_us), tmp_path)
+    file = open_events(path)
+    assert_same(Events.concatenate(file.events()), events)
+    assert file.start_us == (start_us if "start" in kind.keeps else 0)
+    assert survey(file).start_us == (start_us if "start" in kind.keeps or start_us < 0 else events.t[0])
+    middle = events.select((events.t >= events.t[99]) & (events.t < events.t[-99]))
+    assert_same(Events.concatenate(read_events(path, int(events.t[99]), int(events.t[-99]))), middle)
+
+
 @pytest.mark.parametrize("name", WRITABLE)
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())

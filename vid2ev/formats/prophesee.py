@@ -71,8 +71,8 @@ class Header(NamedTuple):
     @property
     def start_us(self) -> int | None:
         """The instant from which times count, if it is there."""
-        found = _number(r"(-?\d{1,18})", self.fields.get("start_us", self.fields.get("t0", "")))
-        return None if found is None else int(found)
+        found = _number(r"(?<!\d)(-?\d{1,19})(?!\d)", self.fields.get("start_us", self.fields.get("t0", "")))
+        return int(found) if found is not None and abs(int(found)) < 1 << 62 else None
 
 
 def read_header(head: bytes) -> Header | None:
