@@ -222,6 +222,15 @@ def test_a_pipe_is_said_to_be_one_and_not_waited_for(name: str, tmp_path: Path) 
     os.close(pipe)
 
 
+OSERROR = ("pipe", "pipe.npz", "text", "rig.toml", "bag.db3", "bag.db3.zstd")  # (which others make a sentence of)
+
+
+@pytest.mark.parametrize("name", [name for name in READERS if name not in OSERROR])
+def test_a_name_that_no_file_can_have_is_a_sentence(name: str, tmp_path: Path) -> None:
+    with pytest.raises((DataError, UsageError), match=name[-4:]):
+        READERS[name](tmp_path / f"{300 * 'x'}{name}")
+
+
 def test_flow_takes_no_more_memory_than_a_file_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_flow(tmp_path / "a.flo", np.zeros((300, 500, 2), np.float32))
     assert read_flow(tmp_path / "a.flo").shape == (300, 500, 2)

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import re
+import stat
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator
@@ -56,7 +57,11 @@ def limit_for(count: int) -> str:
 
 def check_file(path: Path) -> None:
     """Raise DataError for a pipe: whoever opens it waits for somebody to write, and what is read of it is gone."""
-    if path.is_fifo():
+    try:
+        pipe = stat.S_ISFIFO(os.stat(path).st_mode)
+    except (OSError, ValueError):  # (whoever opens it says what is wrong)
+        return
+    if pipe:
         raise DataError(f"{path}: a pipe, expected a file; write to a file what comes out of it, and give that")
 
 
@@ -79,7 +84,7 @@ def read_lines(path: Path, expected: str) -> list[str]:
     file may put into memory, what cannot be read.
     """
     check_file(path)
-    check_bytes(path, path.stat().st_size if path.is_file() else 0)
+    check_bytes(path, os.path.getsize(path) if os.path.isfile(path) else 0)  # (Path's raise OSError for long names)
     try:
         return path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError as error:

@@ -9,6 +9,7 @@ A new format is a module with a `FORMAT` and a line in `FORMATS`.
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -259,7 +260,7 @@ def _cameras(folder: Path) -> list[Path]:
 
 def _opened(path: str | Path) -> tuple[Format, EventFile]:
     path = Path(path)
-    path = _within(path) if path.is_dir() else path
+    path = _within(path) if os.path.isdir(path) else path  # (Path.is_dir raises OSError for a name that is too long)
     kind = recognise(path)
     if kind is None or kind.open is None:
         refuse_mat(path)

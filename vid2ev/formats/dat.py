@@ -5,9 +5,9 @@
     time       uint32, little-endian [us] since start_us
     address    uint32: column [13:0], row [27:14], polarity [28]
 
-32 bits of microseconds are 71.6 minutes.  What is longer goes on in more files, NAME_1.dat, NAME_2.dat, ..., each
-with its own start_us, a line that says which of how many it is, and one with the number of events and the length of
-them all, by which parts of other recordings are known; each can be read alone, and the first is read with those that
+32 bits of microseconds are 71.6 minutes.  What is longer goes on in more files, NAME_1.dat to NAME_9998.dat at most,
+each with its own start_us, a line that says which of how many it is, and one with the number of events and the length
+of them all, by which parts of other recordings are known; each can be read alone, and the first is read with those that
 follow.  Times that start anew within one file are followed, too.  Version 1, where the address is column [8:0], row
 [16:9], polarity [17], is read.  Source: https://docs.prophesee.ai/stable/data/file_formats/dat.html
 """
