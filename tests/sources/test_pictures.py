@@ -54,6 +54,29 @@ def test_exif_turns_a_picture_as_viewers_do(tmp_path: Path, orientation: int, su
 # ---------------------------------------------------------------------------------------------------------- kinds
 
 
+def pnm(kind: str, most: int, values: np.ndarray) -> bytes:
+    """A PNM of values [H, W] or [H, W, 3] of which `most` is white."""
+    head = f"{kind}\n# of a test\n{values.shape[1]} {values.shape[0]}\n{most}\n".encode()
+    if kind in ("P2", "P3"):
+        return head + " ".join(map(str, values.ravel().tolist())).encode() + b"\n"
+    return head + values.astype(">u2" if most > 255 else "u1").tobytes()
+
+
+@pytest.mark.parametrize("most", [1, 15, 127, 255, 511, 1023, 4095, 65535])
+@pytest.mark.parametrize("kind", ["P2", "P3", "P5", "P6"])
+def test_white_of_a_pnm_is_what_its_header_says(tmp_path: Path, kind: str, most: int) -> None:
+    """FFmpeg writes 10 bits into 16, and that 1023 is white."""
+    values = np.linspace(0, most, 24).astype(int).reshape((2, 4, 3) if kind in ("P3", "P6") else (4, 6))
+    for k in range(2):
+        (tmp_path / f"{k}.{'ppm' if values.ndim == 3 else 'pgm'}").write_bytes(pnm(kind, most, values))
+    for transfer in ("linear", f"linear:{most.bit_length()}bit") if kind in ("P5", "P6") or most > 255 else ("linear",):
+        source = open_source(tmp_path, fps=1, colour="rgb", transfer=transfer)
+        first, _ = source.frames()
+        expected = values / most if values.ndim == 3 else np.repeat(values[..., None] / most, 3, axis=2)
+        np.testing.assert_allclose(first.light, expected, atol=2 / 255 if kind in ("P2", "P3") and most < 256 else 1e-6)
+        assert source.warnings == []
+
+
 @pytest.mark.parametrize("mode", ["L", "LA", "P", "1", "RGB", "RGBA"])
 def test_png_of_every_mode(tmp_path: Path, mode: str) -> None:
     picture = Image.fromarray(codes((6, 8, 3))).convert(mode)

@@ -5,11 +5,12 @@ the package OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`)
 with several parts or layers the first with colour counts: R, G, B or else Y.  Its data window is set into its display
 window, black around, and its chromaticities hold.
 
-Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
+Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112; netpbm, "PNM".
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,8 @@ from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
+PNM_OF_BYTES = (b"P5", b"P6")
+PNM = (b"P2", b"P3", *PNM_OF_BYTES)
 
 
 class Picture(NamedTuple):
@@ -62,6 +65,17 @@ def remarks_on_tags(path: Path, pixels: np.ndarray) -> list[str]:
     if pixels.dtype.kind == "f":
         return []
     return remarks_on_png(path) if head_of(path).startswith(PNG) else remarks_on_profile(path, profile_name(path))
+
+
+def bits_in(path: Path) -> int | None:
+    """Of how many bits the codes of a PNM are, by its header, where they do not fill those that hold them: of 10 in
+    16, as FFmpeg writes them.  None for all others, and where OpenCV has scaled them."""
+    head = head_of(path)
+    words = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
+    most = int(words[3]) if head.startswith(PNM) and len(words) > 3 and words[3].isdigit() else 0
+    bits, held = most.bit_length(), 16 if most > 255 else 8
+    as_stored = held == 16 or head.startswith(PNM_OF_BYTES)
+    return bits if 0 < bits < held and most == 2**bits - 1 and as_stored else None
 
 
 class PageReader:

@@ -5,7 +5,8 @@ Radiance HDR.  The content decides, not the name.  Times come from `timestamps.t
 rule for its unit; HS-ERGB and BS-ERGB call it `timestamp.txt`), for `stack.tif` from `stack_timestamps.npy` or `.txt`
 beside it, or from fps: one after the other then, whatever their numbers, with a remark where numbers are missing.
 Codes are sRGB, 16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose
-folder it is, or the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs.
+folder it is, or the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs,
+and so does the first PNM.
 Floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
 """
 
@@ -22,7 +23,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import recognise
-from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
+from vid2ev.light.picture_files import PageReader, Picture, bits_in, pages_of, read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader, bits_of
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
@@ -92,7 +93,7 @@ class Images:
             self.warnings += [] if curve else remarks_on_tags(self._places[0][0], first)
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
-        self._reader = PictureReader(transfer, colour, bits)
+        self._reader = PictureReader(transfer, colour, bits or bits_in(self._places[0][0]))
         self.warnings += self._reader.remarks_on(first)
         self._dtype = first.dtype
 
