@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vid2ev.rig.bands import Bands
 from vid2ev.rig.intrinsics import Intrinsics
-from vid2ev.rig.surface import _patches_of, corners_of, surface_of
+from vid2ev.rig.pose import Pose
+from vid2ev.rig.surface import _patches_of, corners_of, seen_of, surface_of
 
 SOURCE = Intrinsics.of_field((24, 16), 60)
 
@@ -72,3 +74,16 @@ def test_a_cut_is_near_to_the_two_pixels_on_either_side(across: bool) -> None:
     expected = np.zeros((20, 20), np.bool_)
     expected[:, 10:14] = True
     np.testing.assert_array_equal(found if across else found.T, expected)
+
+
+@pytest.mark.parametrize("turn_deg", range(0, 360, 15))
+def test_where_a_lens_ends_rows_are_the_same_whatever_bands_they_are_drawn_in(turn_deg: int) -> None:
+    """A quad with a corner that the lens does not see may have a triangle that it does."""
+    source = Intrinsics.of_field((24, 16), 100)
+    surface = surface_of(np.full((16, 24), 0.5, np.float32), corners_of(source), source)
+    camera = Intrinsics(
+        size=(40, 40), focal_px=(25.0, 25.0), centre_px=(19.5, 19.5), model="radtan", distortion=(-0.35, 0.02, 0, 0)
+    )
+    pose = Pose.of((0, 0, turn_deg), (0.05, 0, 0))
+    for one, other in zip(*(seen_of(surface, camera, pose, Bands(count)) for count in (1, 40)), strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -38,10 +38,11 @@ def draw_quads(begin, end, u, v, q, w, columns, rows, cut, gap, x, y, inverse):
         if not _on_rows(v[j], v[j + 1], first_row, last_row):
             continue
         for i in range(width):
-            top = min(min(v[j, i], v[j, i + 1]), min(v[j + 1, i], v[j + 1, i + 1]))
-            bottom = max(max(v[j, i], v[j, i + 1]), max(v[j + 1, i], v[j + 1, i + 1]))
-            left = min(min(u[j, i], u[j, i + 1]), min(u[j + 1, i], u[j + 1, i + 1]))
-            right = max(max(u[j, i], u[j, i + 1]), max(u[j + 1, i], u[j + 1, i + 1]))
+            # (from the corner that both triangles have: what is NaN after it changes nothing)
+            top = min(min(min(v[j, i], v[j, i + 1]), v[j + 1, i]), v[j + 1, i + 1])
+            bottom = max(max(max(v[j, i], v[j, i + 1]), v[j + 1, i]), v[j + 1, i + 1])
+            left = min(min(min(u[j, i], u[j, i + 1]), u[j + 1, i]), u[j + 1, i + 1])
+            right = max(max(max(u[j, i], u[j, i + 1]), u[j + 1, i]), u[j + 1, i + 1])
             if bottom < first_row or top > last_row or right < _ZERO or left > far_right:
                 continue
             if cut[j, i] and max(right - left, bottom - top) > gap + _ONE:
@@ -103,8 +104,9 @@ def _draw(u, v, q, w, columns, rows, begin, end, x, y, inverse):
 
 @cached
 def _on_rows(above, below, first, last):
-    """Whether any of the corners of two rows, or a side between them, may be on the rows first ... last."""
+    """Whether any of the corners of two rows, or a side between them, may be on the rows first ... last; NaN is on
+    none."""
     low, high = F(np.inf), F(-np.inf)
     for i in range(above.size):
-        low, high = min(low, min(above[i], below[i])), max(high, max(above[i], below[i]))
-    return not (low > last or high < first)  # (true of NaN, too)
+        low, high = min(min(low, above[i]), below[i]), max(max(high, above[i]), below[i])
+    return not (low > last or high < first)
