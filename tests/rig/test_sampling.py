@@ -14,6 +14,7 @@ from vid2ev.rig.lens import pixel_grid
 from vid2ev.rig.sampling import pixel_means, sampled
 from vid2ev.rig.spline import Spline
 from vid2ev.rig.surface import corners_of, surface_of
+from vid2ev.upsample.mended import mended
 
 ONE = Bands(1)
 
@@ -66,6 +67,16 @@ def test_light_that_is_no_number_stays_where_it_is() -> None:
     x, y = np.moveaxis(pixel_grid((30, 30)) + 0.3, -1, 0)
     found = at(light, x, y)[..., 0]
     assert np.isfinite(found).all() and (found[8:12] == 0.5).all() and found[15, 15] > 1000
+
+
+@pytest.mark.parametrize("huge", [1e15, 1e30, 1e38, 3.4e38])
+def test_light_that_no_scene_has_is_infinite_light(huge: float) -> None:
+    light = np.random.default_rng(7).random((20, 30, 3), np.float32)
+    light[5, 5], light[9, 20, 1], light[15, 8] = np.inf, np.inf, -np.inf
+    x, y = np.moveaxis(pixel_grid((30, 20)) + 0.3, -1, 0)
+    expected = at(light, x, y)
+    assert (at(np.where(np.isinf(light), np.sign(light) * np.float32(huge), light), x, y) == expected).all()
+    assert (at(mended(light), x, y) == expected).all()  # (as it is in frames between others)
 
 
 def test_light_moves_smoothly() -> None:

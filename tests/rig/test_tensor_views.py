@@ -17,7 +17,7 @@ from vid2ev.rig.bands import Bands
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.rig.sampling import sampled
-from vid2ev.rig.spline import BRIGHTEST, MARGIN, Spline
+from vid2ev.rig.spline import BRIGHTEST, INFINITE, MARGIN, Spline
 from vid2ev.rig.tensor_spline import TensorSpline, spline_of
 from vid2ev.rig.tensor_views import TensorLook
 from vid2ev.rig.views import Views
@@ -34,7 +34,8 @@ ULPS = 14
 
 
 def range_of(light: np.ndarray) -> float:
-    mended = np.nan_to_num(light, nan=0.0, posinf=BRIGHTEST, neginf=-BRIGHTEST)
+    known = np.nan_to_num(light, nan=0.0)
+    mended = np.where(np.abs(known) < INFINITE, known, np.sign(known) * BRIGHTEST)
     return float(mended.max() - mended.min())
 
 
@@ -55,7 +56,7 @@ def lights(draw: st.DrawFn) -> np.ndarray:
         "octaves": np.exp(rng.normal(0, 3, shape)) - 0.1,
     }[draw(st.sampled_from(["noise", "squares", "octaves"]))].astype(np.float32)
     if draw(st.booleans()):
-        light[rng.random(shape) < 0.01] = draw(st.sampled_from([np.nan, np.inf, -np.inf]))
+        light[rng.random(shape) < 0.01] = draw(st.sampled_from([np.nan, np.inf, -np.inf, 1e30, -3e38]))
     return light
 
 

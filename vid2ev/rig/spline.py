@@ -12,7 +12,8 @@ that range by half of it, as a peak between pixels does, and not go below low / 
 rings far from a lamp, nor goes below zero beside it, and flat light stays exactly flat.
 
 Light that is not a number counts as black, infinite light as 65504, the brightest of half floats: one such pixel would
-otherwise be all over its row and column.
+otherwise be all over its row and column.  So does light from `INFINITE` on, which no scene has: it is what frames in
+between have in the place of infinite light, and the sums of more would not be finite.
 
 Source: M. Unser, "Splines: a perfect fit for signal and image processing", IEEE Signal Processing Magazine 16(6), 1999
 (the filter: box 2).
@@ -31,6 +32,7 @@ from vid2ev.rig.bands import Bands
 F = np.float32
 POLE = F(math.sqrt(3) - 2)
 HORIZON = 16  # pixels after which the filter has forgotten: |POLE| ** 16 < 1e-9
+INFINITE = 1e15  # light; that of infinite pixels is 1e30 in frames that are made between others
 MARGIN = 2  # px around the weights, so that sampling needs no conditions
 _QUARTER, _HALF, _ONE, _SIX, _ZERO = F(0.25), F(0.5), F(1), F(6), F(0)
 
@@ -76,12 +78,12 @@ class Spline:
 @cached
 def _planes(begin, end, light, pixels):
     """Colour by colour, and each a number."""
-    brightest = F(BRIGHTEST)
+    brightest, infinite = F(BRIGHTEST), F(INFINITE)
     for c in range(light.shape[2]):
         for j in range(begin, end):
             for i in range(light.shape[1]):
                 value = light[j, i, c]
-                if np.isfinite(value):
+                if abs(value) < infinite:
                     pixels[c, j, i] = value
                 else:
                     pixels[c, j, i] = brightest if value > _ZERO else -brightest if value < _ZERO else _ZERO

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from vid2ev.rig.spline import BRIGHTEST, HORIZON, MARGIN, POLE
+from vid2ev.rig.spline import BRIGHTEST, HORIZON, INFINITE, MARGIN, POLE
 
 DOUBLINGS = tuple(2**k for k in range(HORIZON.bit_length() - 1))
 REACH = HORIZON - 1 + MARGIN  # pixels beyond the border that the filter looks at
@@ -32,7 +32,8 @@ def spline_of(light: Any) -> TensorSpline:
     import torch
 
     planes = light.reshape(*light.shape[:2], -1).movedim(-1, 0).to(torch.float32)
-    pixels = torch.nan_to_num(planes, nan=0.0, posinf=BRIGHTEST, neginf=-BRIGHTEST).contiguous()
+    known = planes.nan_to_num(nan=0.0)
+    pixels = known.where(known.abs() < INFINITE, known.sign() * BRIGHTEST).contiguous()
     gain = (6.0 * float(POLE)) ** 2  # of both axes
     weights = _filtered(_filtered(gain * pixels, 1), 2)
     high, low = (sign * torch.nn.functional.max_pool2d(sign * pixels, 3, 1, 1) for sign in (1.0, -1.0))
