@@ -143,6 +143,8 @@ def test_a_picture_is_the_densest_slice() -> None:
     write(Events.concatenate([events_of([0, 100_000], 20, 20, 1), busy, events_of([900_000], 21, 21, 1)]))
     made = render("events.h5", "-o", "a.png", "--by", "duration:100ms")
     assert (made["events"], made["start_us"], made["duration_us"], made["frames"]) == (100, 300_000, 100_000, 1)
+    slower = render("events.h5", "-o", "b.png", "--speed", "3", "--start", "0", "--stop", "0.8")  # (3 / 30 s)
+    assert [slower[key] for key in ("events", "start_us", "duration_us")] == [100, 300_000, 100_000]
     assert sorted(lit(picture("a.png"), 40)) == sorted((k % 32, k // 32) for k in range(100))
 
 
@@ -187,6 +189,9 @@ def test_folders_of_recordings_and_defaults() -> None:
     assert "polarity by duration:33.3333ms" in shown.stdout
     shown = CliRunner().invoke(command, ["clip_events", "-o", "c.png", "--by", "duration:20ms"], catch_exceptions=False)
     assert "polarity by duration:20000us" in shown.stdout
+    exact = ["--speed", "0.12345678901234567"]  # (more digits than --by takes)
+    shown = CliRunner().invoke(command, ["clip_events", "-o", "d.png", *exact], catch_exceptions=False)
+    assert "polarity by duration:4.11523ms" in shown.stdout
     assert CliRunner().invoke(command, ["clip_events", "-o", "b.png", "-q"], catch_exceptions=False).stdout == ""
 
 

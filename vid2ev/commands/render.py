@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ def render(events: str, output: Path | None, as_json: bool, quiet: bool, **optio
     """Make a film (.mp4), a picture (.png) or a folder of pictures of EVENTS: an event file, or a recording's folder.
 
     Every event is shown once.  ON is amber, OFF is blue.  A film has a picture for each slice; FILE.png is a picture of
-    all events from --start to --stop, or, with --by or without a window, of the slice with the most events.
+    all events from --start to --stop, or, with --by, --speed or without a window, of the slice with the most events.
     """
     from vid2ev.commands.progress import event_bar
     from vid2ev.terminal import lines
@@ -91,12 +92,9 @@ def _default(events: str) -> Path:
 
 def _of_people(by: str) -> str:
     """How it was sliced, in milliseconds where that is no whole number of microseconds."""
-    from vid2ev.views.requests import parse_slicing
-    from vid2ev.views.slices import Duration
-
-    slicing = parse_slicing(by)
-    if isinstance(slicing, Duration) and slicing.us.denominator > 1:
-        return f"duration:{float(slicing.us) / 1000:.6g}ms"
+    kind, _, us = by.partition(":")
+    if kind == "duration" and "/" in us:
+        return f"duration:{float(Fraction(us.removesuffix('us'))) / 1000:.6g}ms"
     return by
 
 

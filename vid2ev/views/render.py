@@ -81,7 +81,7 @@ def render(
     recording = _recording(file, zero_us, start_s, stop_s, bool(frames), frame_us)
     if isinstance(slicing, Source):
         recording = with_frame_times(recording)
-    if made_as == "png" and by is None and (start_s, stop_s) != (None, None):
+    if made_as == "png" and by is None and speed is None and (start_s, stop_s) != (None, None):
         slicing = Duration(Fraction(max(1, recording.duration_us)))
     shown = recording.frames() if recording.frames and frames is not False else None
     fine = not isinstance(slicing, Source) and not (isinstance(slicing, Duration) and slicing.us >= 1000)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vid2ev.views.representation import Kind
 
 NUMBER = r"[0-9]{1,15}/[0-9]{1,15}|(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})(?:[eE][+-]?[0-9]{1,2})?"
+LONGEST_US = 10**15  # thirty years: the end of a slice, which may be beyond that of its recording, is within 64 bits
 UNITS_US = {"us": 1, "ms": 1000, "s": 10**6, "": 10**6}
 SLICINGS = "duration:10ms, count:50000, area:500,32 or source"
 REPRESENTATIONS = "counts, frame:2, voxel:5, time-surface:30ms or sae"
@@ -30,6 +31,8 @@ def parse_slicing(text: str) -> Slicing:
         us = parse_us(rest, f"slices '{text}'")
         if us < 1:
             raise UsageError(f"slices '{text}': times are in whole microseconds; choose at least duration:1us")
+        if us > LONGEST_US:
+            raise UsageError(f"slices '{text}': longer than anything is recorded; choose at most duration:1e9s")
         return Duration(us)
     if name == "count":
         return Count(_whole(rest, f"slices '{text}'", "a number of events", "count:50000"))
