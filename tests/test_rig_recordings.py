@@ -489,6 +489,21 @@ def test_codes_of_a_sensor_are_not_taken_for_pictures(tmp_path: Path) -> None:
             next(read_events(folder))
 
 
+def test_the_folder_that_one_is_in_is_what_its_own_name_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    convert(CLIP, tmp_path / "out", "ideal", ["cis.gamma=2.2"], rig=rig(), pictures="raw,png", **OPTIONS)
+    for kind in ("frames", "raw"):
+        folder = tmp_path / "out" / "aps" / kind
+        named = open_source(folder)
+        monkeypatch.chdir(folder)
+        here = open_source(".")
+        assert here.describe() | {"path": ""} == named.describe() | {"path": ""}
+        assert here.taken_by == named.taken_by is not None
+        assert Recipe.of(".", transfer="linear").describe() == Recipe.of(folder, transfer="linear").describe()
+    with pytest.raises(UsageError, match="codes of a sensor's ADC"):
+        convert(".", tmp_path / "again", **OPTIONS)
+    assert "codes     of a sensor's ADC" in CliRunner().invoke(main, ["info", "."]).stdout
+
+
 def test_codes_and_pictures_of_a_frame_camera_are_read_by_its_curve(tmp_path: Path) -> None:
     """Codes of an ADC are linear; those of 8 bits are as `gamma` says, and the light is what it was."""
     for gamma in ("srgb", "2.2"):

@@ -41,9 +41,10 @@ def _beside(folder: Path) -> Any:
 def _of_recording(folder: Path) -> Any:
     """What DIR/manifest.json says of the camera of DIR/CAMERA/frames, or raw.  Raises LookupError where it was guessed
     how wide the video sees, around which the cameras were."""
-    taker = folder.absolute().parent
+    folder = folder.absolute()  # (one may be in it)
     if folder.name not in (KINDS["raw"], KINDS["png"]):
         raise LookupError
+    taker = folder.parent
     rig = json_of(read_text(taker.parent / "manifest.json"))["rig"]
     known = [] if rig["source"]["assumed"] else rig["cameras"]
     return {camera["name"]: camera["intrinsics"] for camera in known}[taker.name]

@@ -231,7 +231,8 @@ class Recipe:
     def _shared(self) -> dict[str, Any]:
         """What is the same for all cameras."""
         path = Path(self.video)
-        known_by = {"path": path.name, **identity(path)} if os.path.exists(path) else {"path": self.video}
+        name = os.path.basename(os.path.abspath(path))  # (one may be in the folder that it is)
+        known_by = {"path": name, **identity(path)} if os.path.exists(path) else {"path": self.video}
         upsampling = {"method": self.upsample, "subframes": self.subframes, "max_subframes": self.max_subframes}
         upsampling |= getattr(self.upsampler(), "about", {})
         truth = {"truth": asdict(self.truth)} if self.truth else {}
@@ -264,7 +265,8 @@ def plain(facts: dict[str, Any]) -> dict[str, Any]:
 
 def holds_adc_codes(path: Path) -> bool:
     """Whether it is the folder of a frame camera's codes."""
-    return path.name == RAW and (path.parent / "manifest.json").is_file()
+    folder = path.absolute()  # (one may be in it)
+    return folder.name == RAW and (folder.parent / "manifest.json").is_file()
 
 
 def refuse_recordings(path: Path, transfer: str = "auto") -> None:

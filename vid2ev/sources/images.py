@@ -87,7 +87,7 @@ class Images:
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
-        curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path)
+        curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path.absolute())
         self._tagged = transfer == "auto" and curve is None, tagged
         if transfer == "auto":
             self.warnings += [] if curve else remarks_on_tags(self._places[0][0], first)
