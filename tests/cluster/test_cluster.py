@@ -129,6 +129,8 @@ def test_what_cannot_be_meant_is_said_in_words(monkeypatch: pytest.MonkeyPatch) 
         pass
     with pytest.raises(UsageError, match="--memory 4: expected a size such as 4GiB, at least 128MiB"):
         Workers(2, memory="4")
+    with pytest.raises(UsageError, match="--memory 1e400GB: expected a size such as 4GiB"):
+        Workers(2, memory="1e400GB")
     with pytest.raises(UsageError, match="expected an address such as"), Workers(scheduler="nowhere").client():
         pass
     monkeypatch.setattr(workers_module, "REACHED_S", 1)

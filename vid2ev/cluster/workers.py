@@ -111,7 +111,7 @@ def _bytes_of(memory: str) -> int:
 
     try:
         found = parse_bytes(memory)
-    except ValueError:
+    except (ValueError, OverflowError):
         found = 0
     if found < LEAST_BYTES:
         raise UsageError(f"--memory {memory}: expected a size such as 4GiB, at least {LEAST_BYTES >> 20}MiB")

@@ -49,9 +49,8 @@ class Rate(FiniteRange):
             return super().convert(value, param, ctx)
         if not number_of(above) > 0 or not number_of(below) > 0:
             self.fail(f"'{value}': expected a number, or one over another, such as 30000/1001", param, ctx)
-        exact = Fraction(above) / Fraction(below)
-        super().convert(float(exact), param, ctx)
-        return exact
+        super().convert(number_of(above) / number_of(below), param, ctx)
+        return Fraction(above) / Fraction(below)
 
 
 SECONDS = FiniteRange(0, 1e9)  # of a recording
