@@ -16,6 +16,7 @@ from vid2ev.sensors.dvs import Dvs
 from vid2ev.stream.events import Events
 from vid2ev.views.grid import NetCounts, Windows
 
+EVER = np.iinfo(np.int64)
 SIZE, FRAMES = (61, 37), 40  # (two blocks of pixels; more frames than go through the walk at a time)
 SENSORS = {
     "paper": DvsSpec(),
@@ -139,6 +140,13 @@ def test_the_newest_event_is_the_newest_after_a_flash_of_many_decades() -> None:
     np.testing.assert_array_equal(grid.take().max(axis=(1, 2, 3)), ends)
 
 
+def test_all_of_time_can_be_one_interval() -> None:
+    counts = NetCounts(SIZE, [EVER.min, 0, EVER.max])
+    t = np.array([-5, 0, 1, EVER.max])
+    counts.add(Events(t, np.arange(4, dtype=np.uint16), np.zeros(4, np.uint16), np.array([1, 1, 1, 0], np.uint8)))
+    assert counts.take().sum(axis=(1, 2)).tolist() == [2, 0]
+
+
 def test_what_cannot_be_is_said() -> None:
     batch = DvsBatch([DvsSpec()] * 2, SIZE, [1, 2])
     light, t_ns = light_of(0, clips=2)
@@ -153,8 +161,9 @@ def test_what_cannot_be_is_said() -> None:
         batch.steps(light[::-1], t_ns[::-1])
     with pytest.raises(UsageError, match="expected a whole number of nanoseconds"):
         batch.steps(light, t_ns + 0.5)
-    with pytest.raises(UsageError, match="each after the one before"):
-        NetCounts(SIZE, [0, 5, 5])
+    for edges_us in ([0, 5, 5], [EVER.max, EVER.min]):
+        with pytest.raises(UsageError, match="each after the one before"):
+            NetCounts(SIZE, edges_us)
     with pytest.raises(UsageError, match="expected whole numbers of microseconds"):
         NetCounts(SIZE, [0.5, 1.5])
     with pytest.raises(UsageError, match="expected int8 or int16"):

@@ -98,7 +98,7 @@ class Windows:
 def edges_of(edges_us: Sequence[int] | np.ndarray) -> np.ndarray:
     """Edges of intervals, int64 [us]; raises UsageError for fewer than two, or such as do not ascend."""
     edges = _whole(edges_us)
-    if edges.ndim != 1 or len(edges) < 2 or (np.diff(edges) <= 0).any():
+    if edges.ndim != 1 or len(edges) < 2 or (edges[1:] <= edges[:-1]).any():
         raise UsageError(f"edges of shape {edges.shape}: expected two or more times [us], each after the one before")
     return edges
 
