@@ -12,6 +12,7 @@ import pytest
 from skimage import data
 
 from vid2ev import Dvs, convert, load_sensor, open_source, read_events
+from vid2ev.rig.camera import Camera, Rig
 from vid2ev.seen.instants import Instant, instants
 from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.events import Events
@@ -103,6 +104,9 @@ def test_a_recording_has_no_events_of_a_cut_and_lists_it(tmp_path: Path) -> None
     assert any("1 cut" in warning for warning in made["warnings"])
     beside = convert(film(tmp_path), tmp_path / "beside", frame_camera=True, **OPTIONS)["results"]
     assert [any("1 cut" in text for text in beside[camera]["warnings"]) for camera in ("dvs", "cis")] == [True, False]
+    late = Rig(cameras=(Camera(name="late", kind="dvs", clock_offset_us=7000),))
+    made = convert(film(tmp_path), tmp_path / "late", rig=late, **OPTIONS)["results"]["late"]
+    assert (made["start_us"], made["cuts_us"]) == (7000, [57_000])  # (all on the camera's own clock)
     kept = convert(film(tmp_path), tmp_path / "keep", cuts="keep", **OPTIONS)
     assert kept["cuts_us"] == [] and kept["counts"]["events"] > 10_000
     times = np.concatenate([events.t for events in read_events(tmp_path / "keep")])

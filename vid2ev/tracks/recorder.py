@@ -64,7 +64,7 @@ class Progress:
     events: int = 0  # of all cameras
     start_ns: int = 0  # the first frame
     end_ns: int = 0  # the last frame
-    cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots
+    cuts_us: list[int] = field(default_factory=list)  # the first frames of new shots, on the source's clock
     seconds: float = 0.0  # of work, in all runs
     looked: int = 0  # instants that the plans go by
     ended: bool = False  # and whether they are all
@@ -264,7 +264,7 @@ class Recorder:
             "start_us": start_us,
             "duration_us": duration_us,
             "counts": counts | track.counts(),
-            "cuts_us": done.cuts_us,
+            "cuts_us": [cut_us + self.recipe.mounts[number].clock_offset_us for cut_us in done.cuts_us],
             "warnings": done.warnings + _remarks(done, kind) + self._unseen(number) + track.remarks(),
         }
 
