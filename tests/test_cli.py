@@ -374,6 +374,10 @@ def test_nothing_is_made_that_is_called_as_standard_output(words: str) -> None:
     assert not Path("-").exists()
 
 
+def test_what_is_to_be_reformatted_is_not_said_to_be_made() -> None:
+    refused(2, "-: no such file; give an event file", "reformat", "-", "x.h5")
+
+
 def test_a_list_of_videos_is_one_to_all_commands() -> None:
     Path("list.txt").write_text("clip.mp4\n")
     refused(2, "a list of videos; give one of them", "info", "list.txt")

@@ -140,7 +140,8 @@ def refuse_nothing(words: list[str]) -> None:
 def refuse_standard_output(words: list[str]) -> None:
     """Raise UsageError where what is to be made is called `-`: it would be a file or folder of that name."""
     for before, word in pairwise(words):
-        if word in ("-o-", "--output=-") or (word == "-" and (before in ("-o", "--output") or words[0] == "reformat")):
+        out = before in ("-o", "--output") or (words[0] == "reformat" and before != "reformat")  # (whose first is IN)
+        if word in ("-o-", "--output=-") or (word == "-" and out):
             raise UsageError("-: files and folders are made, nothing goes to standard output; give a name")
 
 

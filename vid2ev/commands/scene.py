@@ -107,13 +107,14 @@ def _listing(titles: dict[str, str]) -> str:
 
 def _file(name: str, options: dict[str, Any]) -> SceneFile:
     """The scene file with its settings; what is wrong with it is said at once."""
+    from vid2ev.commands.progress import given
     from vid2ev.errors import UsageError
     from vid2ev.scenes.scene_file import plain_size, read_scene
     from vid2ev.scenes.source import parse_request
     from vid2ev.sources import SCENE_PREFIX
 
     request = parse_request(name.removeprefix(SCENE_PREFIX))  # (as `convert` takes it)
-    options["seed"] = options["seed"] or request.seed
+    options["seed"] = options["seed"] if "seed" in given() else request.seed
     settings = [*request.settings, *(plain_size(setting) for setting in options["settings"])]
     if options["size"]:
         settings.append(plain_size(f"size={options['size']}"))
