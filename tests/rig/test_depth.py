@@ -167,6 +167,8 @@ def test_a_map_of_nothing_that_is_known_is_refused(tmp_path: Path, depth: float)
         ("plane:1", {"scale": 0.0}, "scale 0"),
         ("plane:1", {"shift": np.nan}, "shift nan"),
         ("plane:1", {"kind": "disparity"}, "without a baseline"),
+        ("plane:1", {"focal_px": 900.0}, "focal_px 900 of depth: expected of disparity"),
+        ("plane:1", {"kind": "inverse", "baseline_m": 0.1}, "baseline_m 0.1 of depth: expected of disparity"),
         ("plane:1", {"kind": "distance"}, "possible are depth, disparity, inverse"),
         ("model:", {}, "without a name"),
     ],

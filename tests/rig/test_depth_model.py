@@ -75,6 +75,11 @@ def test_what_a_model_needs_is_said(folder: Path, tmp_path: Path, monkeypatch) -
     if folder.name == "relative":
         with pytest.raises(UsageError, match="give the scale in 1 / Z"):
             open_depth(f"model:{folder}", SOURCE)
+    own, other = ("inverse", "depth") if folder.name == "relative" else ("depth", "inverse")
+    assert open_depth(f"model:{folder}", SOURCE, scale=1, kind=own).scale.kind == own
+    for said in ({"kind": other}, {"kind": "disparity", "baseline_m": 0.1}, {"baseline_m": 0.1}):
+        with pytest.raises(UsageError, match=f"gives numbers of kind '{own}', not "):
+            open_depth(f"model:{folder}", SOURCE, scale=1, **said)
     (tmp_path / "config.json").write_text("{}")
     for name in (tmp_path, tmp_path / "nothing"):
         with pytest.raises(DataError, match="cannot be loaded") as caught:

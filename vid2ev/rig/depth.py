@@ -119,6 +119,9 @@ def open_depth(
     Raises UsageError for what cannot be meant, DataError for files and models that cannot be read.
     """
     given = DepthScale(kind or ("disparity" if baseline_m is not None else "depth"), scale, shift, focal_px, baseline_m)
+    for name, value in (("focal_px", focal_px), ("baseline_m", baseline_m)):
+        if value is not None and given.kind != "disparity":
+            raise UsageError(f"{name} {value:g} of depth: expected of disparity; leave it out, or set kind=disparity")
     meaning = replace(given, focal_px=focal_px or source.focal_px[0])
     if not str(text):  # (which a folder of depth would be: this one)
         raise UsageError("depth '': expected a map or a folder of maps, plane:METRES or model:NAME")
@@ -128,7 +131,7 @@ def open_depth(
     if name == "model":
         from vid2ev.rig.depth_model import ModelDepth
 
-        return ModelDepth(rest, source.size, meaning)
+        return ModelDepth(rest, source.size, meaning, given.kind if baseline_m is not None else kind)
     from vid2ev.rig.depth_files import DepthFiles
 
     return DepthFiles(Path(text), source.size, meaning)

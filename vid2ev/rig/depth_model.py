@@ -24,7 +24,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import parse_transfer
-from vid2ev.rig.depth import DepthScale
+from vid2ev.rig.depth import DepthScale, Kind
 from vid2ev.untrusted import first_line
 
 EXAMPLE = "depth-anything/Depth-Anything-V2-Small-hf"
@@ -35,14 +35,16 @@ PATIENCE_S = 10.0  # for the hub to say whether it has a model
 class ModelDepth:
     """Depth maps that a model makes of the frames.
 
-    Raises UsageError without the package, or without a scale where the model is relative; DataError for a model that
-    cannot be loaded.
+    kind    what its numbers were said to be, if that was said
+
+    Raises UsageError without the package, without a scale where the model is relative, or where its numbers are of
+    another kind; DataError for a model that cannot be loaded.
     """
 
     plane_m: float | None = None
     count: int | None = None
 
-    def __init__(self, name: str, size: tuple[int, int], scale: DepthScale):
+    def __init__(self, name: str, size: tuple[int, int], scale: DepthScale, kind: Kind | None = None):
         if not name:
             raise UsageError(f"depth 'model:' without a name; expected a folder or a name, such as model:{EXAMPLE}")
         self.name, self.size = name, size
@@ -50,7 +52,10 @@ class ModelDepth:
         metric = is_metric(self._model.config)
         if not metric and scale.scale is None:
             raise UsageError(f"model:{name} gives relative depth v; give the scale in 1 / Z = scale v + shift")
-        self.scale = replace(scale, kind="depth" if metric else "inverse")
+        own: Kind = "depth" if metric else "inverse"
+        if kind not in (None, own):
+            raise UsageError(f"model:{name} gives numbers of kind '{own}', not '{kind}'; leave kind and baseline_m out")
+        self.scale = replace(scale, kind=own)
         self._to_signal = parse_transfer("srgb").to_signal
         self._kept: dict[int, np.ndarray] = {}
 
