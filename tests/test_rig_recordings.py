@@ -457,6 +457,20 @@ def test_changes_to_sensors_that_are_not_there_are_refused(tmp_path: Path) -> No
         convert(CLIP, tmp_path / "out", overrides="threshold_on=0.2", **OPTIONS)
 
 
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [({"bayer": "RGGB"}, "bayer"), ({"labels": True}, "labels"), ({"frames": "npz"}, "frames of events"),
+     ({"probe": ["5,5"]}, "probe"), ({"noise_maps": True}, "noise_maps")],
+)  # fmt: skip
+def test_what_is_of_events_alone_is_refused_where_no_camera_sends_any(
+    tmp_path: Path, asked: dict[str, Any], name: str
+) -> None:
+    frames = Rig(cameras=(Camera(name="aps", kind="cis"),))
+    with pytest.raises(UsageError, match=f"^{name} without an event camera: .* leave {name} out"):
+        convert(CLIP, tmp_path / "out", rig=frames, **asked, **OPTIONS)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_seed_that_was_drawn_is_that_of_the_rig_when_it_is_taken_up(tmp_path: Path) -> None:
     options = OPTIONS | {"rig": rig(), "seed": None}
     with pytest.raises(Paused):

@@ -173,6 +173,10 @@ def test_what_is_no_pixel_is_refused(text: str) -> None:
         Outputs.of(probe=[text])
 
 
+def test_a_pixel_that_is_named_twice_is_probed_once() -> None:
+    assert Outputs.of(probe=["5,6", (5, 6), "1,2", " 5 , 6 "]).probe == ((5, 6), (1, 2))
+
+
 def test_a_pixel_outside_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="48x32"):
         convert(CLIP, tmp_path / "out", probe=["48,0"])

@@ -169,6 +169,11 @@ def check_outputs(recipe: Recipe, outputs: Outputs) -> None:
         )
     if outputs.pictures != Outputs().pictures and all(mount.kind == "dvs" for mount in recipe.mounts):
         raise UsageError(f"pictures as {', '.join(outputs.pictures)}: expected a frame camera; add --frames or --cis")
+    of_events: dict[str, Any] = {"bayer": recipe.bayer, "labels": recipe.labels, "frames of events": outputs.frames}
+    of_events |= {"probe": outputs.probe, "noise_maps": outputs.noise_maps}
+    asked = next((name for name, value in of_events.items() if value), None)
+    if asked and all(mount.kind == "cis" for mount in recipe.mounts):
+        raise UsageError(f"{asked} without an event camera: expected one in the rig; add one, or leave {asked} out")
     # (To ask for its first instant opens a source once more; those that pass once are asked when they begin.)
     known = outputs.by_the_clock and source.rewindable
     _check_cameras(recipe, outputs, round(1e9 * begins_s(source)) if known else None)

@@ -52,9 +52,10 @@ class Outputs:
         **rest: Any,
     ) -> Outputs:
         """The outputs of these options; several formats or pictures may be in one text, with commas, and a pixel be
-        "x,y".  Raises UsageError."""
+        "x,y"; each counts once.  Raises UsageError."""
         names = names_in(formats)
-        outputs = cls(names, probe=tuple(map(pixel_of, probe)), pictures=names_in(pictures), **rest)
+        pixels = tuple(dict.fromkeys(map(pixel_of, probe)))
+        outputs = cls(names, probe=pixels, pictures=names_in(pictures), **rest)
         for kind in outputs.pictures:
             if kind not in exposures.KINDS:
                 raise UsageError(f"pictures as '{kind}': expected one of {', '.join(exposures.KINDS)}")
