@@ -146,6 +146,8 @@ def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pyte
         (f"{CAMERA}rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nrotation_deg = [0, 0, 0]", "keep one of them"),
         (f"{CAMERA}clock_offset_us = 1.5", "clock_offset_us = 1.5 is impossible: it must be a valid integer"),
         (f"{CAMERA}seed = -1", "seed = -1 is impossible"),
+        (f"{CAMERA}sensor = ''", "sensor = '' is impossible: it must not be empty"),
+        (CAMERA.replace("'a'", f"'{'a' * 65}'"), "a name is a folder's: up to 64 letters, digits, _ and -"),
         (f"{CAMERA}set = 3", "set = 3 is impossible: it must be a table"),
         (f"{CAMERA}set = {{ a = 2020-01-01 }}", "it must be a table of numbers, texts"),
         (f"{CAMERA}{CAMERA}", "two cameras are called a: give each a name of its own"),

@@ -146,10 +146,17 @@ class Camera(Optics):
     @classmethod
     def _names_a_folder(cls, name: str) -> str:
         if not NAME.fullmatch(name):
-            raise ValueError("a name is a folder's: letters, digits, _ and -, beginning with a letter or digit")
+            raise ValueError("a name is a folder's: up to 64 letters, digits, _ and -, a letter or digit before others")
         if name.casefold() in RESERVED or DEVICES.fullmatch(name.casefold()):
             raise ValueError("that name is taken by a recording or an operating system; choose another")
         return name
+
+    @field_validator("sensor")
+    @classmethod
+    def _names_a_sensor(cls, sensor: str | None) -> str | None:
+        if sensor == "":
+            raise ValueError("it must not be empty")
+        return sensor
 
     @field_validator("set", mode="before")
     @classmethod
