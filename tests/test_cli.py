@@ -25,7 +25,7 @@ from numba import njit
 
 from vid2ev import UsageError
 from vid2ev.commands import main, progress, tidy
-from vid2ev.commands.summary import of_the_clip, result_facts
+from vid2ev.commands.summary import file_facts, of_the_clip, result_facts
 from vid2ev.making import conversion
 from vid2ev.recording.manifest import difference
 from vid2ev.seen import instants
@@ -644,3 +644,12 @@ def test_a_difference_is_the_value_that_differs() -> None:
     assert difference([{"name": "a"}], [{"name": "b"}], "all") == 'all[0].name = "a", not "b"'
     assert difference([1], [1, 2], "all") == "all = [1], not [1, 2]"
     assert len(difference([1] * 999, [1], "all")) < 130
+
+
+def test_files_are_told_in_order_and_those_in_folders_are_all_counted(tmp_path: Path) -> None:
+    for name in ("truth/depth/0.npy", "truth/depth/1.npy", "truth/poses.txt", "b/raw/0.png", "a/x", "z.txt", "c.txt"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("12")
+    assert file_facts(tmp_path) == [
+        ("files", f"{tmp_path}: c.txt 2 B, z.txt 2 B, a/ 1 file, b/ 1 file, truth/ 3 files")
+    ]

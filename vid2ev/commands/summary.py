@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vid2ev.terminal import counted
+
 BEFORE_THE_SENSOR = ("view", "subframes")  # of a plan: what is made as it is needed, whatever is asked
 
 
@@ -86,7 +88,7 @@ def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: boo
     """Events or frames of a camera; `named`: which of them it is stands before."""
     counts, seconds, (width, height) = result["counts"], result["duration_us"] / 1e6, sensor["size"]
     if sensor.get("kind") == "cis":
-        exposures = f"{counts['exposures']:,}" if named else _frames(counts["exposures"])
+        exposures = f"{counts['exposures']:,}" if named else counted(counts["exposures"], "frame")
         return f"{exposures}, {counts['unfinished']:,} cut off by the end"
     per_s = counts["events"] / seconds if seconds else 0.0
     rate = f", {short(per_s)}/s, {short(per_s / width / height)}/s per pixel"
@@ -96,7 +98,10 @@ def _count_text(result: Mapping[str, Any], sensor: Mapping[str, Any], named: boo
 
 def _duration(result: Mapping[str, Any]) -> tuple[str, str]:
     counts, seconds = result["counts"], result["duration_us"] / 1e6
-    return "duration", f"{seconds:.3f} s: {_frames(counts['frames'])}, {counts['subframes']:,} made between them"
+    return (
+        "duration",
+        f"{seconds:.3f} s: {counted(counts['frames'], 'frame')}, {counts['subframes']:,} made between them",
+    )
 
 
 def speed_facts(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -127,10 +132,15 @@ def device_facts(device: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def file_facts(directory: Path) -> list[tuple[str, str]]:
-    """The files of a recording."""
-    files = [f"{path.name} {_bytes(path)}" for path in sorted(directory.iterdir()) if path.is_file()]
-    folders = [f"{path.name}/ {len(list(path.iterdir())):,} files" for path in directory.iterdir() if path.is_dir()]
+    """The files of a recording, those in folders by their number."""
+    held = sorted(directory.iterdir())
+    files = [f"{path.name} {_bytes(path)}" for path in held if path.is_file()]
+    folders = [f"{path.name}/ {counted(_files_in(path), 'file')}" for path in held if path.is_dir()]
     return [("files", f"{directory}: " + ", ".join(files + folders))]
+
+
+def _files_in(folder: Path) -> int:
+    return sum(path.is_file() for path in folder.rglob("*"))
 
 
 def source_text(source: Mapping[str, Any]) -> str:
@@ -149,11 +159,7 @@ def _frames_text(source: Mapping[str, Any]) -> str:
     if not source.get("frames_expected"):
         return ""
     guessed = source.get("frames_estimated") or {"start_s", "stop_s"} & {*source.get("edits", {})}
-    return f"{'about ' * bool(guessed)}{_frames(source['frames_expected'])}"
-
-
-def _frames(count: int) -> str:
-    return f"{count:,} frame{'s' * (count != 1)}"
+    return f"{'about ' * bool(guessed)}{counted(source['frames_expected'], 'frame')}"
 
 
 def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
