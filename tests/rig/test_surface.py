@@ -9,6 +9,7 @@ from vid2ev.rig.bands import Bands
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.surface import _patches_of, corners_of, seen_of, surface_of
+from vid2ev.rig.triangles import draw_patches
 
 SOURCE = Intrinsics.of_field((24, 16), 60)
 
@@ -87,3 +88,17 @@ def test_where_a_lens_ends_rows_are_the_same_whatever_bands_they_are_drawn_in(tu
     pose = Pose.of((0, 0, turn_deg), (0.05, 0, 0))
     for one, other in zip(*(seen_of(surface, camera, pose, Bands(count)) for count in (1, 40)), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_what_is_seen_from_its_edge_is_where_its_corners_are() -> None:
+    """Its triangles have no area but for rounding; what is drawn of them lies between their corners all the same."""
+    rng, f32 = np.random.default_rng(3), np.float32
+    for _ in range(40):
+        x, y, inverse = (np.full((8, 8), value, f32) for value in (1, 1, -1))
+        start, way = rng.integers(0, 8, (2, 1000, 1)), rng.normal(size=(2, 1000, 1)) * 10.0 ** rng.uniform(-2, 4)
+        u, v = (start + rng.choice([0, 1, -1, 0.3, 0.7, 3, 2 / 7], (1000, 4)) * way).astype(f32)
+        q, depth = (10.0 ** rng.uniform(-3, 6, (1000, 4))).astype(f32), rng.uniform(1, 2, (1000, 4)).astype(f32)
+        columns, rows = rng.uniform(1, 2, (2, 1000, 4)).astype(f32)
+        draw_patches(0, 8, u, v, q, depth, columns, rows, x, y, inverse)
+        for values in (x, y, inverse[inverse >= 0]):
+            assert (values > 1 - 1e-6).all() and (values < 2 + 1e-6).all()

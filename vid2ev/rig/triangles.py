@@ -4,7 +4,8 @@ A pixel is drawn where its centre lies in a triangle or on its edge.  With e_k t
 
     inverse depth = sum e_k w_k / sum e_k,        place = sum e_k q_k place_k / sum e_k q_k,        q = 1 / c
 
-c being the depth of a corner, or that over any length that is the same for all three, and w the inverse depths.
+c being the depth of a corner, or that over any length that is the same for all three, and w the inverse depths.  Areas
+that rounding has made negative are 0, so that depth and place are never beyond the corners'.
 Triangles that are seen from behind are left out, and those with a corner that is NaN: it is behind the camera.
 
 Source: J. Blinn, "Hyperbolic interpolation", IEEE Computer Graphics and Applications 12(4), 1992.
@@ -91,11 +92,12 @@ def _draw(u, v, q, w, columns, rows, begin, end, x, y, inverse):
                 e1 = right2 * down0 - right0 * down2
                 e2 = right0 * down1 - right1 * down0
                 if e0 >= slack and e1 >= slack and e2 >= slack:
-                    depth = (e0 * w[0] + e1 * w[1] + e2 * w[2]) / area
-                    if depth > inverse[row, column]:
-                        # (beyond an edge, by rounding, the place is on it: a corner near the camera's plane has a
-                        # q that takes it far out)
-                        e0, e1, e2 = max(e0, _ZERO) * q[0], max(e1, _ZERO) * q[1], max(e2, _ZERO) * q[2]
+                    # (a corner near the camera's plane has a q that would take a place beyond an edge far out; and
+                    # what is seen from its edge has areas that are all rounding)
+                    e0, e1, e2 = max(e0, _ZERO), max(e1, _ZERO), max(e2, _ZERO)
+                    depth = (e0 * w[0] + e1 * w[1] + e2 * w[2]) / (e0 + e1 + e2)
+                    if depth > inverse[row, column]:  # (never of NaN, where all areas are 0)
+                        e0, e1, e2 = e0 * q[0], e1 * q[1], e2 * q[2]
                         share = _ONE / (e0 + e1 + e2)
                         inverse[row, column] = depth
                         x[row, column] = (e0 * columns[0] + e1 * columns[1] + e2 * columns[2]) * share
