@@ -134,6 +134,27 @@ def test_a_dry_run_says_all_and_does_nothing() -> None:
     refused(2, "threshold_onn", "convert", CLIP, "--dry-run", "--set", "threshold_onn=1")
 
 
+@pytest.mark.parametrize("frames", ["npz", "png", "mp4"])
+def test_a_dry_run_names_all_files(frames: str) -> None:
+    asked = [
+        "--frames-out",
+        frames,
+        "--format",
+        "csv,hdf5",
+        "--probe",
+        "3,4",
+        "--noise-maps",
+        "--cis-out",
+        "raw,png,mp4",
+    ]
+    arguments = ["convert", CLIP, "-o", "out", "--frames", "--truth", "poses,mask", *asked, *QUICK]
+    said = next(line for line in vid2ev(*arguments, "--dry-run").stdout.splitlines() if line.startswith("output"))
+    assert vid2ev(*arguments, "-q").exit_code == 0
+    made = [path for pattern in ("*", "dvs/*", "cis/*") for path in Path("out").glob(pattern)]
+    there = {str(path.relative_to("out")) for path in made} - {"dvs", "cis"}
+    assert {*said.partition("out: ")[2].split(", ")} == there
+
+
 @pytest.mark.parametrize("effects", ["all", "none", "mismatch"])
 def test_a_dry_run_has_the_sensor_and_the_plan_of_the_manifest(effects: str) -> None:
     arguments = ["convert", CLIP, "-o", "out", "--sensor", "v2e-clean", "--effects", effects, *QUICK]

@@ -126,6 +126,7 @@ class Outputs:
             return [*(exposures.KINDS[name] for name in self.pictures), "manifest.json"]
         files = [*self.files().values(), *([] if "hdf5" in self.formats else [FRAME_INDEX])]
         files += [KINDS[self.frames]] if self.frames else []
+        files += ["frames.csv"] * (self.frames == "mp4")  # (the slices that its pictures are of)
         files += ["probe.csv", "probe.png"] if self.probe else []
         return files + ["noise_maps.npz"] * self.noise_maps + ["preview.mp4"] * self.preview + ["manifest.json"]
 
