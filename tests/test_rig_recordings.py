@@ -420,6 +420,23 @@ def test_a_sensor_that_cannot_be_is_that_of_a_camera_of_a_file(
 
 
 @pytest.mark.parametrize(
+    ("sensor", "changes", "sentence"),
+    [
+        ("paper", [], r"rig.toml: camera 'left': Key 'threshold_onn' in sensor paper is unknown"),
+        ("papr", [], "^Sensor 'papr' is not a preset"),
+        ("papr", ["threshold_on=-1"], "^Sensor 'papr' is not a preset"),
+    ],
+)
+def test_what_a_file_changes_in_the_sensor_of_the_recording_is_its_own_too(
+    sensor: str, changes: list[str], sentence: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text("[[camera]]\nname = 'left'\nkind = 'dvs'\nset = { threshold_onn = 0.2 }\n")
+    with pytest.raises(UsageError, match=sentence):
+        Recipe.of(CLIP, sensor, changes, rig=file)
+
+
+@pytest.mark.parametrize(
     ("scene", "options"), [("scene:close-object", {}), ("scene:flicker", {"rig": rig(fov_deg=30)})]
 )
 def test_a_scene_that_cannot_be_rendered_for_its_cameras_is_refused_before_its_first_frame(

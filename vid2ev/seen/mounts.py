@@ -67,14 +67,19 @@ class Sensors:
         return Loaded(str(sensor), (load_sensor if camera.kind == "dvs" else load_cis)(sensor, changes))
 
     def of_file(self, camera: Camera, file: str | Path) -> Loaded:
-        """As `of`, for a camera of a rig file, which is named where the sensor that it asks for cannot be."""
-        if camera.sensor is None:
-            return self.of(camera)
+        """As `of`, for a camera of a rig file, which is named where the sensor that it asks for, or what it changes in
+        it, cannot be."""
         try:
-            loaded = replace(self, overrides=()).of(camera)  # (what is changed in all of them is not the file's)
-        except Vid2evError as error:
-            raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
-        return self.of(camera) if self.overrides else loaded
+            return self.of(camera)
+        except Vid2evError:
+            plain = replace(self, overrides=())  # (what is changed in all of them is not the file's)
+            if camera.sensor is None:
+                plain.of(camera.model_copy(update={"set": {}}))  # (nor is the sensor)
+            try:
+                plain.of(camera)
+            except Vid2evError as error:
+                raise type(error)(f"{file}: camera '{camera.name}': {error}") from error
+            raise
 
     def check_changes(self, cameras: Iterable[Camera]) -> None:
         """Raise UsageError for changes to sensors of a kind that none of the cameras has."""
