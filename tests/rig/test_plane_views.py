@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 from kornia.geometry.transform import warp_perspective
-from view_rigs import Texture, pinhole, psnr
+from view_rigs import Texture, homography, pinhole, psnr
 
 from vid2ev.errors import UsageError
-from vid2ev.rig.homography import homography, places_on_plane
+from vid2ev.rig.homography import places_on_plane
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixel_grid, pixels_of, rays_of
 from vid2ev.rig.pose import IDENTITY, Pose
@@ -222,5 +222,3 @@ def test_what_cannot_be_meant_is_refused() -> None:
             Views(SOURCE, [(SOURCE, POSES["beside"])], plane_m)
     with pytest.raises(UsageError, match="threads 0"):
         Views(SOURCE, [], threads=0)
-    with pytest.raises(UsageError, match="does not see"):
-        homography(SOURCE, SOURCE, Pose.of((0, 0, 0), (0, 0, 5)), 2.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.pose import Pose
 
 
 def psnr(found: np.ndarray, truth: np.ndarray, where: np.ndarray | None = None) -> float:
@@ -32,3 +33,9 @@ class Texture:
 def pinhole(size: tuple[int, int] = (160, 120), focal: float = 150.0) -> Intrinsics:
     """A camera whose centre is in the middle of its picture."""
     return Intrinsics(size=size, focal_px=(focal, focal), centre_px=((size[0] - 1) / 2, (size[1] - 1) / 2))
+
+
+def homography(source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float) -> np.ndarray:
+    """H = K_source (I + t e_z' / (Z - t_z)) R K_camera^-1 [3, 3]: from pixels of a camera to those of the source."""
+    shear = np.eye(3) + np.outer(pose.translation_m, (0, 0, 1)) / (plane_m - pose.translation_m[2])
+    return source.matrix @ shear @ pose.rotation @ np.linalg.inv(camera.matrix)

@@ -36,20 +36,6 @@ class Places(NamedTuple):
     seen: np.ndarray  # [samples h, samples w] bool
 
 
-def homography(source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float = math.inf) -> np.ndarray:
-    """H [3, 3]: from pixels of the camera to pixels of the source, for cameras without distortion.
-
-    pose      from the camera's coordinates to those of the source
-    plane_m   Z; raises UsageError if it is not greater than 0 or the camera is not before the plane
-    """
-    if not _before_plane(pose, plane_m):
-        at_m = pose.translation_m[2]
-        raise UsageError(
-            f"a camera {at_m:g} m ahead of the source does not see a plane at {plane_m:g} m; put it farther"
-        )
-    return source.matrix @ _onto_plane(pose, plane_m) @ np.linalg.inv(camera.matrix)
-
-
 def places_on_plane(
     source: Intrinsics, camera: Intrinsics, pose: Pose, plane_m: float = math.inf, samples: int = 1
 ) -> Places:
