@@ -23,8 +23,8 @@ from vid2ev.compiling.cache import cached
 F = np.float32
 NOTHING = -1
 ALIKE = F(1.05)  # inverse depths of one surface: up to so many times that of the farthest,
-FRINGE = F(0.02)  # what a sliver of background counts, too narrow to look `inset` pixels further on
 SPREAD = F(0.1)  # or up to this share of the way from the farthest to the nearest
+FRINGE = F(0.02)  # what a sliver of background counts, too narrow to look `inset` pixels further on
 
 
 class Fill(NamedTuple):
