@@ -20,7 +20,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.scenes.blender.corners import corners_of
 from vid2ev.scenes.blender.program import SCRIPT, VARIABLE, command_of, find_blender
-from vid2ev.scenes.blender.renderer import Cycles, render_with_blender
+from vid2ev.scenes.blender.renderer import Cycles, render_with_blender, renderer_beside
 from vid2ev.scenes.render import render
 from vid2ev.scenes.snapshot import Kind, Lamp, Mesh, Shape, Snapshot, Surface, Texture, Thing
 from vid2ev.scenes.world import World
@@ -187,6 +187,13 @@ def test_a_blender_that_is_too_old_is_none(stand: Stand) -> None:
     stand("old")
     with Cycles() as cycles, pytest.raises(UsageError, match=r"of version 3\.4\.1; give one of 4\.2 or later"):
         cycles(Snapshot([there("box")]), ODD, CAMERA)
+
+
+@pytest.mark.parametrize("place", [".", "..", "/"])
+def test_a_place_that_has_none_beside_it_is_refused(stand: Stand, place: str) -> None:
+    stand()
+    with pytest.raises(UsageError, match="cannot be renamed into place"), renderer_beside(Path(place)):
+        pass
 
 
 def test_requests_that_cannot_be_meant(stand: Stand, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -323,6 +323,25 @@ def test_many_scenes_go_on_where_they_stopped(monkeypatch: pytest.MonkeyPatch) -
     assert not Path("many/flying-shapes-0002/poses.txt").exists()
 
 
+@pytest.mark.parametrize("own", [b"[scene]\nduration_s = 0.05\n", b"\xff\xfe[\0s\0"])
+@pytest.mark.parametrize("option", ["--overwrite", "--resume"])
+def test_a_folder_with_a_scene_file_of_a_persons_own_is_left_alone(own: bytes, option: str) -> None:
+    Path("mine").mkdir()
+    Path("mine/scene.toml").write_bytes(own)
+    Path("mine/photo.jpg").write_text("photo")
+    refused(2, "is no rendered scene", "room", "-o", "mine", option, *QUICK)
+    assert Path("mine/scene.toml").read_bytes() == own
+
+
+@pytest.mark.parametrize("seed", ["0", "4"])
+def test_a_seed_that_is_given_counts_more_than_that_of_the_name(seed: str) -> None:
+    given, named, both = (
+        vid2ev("scene", name, *options, "--dry-run").stdout
+        for name, *options in (("room", "--seed", seed), ("room,seed=3",), ("room,seed=3", "--seed", seed))
+    )
+    assert both == given != named
+
+
 def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -348,6 +367,9 @@ def test_what_cannot_be_meant_is_one_sentence() -> None:
     Path("taken").mkdir()
     Path("taken/mine.txt").write_text("mine")
     refused(2, "is no rendered scene", "room", "-o", "taken", "--overwrite", *QUICK)
+    for place in (".", "..", "taken/..", "/"):
+        refused(2, "cannot be renamed into place; give a folder within it", "room", "-o", place, "--overwrite", *QUICK)
+    refused(1, "File name too long", "room", "-o", 300 * "x", *QUICK)
     Path("bad.toml").write_text("[scene]\nduration = 2\n")
     refused(2, "did you mean duration_s?", "bad.toml")
     Path("rig.toml").write_text("[[camera]]\nname = 'left'\nkind = 'dvs'\n")

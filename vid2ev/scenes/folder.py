@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from vid2ev.errors import UsageError
+from vid2ev.recording.destination import check_folder
 from vid2ev.recording.disk import whole, writing
 from vid2ev.scenes.camera_folder import TRUTH, CameraFolder, Contents
 from vid2ev.scenes.own_files import FOLDER, copy_files, with_own_files
@@ -22,6 +23,7 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.toml_text import toml_text
 
 Report = Callable[[int, int], object]  # frames written, of how many
+MADE = "# vid2ev "  # how scene.toml begins in a folder that was rendered; a person's own does not
 
 
 def write_scene(
@@ -42,7 +44,7 @@ def write_scene(
     """
     world = source.world
     source.watched_by((view.intrinsics, view.pose) for view in world.viewpoints)
-    said = f"# vid2ev {version('vid2ev')}: {how}; {contents.describe()}"
+    said = f"{MADE}{version('vid2ev')}: {how}; {contents.describe()}"
     tables, files = with_own_files(world.scene.tables())
     text = f"{said}\n\n{toml_text(tables)}"
     if _is_made(directory, text, overwrite, resume):
@@ -56,16 +58,18 @@ def write_scene(
 
 
 def _is_made(directory: Path, text: str, overwrite: bool, resume: bool) -> bool:
-    if not directory.exists():
+    check_folder(directory)
+    if not directory.exists() or not any(directory.iterdir()):
         return False
-    made = directory / "scene.toml"
-    if not made.is_file() and (not directory.is_dir() or any(directory.iterdir())):
+    file = directory / "scene.toml"
+    made = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+    if not made.startswith(MADE):
         raise UsageError(f"{directory} exists and is no rendered scene; choose another folder with -o")
-    if overwrite or not made.is_file():
+    if overwrite:
         return False
     if not resume:
         raise UsageError(f"{directory} exists; --resume leaves it, --overwrite replaces it, -o chooses another folder")
-    if made.read_text(encoding="utf-8") != text:
+    if made != text:
         raise UsageError(f"{directory} was made with other options; --overwrite replaces it, -o chooses another folder")
     return True
 

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Self
 
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.destination import check_folder
 from vid2ev.recording.disk import writing
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import IDENTITY, Pose
@@ -122,6 +123,7 @@ class Cycles:
 @contextmanager
 def renderer_beside(directory: Path, samples: int | None = None, program: str | None = None) -> Iterator[Cycles]:
     """Cycles for what is to be in a folder; until that is there, what is rendered stays beside it, in NAME.cycles."""
+    check_folder(directory)  # (of some there is no place beside)
     folder = directory.with_name(f"{directory.name}.cycles")
     with Cycles(SAMPLES if samples is None else samples, folder, program=program) as cycles:
         try:
