@@ -7,7 +7,7 @@ import statistics
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
@@ -84,6 +84,25 @@ def test_extremes_reach_both_ends_and_every_choice() -> None:
     assert {value["b"] for value in seen} == set(range(7))
     assert {value["c"] for value in seen} == {"x", "y", "z"}
     assert min(value["a"] for value in seen) == 1 and max(value["a"] for value in seen) == pytest.approx(2)
+
+
+def test_extremes_reach_both_ends_of_what_is_within_choices() -> None:
+    inner = {"choice": ["plain", [3, {"uniform": [5, 6]}], {"choice": [{"integer": [7, 8]}]}]}
+    tree = {"a": {"choice": [{"uniform": [1, 2]}, {"x": inner}, {"normal": [0, 1]}]}}
+    seen = [drawn(tree, chance, "")["a"] for chance in extremes(tree)]
+    numbers = [value for value in seen if isinstance(value, float)]
+    assert {round(value, 9) for value in numbers} >= {1, 2, -3, 3}
+    within = [value["x"] for value in seen if isinstance(value, dict)]
+    assert "plain" in within and {7, 8} <= {value for value in within if isinstance(value, int)}
+    assert {round(value[1], 9) for value in within if isinstance(value, list)} >= {5, 6}
+
+
+@given(st.tuples(st.floats(1e-6, 1e6), st.floats(1e-6, 1e6)).map(sorted), st.integers(0, 2**63))
+@example([90023.1915, 1e5], 0)  # (its last draw is rounded up)
+def test_log_uniform_stays_within_its_ends(ends: list[float], seed: int) -> None:
+    node = {"log_uniform": ends}
+    for chance in (chance_of(seed), *extremes(node)):
+        assert ends[0] <= drawn(node, chance, "key") <= ends[1]
 
 
 @pytest.mark.parametrize(

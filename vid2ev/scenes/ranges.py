@@ -50,11 +50,9 @@ def chance_of(seed: int) -> Chance:
 
 def extremes(tree: Any) -> Iterator[Chance]:
     """Draws that between them take both ends of all ranges in a tree, and every choice."""
-    yield lambda path: 0.0
-    most = max((len(node["choice"]) for node in _ranges(tree) if isinstance(node.get("choice"), list)), default=0)
-    for k in range(1, most - 1):
-        yield lambda path, u=(k + 0.5) / most: u  # type: ignore[misc]
-    yield lambda path: BELOW_ONE
+    for ways in dict.fromkeys([(0.0,), *_ways(tree), (BELOW_ONE,)]):
+        # (of what is chosen among what was chosen, the path tells how deep it is)
+        yield lambda path, ways=ways: ways[min(path.count(".choice"), len(ways) - 1)]  # type: ignore[misc]
 
 
 def is_range(node: Any) -> bool:
@@ -99,7 +97,7 @@ def _number(kind: str, low: Any, high: Any, chance: Chance, path: str, place: Pl
         tail = NormalDist().cdf(-SIGMAS)
         return low + high * NormalDist().inv_cdf(tail + u * (1 - 2 * tail))
     if kind == "log_uniform":
-        return low * (high / low) ** u
+        return min(low * (high / low) ** u, high)  # (rounding leads beyond the end)
     return low + (high - low) * u
 
 
@@ -142,9 +140,16 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _ranges(node: Any) -> Iterator[Mapping[str, Any]]:
-    if is_range(node):
-        yield node
-    if isinstance(node, Mapping | list):
+def _ways(node: Any, before: tuple[float, ...] = ()) -> Iterator[tuple[float, ...]]:
+    """The draws, one for each choice within the last, that lead to either end of each range in a tree."""
+    things = node.get("choice") if is_range(node) else None
+    if isinstance(things, list):
+        for k, thing in enumerate(things):
+            way = (*before, (k + 0.5) / len(things))
+            yield way
+            yield from _ways(thing, way)
+    elif is_range(node):
+        yield from ((*before, end) for end in (0.0, BELOW_ONE))
+    elif isinstance(node, Mapping | list):
         for child in node.values() if isinstance(node, Mapping) else node:
-            yield from _ranges(child)
+            yield from _ways(child, before)
