@@ -15,6 +15,8 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
 
 SMALL = ["camera.size=[96, 72]", "duration_s=0.25", "min_fps=1"]
+HERE = 'kind = "fixed"'
+PLACE = '{ kind = "fixed", position_m = [0, 0, 1.9] }'
 STILL = (
     '[[objects]]\nname = "wall"\nkind = "plane"\nsize_m = 9\ntrajectory = { kind = "fixed", position_m = [0, 0, 2] }\n'
 )
@@ -106,6 +108,34 @@ def test_what_comes_into_view_once_a_round_is_met_each_time(tmp_path: Path, kind
     highest_s = 0.016 * (np.arange(5) + (270 - phase_deg) % 360 / 360)
     after = np.searchsorted(times_s, highest_s).clip(1)
     assert (times_s[after] - times_s[after - 1]).max() < 5e-4  # (of passes of 3 ms)
+
+
+JUMP = 'kind = "keyframes", path = "linear", times_s = [0.053, {}], positions_m = [[0, 0, 0], [0.3, 0, 0]]'
+GLANCE = 'kind = "keyframes", times_s = [0, 0.0645, 0.0665], rotations_deg = [[0, 0, 0], [0, 0, 0], [0, 3, 0]]'
+
+
+@pytest.mark.parametrize(
+    ("camera", "thing"),
+    [
+        ('kind = "shake", rms_mm = 0, rms_deg = 1, low_hz = 80, high_hz = 80', HERE),
+        ('kind = "shake", rms_mm = 5, rms_deg = 0.2, low_hz = 20, high_hz = 50, seed = 5', HERE),
+        (HERE, JUMP.format(0.058)),
+        (HERE, JUMP.format(0.055)),
+        (GLANCE, HERE),
+    ],
+)
+def test_what_is_over_soon_goes_in_small_steps_too(tmp_path: Path, camera: str, thing: str) -> None:
+    file = tmp_path / "sudden.toml"
+    file.write_text(
+        f"[scene]\nduration_s = 0.2\nmin_fps = 10\n[camera]\nsize = [64, 48]\ntrajectory = {{ {camera} }}\n{STILL}"
+        f'[[objects]]\nname = "thing"\nkind = "plane"\ntrajectory = [{PLACE}, {{ {thing} }}]\n'
+    )
+    world = World.of(file)
+    instants, largest = Instants(world), 0.0
+    for t_ns, next_ns in pairwise(instants[k] for k in range(len(instants))):
+        shift, seen = world.flow(t_ns, next_ns, world.render(t_ns))
+        largest = max(largest, float(np.where(seen, np.hypot(shift[..., 0], shift[..., 1]), 0).max()))
+    assert 0.2 < largest <= 0.5
 
 
 def test_nothing_happens_at_the_least_rate(tmp_path: Path) -> None:

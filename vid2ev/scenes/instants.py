@@ -8,11 +8,10 @@ The rate at t is the greatest of
     samples_per_period * frequency of every flicker
     min_fps
 
-and at most max_fps.  It is found at knots 16 ms apart, or an eighth of the fastest turn or orbit (what comes into view
-in each round is to be met there), or 2 ms where it changes much from one to the next, but never closer.  There the true
-flow and the change of light are measured over a small step on a grid of pixels, and the motion of the corners of all
-things in view beside it, for those that fall between the pixels of the grid.  Between two knots the greater of their
-rates R holds, and instant k of N + 1 is where
+and at most max_fps.  It is found at knots (`knots.py`), and halfway between two where it changes much from one to the
+next, down to 2 ms.  There the true flow and the change of light are measured over a small step on a grid of pixels, and
+the motion of the corners of all things in view beside it, for those that fall between the pixels of the grid.  Between
+two knots the greater of their rates R holds, and instant k of N + 1 is where
 
     integral of R dt = k (integral over all of the scene) / N,    N rounded up,
 
@@ -34,16 +33,13 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.lens import pixels_of
 from vid2ev.rig.pose import IDENTITY, Pose
+from vid2ev.scenes.knots import FINEST_NS, STEP_NS, first_knots_ns
 from vid2ev.scenes.render import Picture, render
 from vid2ev.scenes.scene import LightSource, Object
 from vid2ev.scenes.snapshot import Snapshot, Thing
-from vid2ev.scenes.trajectory import Orbit, Spin
 from vid2ev.scenes.world import World, is_still
 
-COARSEST_NS, FINEST_NS = 16_000_000, 2_000_000  # from knot to knot
-ROUND_PARTS = 8  # knots in a round, at least
 STEADY = 1.25  # rates of two knots that differ less need none between them
-STEP_NS = 50_000  # over which motion is measured
 GRID = 64  # pixels across, of the pictures in which it is measured
 MARGIN = 1.15  # for what the grid misses
 SMOOTH = 2  # cells along a pixel at an edge, where changes of light are measured
@@ -115,8 +111,7 @@ def key_of(eye: Eye) -> Hashable:
 
 def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
     """The knots [ns], and the rates that are asked for at them; those above `max_fps` count as alike."""
-    parts = max(1, math.ceil(world.duration_ns / _coarsest_ns(world)))
-    coming = [round(world.duration_ns * k / parts) for k in range(parts, -1, -1)]  # (the earliest last)
+    coming = first_knots_ns(world)[::-1]  # (the earliest last)
     known, most = {t_ns: asked_hz(world, t_ns, eyes) for t_ns in coming}, world.scene.scene.max_fps
     knots = [coming.pop()]
     while coming:
@@ -128,18 +123,6 @@ def _rates(world: World, eyes: Sequence[Eye]) -> tuple[np.ndarray, np.ndarray]:
         else:
             knots.append(coming.pop())
     return np.array(knots, np.float64), np.array([known[t_ns] for t_ns in knots])
-
-
-def _coarsest_ns(world: World) -> float:
-    """How far knots may be apart."""
-    things: list[Object | LightSource] = [*world.scene.objects, *world.scene.lights]
-    rounds_hz = [
-        abs(motion.rate_deg_s) / 360 if isinstance(motion, Spin) else 1 / motion.period_s
-        for trajectory in (world.scene.camera.trajectory, *(thing.trajectory for thing in things))
-        for motion in trajectory
-        if isinstance(motion, Spin | Orbit)
-    ]
-    return max(FINEST_NS, 1e9 / max(1e9 / COARSEST_NS, ROUND_PARTS * max(rounds_hz, default=0.0)))
 
 
 def rate_hz(world: World, t_ns: int, eyes: Sequence[Eye] = ()) -> float:
