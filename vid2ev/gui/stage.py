@@ -109,7 +109,7 @@ class Stage:
                 self._put(thing.name, self._scene.sphere(0.06).material(ON))
             return
         assert isinstance(values, Object)
-        x, y, z = values.size_m
+        x, y, z = extents_m(values)
         turn = STRAIGHT
         shape: Any
         if values.kind == "sphere":
@@ -117,7 +117,7 @@ class Stage:
         elif values.kind == "cylinder":
             shape, turn = self._scene.cylinder(0.5, 0.5, 1, 24).scale(x, z, y), UPRIGHT
         else:
-            shape = self._scene.box(x, y, max(z, THIN_M), wireframe=values.kind == "mesh")
+            shape = self._scene.box(x, y, z, wireframe=values.kind == "mesh")
         large = max(x, y, z) > LARGE_M
         self._put(thing.name, shape.material(_tone(values), 0.25 if large else 1.0), turn, fixed=large)
 
@@ -166,6 +166,12 @@ class Stage:
         seen = reference.inverse().apply(place_m)
         place_mm = tuple(round(1000 * float(part), 2) for part in seen)
         self._session.change(lambda: setup.with_camera_values(number, {"translation_mm": place_mm}))
+
+
+def extents_m(thing: Object) -> tuple[float, float, float]:
+    """The full extents of a thing in the view, where a plane is a thin box whatever its file says of its z."""
+    x, y, z = thing.size_m
+    return x, y, THIN_M if thing.kind == "plane" else max(z, THIN_M)
 
 
 def _tone(thing: Object) -> str:
