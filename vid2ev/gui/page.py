@@ -95,6 +95,8 @@ def free_port(host: str, port: int) -> int:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         with socket.create_server((host, port), family=family) as taken:
             return taken.getsockname()[1]
+    except UnicodeError as error:
+        raise UsageError(f"host '{host}' is no name that a machine can have; give another --host") from error
     except OSError as error:
         raise UsageError(
             f"{address(host, port)} cannot be served ({error.strerror}); give another --port, or 0"
