@@ -33,6 +33,7 @@ from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.tasks import gathered
 from vid2ev.gui.unanswered import Unanswered
 from vid2ev.gui.why import why_not
+from vid2ev.making.conversion import default_directory
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.seen.recipe import Recipe
@@ -85,6 +86,15 @@ def test_the_command_is_what_the_page_converts(change: Any, tmp_path: Path, monk
     assert said == made
     for number, camera in enumerate(setup.rig.cameras):
         assert said["cameras"][camera.name]["parameters"] == setup.spec(number).model_dump(mode="json")
+
+
+@pytest.mark.parametrize("output", ["spinning-shapes_events", "scene_events", "elsewhere"])
+@pytest.mark.parametrize("change", [lambda setup: setup, moved_camera, other_scene])
+def test_the_command_records_where_the_page_does(change: Any, output: str) -> None:
+    words = shlex.split(str(command_of(change(setup_of(SMALL)), output)))[2:]
+    options = convert.make_context("convert", words).params
+    usual = str(default_directory(options["videos"][0]))
+    assert (options["output"] is None) == (output == usual) and str(options["output"] or usual) == output
 
 
 def test_a_value_that_cannot_be_is_refused_and_one_that_is_the_presets_is_no_change() -> None:
@@ -344,6 +354,21 @@ def test_without_the_extra_or_a_free_port_one_sentence_says_so(monkeypatch: pyte
     with socket.create_server(("127.0.0.1", 0)) as taken:
         refused = CliRunner().invoke(gui, [SMALL, "--port", str(taken.getsockname()[1])]).exception
     assert isinstance(refused, UsageError) and "give another --port, or 0" in str(refused)
+    for host in ("a..b", 70 * "x" + ".org"):
+        refused = CliRunner().invoke(gui, [SMALL, "--host", host, "--port", "0"]).exception
+        assert isinstance(refused, UsageError) and "is no name that a machine can have" in str(refused)
+
+
+@pytest.mark.parametrize("size", ["9", "[9, 9, 9]", "[9, 9, 0]"])
+def test_a_plane_is_thin_in_the_3d_view(size: str, tmp_path: Path) -> None:
+    pytest.importorskip("nicegui", reason="the extra gui is not installed")
+    from vid2ev.gui.stage import THIN_M, extents_m
+
+    file = tmp_path / "wall.toml"
+    file.write_text(f'[[objects]]\nkind = "plane"\nsize_m = {size}\n[[objects]]\nkind = "box"\nsize_m = {size}\n')
+    wall, box = read_scene(file).resolved().objects
+    assert extents_m(wall) == (9, 9, THIN_M)
+    assert extents_m(box) == (9, 9, max(box.size_m[2], THIN_M))
 
 
 def test_addresses_of_version_6_are_served(monkeypatch: pytest.MonkeyPatch) -> None:

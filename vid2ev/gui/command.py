@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from vid2ev.gui.setup import PRESET, Setup, texts_of
+from vid2ev.making.conversion import default_directory
 from vid2ev.recording.disk import sync, writing
 from vid2ev.rig.camera import Camera, Rig, default_rig
 from vid2ev.rig.rig_file import check_free, rig_text, write_text
@@ -52,7 +53,7 @@ class Command:
 
 
 def command_of(setup: Setup, output: str | None = None) -> Command:
-    """The command of a setup, whose recording goes to `output`."""
+    """The command of a setup, whose recording goes to `output`, which is said where the command would not do so."""
     files = {} if setup.scene is None else {SCENE: scene_text(setup)}
     words = [SCENE if setup.scene is not None else setup.source]
     if is_plain(setup):
@@ -62,7 +63,9 @@ def command_of(setup: Setup, output: str | None = None) -> Command:
         words += ["--rig", RIG]
     for name, value in setup.options.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
-    return Command((*words, *(["-o", output] if output else [])), files, setup)
+    if output and output != str(default_directory(words[0])):
+        words += ["-o", output]
+    return Command(tuple(words), files, setup)
 
 
 def options_of(setup: Setup, folder: Path) -> dict[str, Any]:

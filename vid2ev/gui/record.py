@@ -85,9 +85,7 @@ class Record:
         if setup.source != self._source:
             self._source = setup.source
             self._where.value = str(default_directory(setup.source))
-        command = command_of(
-            setup, None if self._directory == str(default_directory(setup.source)) else self._directory
-        )
+        command = command_of(setup, self._directory)
         self._command.text = str(command)
         names = " and ".join(command.files)
         self._needs.set_visibility(bool(names))
