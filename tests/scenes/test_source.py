@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from vid2ev import Dvs, convert, load_sensor
 from vid2ev.errors import UsageError
+from vid2ev.making import conversion
 from vid2ev.recording.manifest import read_manifest
+from vid2ev.scenes import render
 from vid2ev.scenes.source import SceneSource, parse_request, split_outside
 from vid2ev.scenes.world import World
 from vid2ev.sources import open_source
@@ -88,6 +92,27 @@ def test_a_scene_file_is_a_source(tmp_path: Path) -> None:
     file.write_text('[scene]\nduration_s = 0.1\n[camera]\nsize = [8, 6]\n[[objects]]\nname = "a"\nkind = "box"\n')
     assert open_source(file).size == (8, 6)
     assert open_source(f"scene:{file},size=10x5").size == (10, 5)
+
+
+@pytest.mark.parametrize("edits", [{}, {"size": "96x72"}])
+@pytest.mark.parametrize(("threads", "pools"), [(1, set()), (2, {2}), (None, {3})])
+def test_a_scene_is_rendered_by_as_many_threads_as_its_conversion_is_given(
+    threads: int | None, pools: set[int], edits: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By default by as many as there are cores for this process, however many the machine has."""
+    begun: set[int] = set()
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, threads: int):
+            begun.add(threads)
+            super().__init__(threads)
+
+    monkeypatch.setattr(render, "ThreadPoolExecutor", Pool)
+    for module in (render, conversion):
+        monkeypatch.setattr(module, "usable_cores", lambda: 3)
+    text = "scene:room,size=128x96,duration_s=0.02"
+    convert(text, tmp_path / "made", "ideal", preview=False, threads=threads, fps=100, **edits)
+    assert begun == pools
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,8 @@ def convert(
     """Make the recording of a video: the folder `directory`, or NAME_events in the current one.
 
     seed       of the sensor; None draws one
-    threads    of views and sensors; by default as many as there are cores.  They change nothing but the time it takes
+    threads    of views, pictures of scenes and sensors; by default as many as there are cores.  They change nothing but
+               the time it takes
     skip       let strips of pixels sleep in which nothing can happen, and keep what cannot have changed of a scene's
                picture; changes nothing but the time it takes
     overwrite  replace a recording that is there, when the new one is whole

@@ -10,13 +10,13 @@ a sixth of a pixel may be missed; spikes of meshes and gaps between things, if t
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vid2ev.cores import usable_cores
 from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
@@ -129,7 +129,7 @@ def _in_bands(work: Work, bands: np.ndarray, height: int, scratch: Callable[[], 
         work(first, min(first + TILE, height), scratch())
 
     firsts = [int(band) * TILE for band in bands]
-    threads = min(threads or os.cpu_count() or 1, len(firsts))
+    threads = min(threads or usable_cores(), len(firsts))
     if threads <= 1:
         for first in firsts:
             band(first)

@@ -62,9 +62,10 @@ class Instant:
         return replace(self, frames=tuple(map(downloaded, self.frames)))
 
 
-def instants(recipe: Recipe, start: int = 0, device: Device = CPU, threads: int = 1) -> Generator[Instant]:
+def instants(recipe: Recipe, start: int = 0, device: Device = CPU, threads: int | None = None) -> Generator[Instant]:
     """What is seen at source frame `start`, and at all frames after it, those in between too.  Threads make it, a
-    little in advance: one looks for motion, another carries light along it, and `threads` form the views.
+    little in advance: one looks for motion, another carries light along it, and `threads` form the views or render a
+    scene; if not given, one and all cores.
 
     Light is made on the `device` from the source's frames on, and is in tensors of torch there.
     """
@@ -109,8 +110,10 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
         yield Picture(t_ns // 1000 + mount.clock_offset_us, srgb_codes(as_array(light)))
 
 
-def _instants(recipe: Recipe, start: int, upload: Upload | None, threads: int) -> Generator[Instant]:
-    sight, wanted, before_ns = recipe.sight(threads), recipe.truth, None
+def _instants(recipe: Recipe, start: int, upload: Upload | None, threads: int | None) -> Generator[Instant]:
+    sight, wanted, before_ns = recipe.sight(threads or 1), recipe.truth, None
+    if threads and (scene := scene_behind(recipe.source)):
+        scene.world.threads = threads
     if recipe.rendered:
         return (yield from _rendered(recipe, start, upload))
     of_scene = _of_scene(recipe, wanted) if wanted else None
