@@ -342,6 +342,14 @@ def test_a_seed_that_is_given_counts_more_than_that_of_the_name(seed: str) -> No
     assert both == given != named
 
 
+@pytest.mark.parametrize(("rate", "other"), [("29.97", "30000/1001"), ("100", "100.00001")])
+def test_a_folder_of_another_rate_is_not_taken_for_this_one(rate: str, other: str) -> None:
+    arguments = ["flying-shapes", "-o", "out", "--size", "8x6", "--duration", "0.05", "--no-preview", "--fps"]
+    assert vid2ev("scene", *arguments, rate).exit_code == 0
+    refused(2, "made with other options", *arguments, other, "--resume")
+    assert "is there already" in vid2ev("scene", *arguments, rate, "--resume").stdout
+
+
 def test_a_disk_that_is_full_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")

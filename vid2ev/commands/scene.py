@@ -147,7 +147,7 @@ def _render(file: SceneFile, contents: Contents, options: dict[str, Any], quiet:
     for seed, directory in directories.items():
         with _renderer(directory, options) as renderer, counting(quiet, FRAMES, desc=str(directory)) as report:
             source = SceneSource(World(file, seed, renderer=renderer), file.name, seed=seed, fps=options["fps"])
-            often = f"{float(options['fps']):g} fps" if options["fps"] else "all instants"
+            often = f"{float(options['fps']):.12g} fps" if options["fps"] else "all instants"
             how = f"{file.name}, seed {seed}, {often}"
             how += f", Cycles with {renderer.samples} samples" if renderer else ""
             new = write_scene(directory, source, contents, how, report=report, **keep)
