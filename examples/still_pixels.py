@@ -11,9 +11,8 @@ of an ordinary sensor.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -27,10 +26,6 @@ class RateAtLight:
     rate_hz: float
     error_hz: float
     on_share: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """All numbers, ready for JSON."""
-        return asdict(self)
 
 
 def rates_by_light(counts: np.ndarray, light: np.ndarray, seconds: float, edges: np.ndarray) -> list[RateAtLight]:

@@ -27,7 +27,6 @@ class Job:
 
     prepare   makes what the job needs in a folder, once
     make      makes the output in the place given, or goes on with it; the first argument is the prepared folder
-    partial   the names of what is begun, beside or within the output, by the name of the output
     growing   the files in there that grow without being renamed: their last block may be torn
     old       makes another output in that place, which is to be replaced; None where nothing is ever replaced
     """

@@ -158,7 +158,6 @@ def _light(codes: np.ndarray) -> np.ndarray:
 
 def _joined(parts: list[Mesh]) -> Mesh:
     """One mesh of several; where only some have normals, the others are flat; the first picture is that of all."""
-    firsts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     smooth = any(part.normals is not None for part in parts)
     parts = [_with_own_corners(part) if smooth and part.normals is None else part for part in parts]
     firsts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
