@@ -60,7 +60,8 @@ class Setting(Part):
         default=0.2,
         ge=1e-4,
         le=10,
-        description="the most that lamps and shadows change light between two instants, but for a few pixels [nat]",
+        description="the most that lamps and shadows change light between two instants, but for few pixels and deep"
+        " flicker [nat]",
     )
     samples_per_period: float = Field(default=32.0, ge=2, le=1e4, description="instants in one period of a flicker")
     min_fps: float = Field(default=100.0, ge=1e-3, le=1e6, description="instants per second, at least [1/s]")
