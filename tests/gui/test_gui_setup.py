@@ -185,6 +185,26 @@ def test_every_part_of_a_scene_that_was_loaded_over_another_can_be_changed() -> 
     session.close()
 
 
+@pytest.mark.parametrize("name", ["spinning-shapes", "specular", "parallax"])
+def test_each_control_of_a_scene_takes_what_it_shows_and_is_brought_back(name: str) -> None:
+    """A trajectory with a motion more, and a thing that was moved, too."""
+    session = Session(setup_of(f"scene:{name}"))
+    for thing in things_of(session.setup.settled()):
+        board = SceneBoard(session, thing.name)
+        for control in board.controls:
+            before, shown = board.base(control.key), control.shown(board.value(control.key))
+            put = [tuple(shown) if control.kind == "vector" and shown else control.parsed(shown)]
+            if control.key == "trajectory":
+                put.append(control.parsed(f'[{{ kind = "fixed", position_m = [1, 0, 0] }}, {shown[1:]}'))
+            if control.key == "position_m":
+                put.append((1.0, 2.0, 3.0))
+            for value in put:
+                board.put(control.key, value)
+                board.put(control.key, before)
+                assert board.value(control.key) == before and session.setup.scene is None
+    session.close()
+
+
 def test_a_scene_whose_values_are_brought_back_is_that_of_its_file() -> None:
     """Which the command names; there is nothing to save."""
     session = Session(setup_of(SMALL))

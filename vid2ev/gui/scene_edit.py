@@ -106,7 +106,8 @@ def _first(thing: Thing) -> dict[str, Any]:
 def _put_first(table: dict[str, Any], place: Mapping[str, Any]) -> None:
     motions = table.get("trajectory", [])
     later = motions[1:] if motions and motions[0]["kind"] == "fixed" else motions
-    table["trajectory"] = [{"kind": "fixed", **place}, *later]
+    fixed = [{"kind": "fixed", **place}] if any(map(any, place.values())) else []
+    table["trajectory"] = [*fixed, *later]
 
 
 def _table(tables: dict[str, Any], name: str) -> dict[str, Any]:

@@ -143,7 +143,7 @@ def frozen(node: Any) -> Any:
     """A tree with tuples in the place of lists."""
     if isinstance(node, Mapping):
         return {key: frozen(value) for key, value in node.items()}
-    return tuple(map(frozen, node)) if isinstance(node, list) else node
+    return tuple(map(frozen, node)) if isinstance(node, list | tuple) else node
 
 
 def _one_of(folder: Path, u: float, where: str) -> Path:
