@@ -161,6 +161,7 @@ def test_files_are_found_beside_the_scene_file(tmp_path: Path) -> None:
         ("camera.size.z=2", "is no table"),
         ("lights.lamp.flicker.depth=2", "less than or equal to 1"),
         ("lights.lamp.kind=sun", ""),
+        ("lights.lamp.direction=[0, 1e300, 0]", "lights.lamp.direction.1 = 1e+300 is impossible"),
         ("min_fps=1e5", "above max_fps"),
         ("duration_s={ uniform = [3] }", "expected two ends"),
         ("duration_s=1979-05-27", "must be a valid number"),

@@ -211,6 +211,7 @@ def test_a_shake_turns_by_its_root_mean_square_apart_from_where_it_goes() -> Non
         {"kind": "shake", "low_hz": 5, "high_hz": 1},
         {"kind": "straight", "velocity_m_s": [math.inf, 0, 0]},
         {"kind": "fixed", "position_m": ["1", 0, 0]},
+        {"kind": "look-at", "target_m": [0, 0, 1], "up": [0, 1e300, 0]},
         {"kind": "hover"},
     ],
 )

@@ -27,8 +27,9 @@ Seconds = Annotated[float, Field(ge=-1e6, le=1e6)]
 Degrees = Annotated[float, Field(ge=-1e7, le=1e7)]
 Light = Annotated[float, Field(ge=0, le=1e6)]
 Length = Annotated[float, Field(ge=0, le=1e5)]
+Along = Annotated[float, Field(ge=-1e9, le=1e9)]  # (squares of larger ones are infinite somewhere)
 
 Point = tuple[Metres, Metres, Metres]  # x, y, z
 Turn = tuple[Degrees, Degrees, Degrees]  # a rotation vector
-Direction = tuple[float, float, float]  # of any length but 0
+Direction = tuple[Along, Along, Along]  # of any length but 0
 Colour = tuple[Light, Light, Light]  # linear red, green, blue
