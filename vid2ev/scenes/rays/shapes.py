@@ -3,8 +3,8 @@
     X = o + d t,  t > 0
 
 Each law gives (t, part), t infinite for a miss; part tells apart the faces of a box (-x, +x, -y, +y, -z, +z) and the
-side and ends of a cylinder.  From inside, a ray meets the far side.  Shapes without any extent are met by nothing;
-nothing is NaN.
+side and ends of a cylinder.  From inside, a ray meets the far side.  Without extent along an axis, planes and boxes are
+met by the very rays that go there, spheres, and cylinders that have none across, by nothing; nothing is NaN.
 """
 
 from __future__ import annotations
