@@ -333,6 +333,20 @@ def test_a_folder_with_a_scene_file_of_a_persons_own_is_left_alone(own: bytes, o
     assert Path("mine/scene.toml").read_bytes() == own
 
 
+@pytest.mark.parametrize("frames", ["png16", "tiff", "exr"])
+def test_what_was_put_beside_a_rendered_scene_is_not_replaced_with_it(frames: str) -> None:
+    if frames == "exr":
+        pytest.importorskip("OpenEXR")
+    arguments = ["close-object", "-o", "out", "--truth", "depth:png,flow:png,poses", *QUICK[:-1], "--frames", frames]
+    for more in ([], ["--overwrite"]):  # (with a folder of each camera of its rig)
+        assert vid2ev("scene", *arguments, *more).exit_code == 0
+    for name in ("notes.txt", "events/manifest.json"):
+        Path("out", name).parent.mkdir(exist_ok=True)
+        Path("out", name).write_text("mine")
+        refused(2, f"no rendered scene ({name.partition('/')[0]})", *arguments, "--overwrite")
+        Path("out", name).unlink()
+
+
 @pytest.mark.parametrize("seed", ["0", "4"])
 def test_a_seed_that_is_given_counts_more_than_that_of_the_name(seed: str) -> None:
     given, named, both = (

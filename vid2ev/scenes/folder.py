@@ -8,6 +8,7 @@ NAME/        what a camera of the scene's rig saw, likewise
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextlib import ExitStack
 from importlib.metadata import version
@@ -23,6 +24,9 @@ from vid2ev.scenes.source import SceneSource
 from vid2ev.toml_text import toml_text
 
 Report = Callable[[int, int], object]  # frames written, of how many
+FILES = re.compile(  # what a rendered scene holds, beside the folders of cameras
+    r"scene\.toml|files|\d{6,}\.(png|tiff|exr)|(timestamps|poses)\.txt|intrinsics\.json|preview\.mp4|depth|flow"
+)
 MADE = "# vid2ev "  # how scene.toml begins in a folder that was rendered; a person's own does not
 
 
@@ -66,12 +70,22 @@ def _is_made(directory: Path, text: str, overwrite: bool, resume: bool) -> bool:
     if not made.startswith(MADE):
         raise UsageError(f"{directory} exists and is no rendered scene; choose another folder with -o")
     if overwrite:
+        _check_replaceable(directory)
         return False
     if not resume:
         raise UsageError(f"{directory} exists; --resume leaves it, --overwrite replaces it, -o chooses another folder")
     if made != text:
         raise UsageError(f"{directory} was made with other options; --overwrite replaces it, -o chooses another folder")
     return True
+
+
+def _check_replaceable(directory: Path) -> None:
+    """Raise UsageError for a rendered scene beside which something else was put, which would be gone with it."""
+    held = (path for path in directory.iterdir() if not FILES.fullmatch(path.name))
+    if others := [path.name for path in held if not (path / "intrinsics.json").is_file()]:
+        raise UsageError(
+            f"{directory} holds files that are no rendered scene ({min(others)}); choose another folder with -o"
+        )
 
 
 def _write_all(folder: Path, source: SceneSource, contents: Contents, report: Report | None) -> None:
