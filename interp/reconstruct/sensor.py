@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from interp.representation.dead_time import DeadTime
-from interp.representation.event_counts import USUAL_NATS
+from interp.representation.event_counts import USUAL_NATS, contrast_of
 from vid2ev.recording.manifest import as_stated, read_manifest
 
 
@@ -35,5 +35,5 @@ def _said(path: Path) -> Sensor:
         numbers = (read_manifest(manifest).get("sensor") or {"parameters": {}})["parameters"]
         said = Sensor()
         if "threshold_on" in numbers:
-            said = replace(said, contrast=(numbers["threshold_off"], numbers["threshold_on"]))
+            said = replace(said, contrast=contrast_of(numbers))
         return replace(said, dead_time=DeadTime.of(numbers)) if "refractory_us" in numbers else said

@@ -12,10 +12,10 @@ standard deviation would take away, and there is nothing to divide by where ther
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 USUAL_NATS = 0.15  # the paper's threshold
 PER_VOXEL_NATS = 3 * USUAL_NATS
+MOST_NATS = 100.0  # that no threshold reaches
 LARGEST = 10.0
 WHOLE16 = 2048  # the largest up to which float16 has all whole numbers
 
@@ -123,6 +124,17 @@ class EventCounts:
     def none(batch: int, size: tuple[int, int], steps: int = 1, contrast: float = USUAL_NATS) -> EventCounts:
         """No events, for sizes (height, width)."""
         return EventCounts(torch.zeros(batch, 2, steps, *size), torch.full((batch, 2), contrast))
+
+
+def contrast_of(parameters: Mapping[str, Any]) -> tuple[float, float]:
+    """What an OFF and an ON event stand for [nat], of a sensor's parameters.
+
+    Raises KeyError, TypeError, ValueError for what no sensor has.
+    """
+    off, on = (float(parameters[name]) for name in ("threshold_off", "threshold_on"))
+    if not (0 < off < MOST_NATS and 0 < on < MOST_NATS):
+        raise ValueError(f"thresholds {(off, on)}")
+    return off, on
 
 
 def before_and_after(times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

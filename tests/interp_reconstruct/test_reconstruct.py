@@ -335,6 +335,15 @@ def test_what_lies_beside_an_event_file_is_not_its_manifest(tmp_path: Path, text
     assert reconstruct(source, tmp_path / "out")["source"]["contrast"] == [0.15, 0.15]
 
 
+@pytest.mark.parametrize("off", ["a", None, [0.2], -0.2, 0, math.nan, 1e300])
+def test_thresholds_of_a_manifest_that_no_sensor_has_are_said_to_be_damage(tmp_path: Path, off: Any) -> None:
+    source = written(tmp_path / "events.npz", drawn(10))
+    sensor = {"parameters": {"threshold_on": 0.3, "threshold_off": off}}
+    (tmp_path / "manifest.json").write_text(json.dumps({"versions": {"vid2ev": "0"}, "sensor": sensor}))
+    with pytest.raises(DataError, match=r"manifest\.json does not say what it should"):
+        reconstruct(source, tmp_path / "out", cutoff_hz=1)
+
+
 @pytest.mark.parametrize("contrast", [(0, 0.2), (math.nan, 0.2), (0.2, math.inf), (0.2,), 0.2])
 def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> None:
     with pytest.raises(UsageError, match="expected nats"):

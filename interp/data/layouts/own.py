@@ -18,6 +18,7 @@ from interp.data.layouts.maps import Maps
 from interp.data.layouts.sequence import Placed
 from interp.representation.carried import Look
 from interp.representation.dead_time import DeadTime
+from interp.representation.event_counts import contrast_of
 from vid2ev import CisSpec, DataError, UsageError, read_events
 from vid2ev.formats import open_events
 from vid2ev.recording.exposures import KINDS, LATEST_US, TIMESTAMPS, read_codes, read_spans
@@ -156,10 +157,8 @@ def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
     if sensor["kind"] == "cis":
         return facts | {"folder": _pictures_in(folder), "rate_hz": float(numbers["frame_rate_hz"]), "numbers": numbers}
     begin, length = (_whole(said[key], -LATEST_US, LATEST_US) for key in ("start_us", "duration_us"))
-    contrast = tuple(float(numbers[key]) for key in ("threshold_off", "threshold_on"))
-    if not all(0 < each < 100 for each in contrast):
-        raise ValueError(f"thresholds {contrast}")
-    return facts | {"contrast": contrast, "dead_time": DeadTime.of(numbers), "span_us": (begin, begin + length)}
+    known = {"contrast": contrast_of(numbers), "dead_time": DeadTime.of(numbers)}
+    return facts | known | {"span_us": (begin, begin + length)}
 
 
 def _whole(said: Any, least: int, most: int) -> int:
