@@ -176,6 +176,12 @@ def test_a_column_that_is_not_known_is_not_drawn() -> None:
     ]
 
 
+def test_nothing_is_said_against_a_condition_where_no_score_is_known() -> None:
+    rows = [row(position=p, psnr_255=30.0, motion_px=10.0 * p, events_per_px=1.0 * p) for p in (1, 2, 3)]
+    assert [condition.field for condition, _ in varying(rows)] == ["motion_px", "events_per_px"]
+    assert not [section.title for section in document(rows, {}).sections if section.title.startswith("Against")]
+
+
 @pytest.mark.parametrize("most_px", [50.0, 250.0])
 def test_a_line_is_spoken_of_where_there_is_one(most_px: float) -> None:
     rows = [row(position=p, psnr=30.0, ssim=0.9, motion_px=most_px * p / 5) for p in (1, 2, 3, 4, 5)]

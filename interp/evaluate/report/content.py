@@ -100,9 +100,10 @@ def _chapter(rows: Sequence[Row], sets: Mapping[str, Sequence[str]]) -> dict[str
         "Over time": _drawn(over_time_plot(rows), "PSNR of each frame."),
     }  # fmt: skip
     for condition, edges in conditions:
-        plot = condition_plot(rows, condition, edges)
+        if not (plot := condition_plot(rows, condition, edges)):  # (of what is known, no score is)
+            continue
         chapter[f"Against {condition.title}"] = [
-            *([plot] if plot else []),
+            plot,
             *([Text(breaking_points(rows, condition, edges))] if condition.harder else []),
             *(condition_table(rows, condition, edges, field, name) for field, name in SCORES.items()),
         ]
