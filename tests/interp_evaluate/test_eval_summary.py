@@ -233,14 +233,16 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
 
 def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     write_film(tmp_path / "film.npz", pictures(9))
-    done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4", "-q")
+    done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4",
+               "--set", "shading=[1, -0.25]", "-q")  # fmt: skip
     assert done.exit_code == 0 and done.stdout == ""
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["sensor"]["parameters"]["threshold_on"] == 0.4
     assert list(summary["methods"]) == list(METHODS)
     assert f"[default: {', '.join(METHODS)}]" in " ".join(run("--help").stdout.split())
     text = (tmp_path / "out" / "report.md").read_text()
-    assert FROM_TRUTH in text and "threshold_on 0.4" in text and "| event camera | clean, seed 0 |" in text
+    assert FROM_TRUTH in text and "| event camera | clean, seed 0 |" in text
+    assert "threshold_on 0.4," in text and "shading [1, -0.25]," in text
     noisy = Simulated.of("noisy", ["shot_rate_hz=3"]).spec
     assert (noisy.threshold_on, noisy.shot_rate_hz, noisy.photoreceptor_tau_us) == (0.25, 3.0, 100.0)
     wrong = run(tmp_path / "film.npz", "-o", tmp_path / "other", "--sensor", "davis")

@@ -73,9 +73,14 @@ def _settings(summary: Mapping[str, Any]) -> dict[str, object]:
     if any(of["kind"] in FILMS for of in summary["sequences"].values()):
         settings["event camera"] = f"{sensor['name']}, seed {sensor['seed']}"
         settings["its parameters"] = [
-            f"{name} {_fact(value)}" for name, value in sensor["parameters"].items() if value != []
+            f"{name} {_parameter(value)}" for name, value in sensor["parameters"].items() if value != []
         ]
     return settings
+
+
+def _parameter(value: object) -> object:
+    """As --set takes it, but for digits."""
+    return f"[{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, list) else _fact(value)
 
 
 def _fact(value: object) -> object:
