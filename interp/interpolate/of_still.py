@@ -27,6 +27,7 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.matlab import is_mat
 from vid2ev.light.picture_files import bits_in, read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
+from vid2ev.recording.exposures import LATEST_US
 from vid2ev.recording.manifest import identity
 
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
@@ -136,6 +137,8 @@ def table_of(path: Path) -> Events:
     t, x, y, p = table.T
     if len(table) and (min(x.min(), y.min()) < 0 or max(x.max(), y.max()) > np.iinfo(np.uint16).max):
         raise DataError(f"{path}: events at columns or rows below 0 or above 65535; expected t, x, y, p in this order")
+    if np.abs(t.astype(np.float64)).max(initial=0) >= LATEST_US:
+        raise DataError(f"{path}: events from {t[0]:g} to {t[-1]:g} us; expected times within {LATEST_US:g} us")
     if len(t) > 1 and t[-1] - t[0] < SHORTEST_US and (t % 1).any():  # (whole microseconds may be as short)
         raise DataError(f"{path}: events from {t[0]:g} to {t[-1]:g}; expected times in us: multiply seconds by 1e6")
     return Events(t.astype(np.int64), x.astype(np.uint16), y.astype(np.uint16), (p > 0).astype(np.uint8))

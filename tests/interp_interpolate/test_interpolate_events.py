@@ -506,6 +506,8 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
         ("negative.mat", {}, DataError, "in this order"),
         ("unknown.mat", {}, DataError, "no numbers"),
         ("seconds.mat", {}, DataError, "multiply seconds by 1e6"),
+        ("late.mat", {}, DataError, "events from 9.22337e.18 to 9.22337e.18 us; expected times within"),
+        ("early.mat", {}, DataError, "events from -1e.19 to -1e.19 us; expected times within"),
         ("events.npz", {}, UsageError, "holds no frames"),
         ("events.npz", {"events": Path("events.npz")}, UsageError, "events of its own"),
         ("still.png", {"events": Path("nothing.npz")}, UsageError, "no such file"),
@@ -517,13 +519,15 @@ def test_what_is_no_take_says_so(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     picture = np.zeros(SIZE[::-1], np.uint8)
-    for stem in ("broken", "other", "negative", "unknown", "seconds", "still"):
+    for stem in ("broken", "other", "negative", "unknown", "seconds", "late", "early", "still"):
         write_codes(tmp_path / f"{stem}.png", picture)
     savemat(tmp_path / "alone.mat", {"events": np.ones((5, 4))})
     savemat(tmp_path / "other.mat", {"light": np.ones((5, 3))})
     savemat(tmp_path / "negative.mat", {"events": -np.ones((5, 4))})
     savemat(tmp_path / "unknown.mat", {"events": np.full((5, 4), np.nan)})
     savemat(tmp_path / "seconds.mat", {"events": np.linspace(1.5, 1.53, 5)[:, None] * [1, 0, 0, 0]})
+    savemat(tmp_path / "late.mat", {"events": np.array([[2**63, 0, 0, 1], [2**63 + 4000, 0, 0, 1]], np.uint64)})
+    savemat(tmp_path / "early.mat", {"events": np.array([[-1e19, 0, 0, 1], [-1e19 + 4000, 0, 0, 1]])})
     (tmp_path / "broken.mat").write_bytes((tmp_path / "alone.mat").read_bytes()[:150])
     written(tmp_path / "events.npz", drawn(100))
     with pytest.raises(error, match=sentence) as found:
