@@ -109,6 +109,8 @@ def methods_of(
         raise UsageError(f"device '{device}': expected cpu or cuda")
     if device != "cpu" and not torch.cuda.is_available():
         raise UsageError(f"device '{device}': torch sees no GPU here; expected cpu, or a torch that sees one")
+    if int(device.partition(":")[2] or 0) >= (cards := torch.cuda.device_count()) and device != "cpu":
+        raise UsageError(f"device '{device}': torch sees GPUs up to cuda:{cards - 1} here; expected one of these")
     for name in baselines:
         if name not in METHODS:
             raise UsageError(f"baseline '{name}'{nearest(name, METHODS)}: expected some of {', '.join(METHODS)}")

@@ -145,5 +145,9 @@ def test_names_and_folders_that_are_taken_are_refused(
     with pytest.raises(UsageError, match="torch sees no GPU"), monkeypatch.context() as patch:
         patch.setattr(torch.cuda, "is_available", lambda: False)
         evaluate(datasets(data), tmp_path / "report", device="cuda")
+    with pytest.raises(UsageError, match="GPUs up to cuda:1 here"), monkeypatch.context() as patch:
+        patch.setattr(torch.cuda, "is_available", lambda: True)
+        patch.setattr(torch.cuda, "device_count", lambda: 2)
+        evaluate(datasets(data), tmp_path / "report", device="cuda:2")
     with pytest.raises(DataError, match="no frame could be scored"):
         evaluate(datasets(data), tmp_path / "report", baselines=["linear"], protocol=Protocol(20, 20))
