@@ -102,13 +102,14 @@ def evaluate(
     from interp.evaluate.simulated import Simulated
     from interp.methods import METHODS
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import heard
+    from vid2ev.commands.progress import given, heard
     from vid2ev.commands.worker_options import workers_of
     from vid2ev.sources import OPTIONS
     from vid2ev.terminal import counted, counting
 
     workers = workers_of(options)
-    edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) is not None}
+    asked = given() & {"sensor", "overrides", "seed", *OPTIONS}
+    edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) not in (None, "auto")}
     folder = Path(output or f"{_name(datasets[0])}_eval")
     with kept(folder), heard() as check, counting(quiet or as_json, GROUPS) as shown:
 
@@ -121,7 +122,7 @@ def evaluate(
             folder,
             baselines=baselines or tuple(METHODS),
             protocol=Protocol(skip, insert or skip, times, rounding),
-            simulated=Simulated.of(sensor, overrides, seed, **edits),
+            simulated=Simulated.of(sensor, overrides, seed, **edits) if asked else None,
             report=report,
             workers=workers,
             share=partial(shared_out, noun="sequences", quiet=quiet or as_json),

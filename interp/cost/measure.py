@@ -27,7 +27,7 @@ from interp.evaluate.group import Group
 from interp.evaluate.protocol import Protocol, range_of
 from interp.evaluate.rebuilders import OfMethod
 from interp.evaluate.scoring import scores_of
-from interp.evaluate.sets import footage_of
+from interp.evaluate.sets import check_simulated, footage_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.tables import mean_of
 from interp.methods import Gap
@@ -135,7 +135,7 @@ def rebuilding(
     source      what `vid2ev eval` takes: a recording, a video, `scene:NAME`; of several recordings the first is taken
     multiple    each so many-th frame is a key frame, and those between are rebuilt
     networks    weights (`interp.pretrained.path_of`); by default those that come with vid2ev
-    simulated   the event camera that looks at films
+    simulated   the event camera that looks at films; by default a clean one, and without films none
     gaps        how many
     sizes       (width, height) to which frames are brought, besides their own, to be timed
     repeats     how often each way is timed
@@ -147,6 +147,7 @@ def rebuilding(
         raise UsageError(f"{multiple} times the frames, {gaps} gaps, {repeats} repeats: expected at least 2, 1 and 1")
     protocol = Protocol(multiple - 1, multiple - 1)
     footage = footage_of([source], protocol, simulated or Simulated.of("clean"), gaps).footage[0]
+    check_simulated([footage], simulated)
     groups = list(footage.groups())
     if not groups:
         raise UsageError(f"{source}: no two key frames with {multiple - 1} frames between them; give a longer one")

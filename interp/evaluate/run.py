@@ -28,7 +28,7 @@ from interp.evaluate.report.of_evaluation import write_pages
 from interp.evaluate.row import Row
 from interp.evaluate.rows import ROWS, write_rows
 from interp.evaluate.scoring import conditions_of, rows_of
-from interp.evaluate.sets import Found, footage_of
+from interp.evaluate.sets import Found, check_simulated, footage_of
 from interp.evaluate.simulated import Simulated
 from interp.evaluate.summary import summarised
 from interp.evaluate.worst import WorstPictures, prune
@@ -78,7 +78,7 @@ def evaluate(
     networks      weights (`interp.pretrained.path_of`)
     baselines     names of closed forms (`interp.methods.METHODS`)
     predictions   folders with pictures that others have made (`predictions.py`)
-    simulated     the event camera that looks at films
+    simulated     the event camera that looks at films; by default a clean one, and without films none
     limit         groups of each sequence, from its first on
     resume        go on with what is in the folder; methods may be added
     figures       films and sheets of the first gaps, too (`figures/of_evaluation.py`)
@@ -97,11 +97,12 @@ def evaluate(
         if not isinstance(value, kind | None):
             raise UsageError(f"{name} {value!r}: expected a {kind.__name__}; leave it out for the usual one")
     folder, protocol = Path(folder), protocol or Protocol()
-    simulated = simulated or Simulated.of("clean")
+    sensor = simulated or Simulated.of("clean")
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
     if not (methods or predictions):
         raise UsageError("nothing to score: expected a baseline, a network or predictions")
-    found = footage_of([*map(str, datasets)], protocol, simulated, limit)
+    found = footage_of([*map(str, datasets)], protocol, sensor, limit)
+    check_simulated(found.footage, simulated)
     for place in predictions:
         methods += predictions_in(place, found.footage)
         if said := passed_over(Path(place), found.footage):
@@ -109,7 +110,7 @@ def evaluate(
     _check(methods)
     job = {
         "vid2ev": versions()["vid2ev"], "protocol": asdict(protocol), "limit": limit, "device": device,
-        "sensor": simulated.describe(), "sequences": {each.name: each.identity for each in found.footage},
+        "sensor": sensor.describe(), "sequences": {each.name: each.identity for each in found.footage},
     }  # fmt: skip
     with Kept(folder, job, {method.name: method.identity for method in methods}, resume) as kept:
         frames = len(protocol.positions)

@@ -55,6 +55,17 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
     return Found(footage, sets, unusable)
 
 
+def check_simulated(footage: Sequence[Footage], simulated: Simulated | None) -> None:
+    """Raise UsageError where it is said how films are seen, and there are none."""
+    if simulated is None or any(isinstance(each, Film) for each in footage):
+        return
+    edits = (f"--{name}" for name in simulated.options)
+    raise UsageError(
+        f"{footage[0].name} is a recording, whose frames and events stay as they are; leave"
+        f" {next(edits, '--sensor, --set and --seed')} out"
+    )
+
+
 def set_names(datasets: Sequence[str]) -> dict[str, str]:
     """What data sets are called: by the ends of their paths, as long as it takes to tell them apart."""
     return dict(zip(datasets, apart(_ends_of(datasets)), strict=True))

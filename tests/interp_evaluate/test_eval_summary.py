@@ -231,6 +231,28 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
     assert refused.exit_code == 2 and "begun with protocol.skip = 7, not 3" in refused.output
 
 
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (["--start", "5"], "leave --start out"),
+        (["--size", "20", "--seed", "1"], "leave --size out"),
+        (["--transfer", "pq"], "leave --transfer out"),
+        (["--sensor", "noisy"], "leave --sensor, --set and --seed out"),
+        (["--set", "threshold_on=0.4"], "leave --sensor, --set and --seed out"),
+    ],
+)
+def test_what_is_said_of_films_is_refused_where_there_are_recordings_alone(
+    tmp_path: Path, asked: list[str], said: str
+) -> None:
+    write_hsergb(tmp_path / "set" / "seq", pictures(10))
+    options = ["--skip", 3, "--baseline", "linear", "-o", tmp_path / "out"]
+    refused = run(tmp_path / "set", *options, *asked)
+    assert refused.exit_code == 2 and not (tmp_path / "out").exists()
+    assert f"seq is a recording, whose frames and events stay as they are; {said}" in refused.output
+    write_film(tmp_path / "film.npz", pictures(5))
+    assert run(tmp_path / "set", tmp_path / "film.npz", *options, "--seed", "1", "-q").exit_code == 0
+
+
 def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     write_film(tmp_path / "film.npz", pictures(9))
     done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4",
