@@ -54,7 +54,7 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 )
 @click.option(
     "--events", type=click.Path(exists=True, path_type=Path), metavar="EVENTS",
-    help="Event file to a video, images or a single frame, on their clock.",
+    help="Event file to one video, images or a single frame, on their clock.",
 )  # fmt: skip
 @click.option(
     "--start",
@@ -127,6 +127,8 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         raise UsageError(
             f"-o {output}: a film, of {len(found)} source(s) in {sources[0]}; expected the name of a folder"
         )
+    if taken.events and len(found) > 1:
+        raise UsageError(f"--events {taken.events}: of one source, and here are {len(found)}; give each its own")
     if output and single:
         paths = {found[0]: output}
     else:

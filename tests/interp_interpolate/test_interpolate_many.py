@@ -65,3 +65,12 @@ def test_a_film_is_of_one_source() -> None:
         result = run(*sources, "-o", "film.mp4")
         assert isinstance(result.exception, UsageError) and "expected the name of a folder" in str(result.exception)
         assert not Path("film.mp4").exists()
+
+
+def test_a_file_of_events_is_of_one_source() -> None:
+    Path("events.csv").write_text("t,x,y,p\n1000,3,5,1\n")
+    for sources in (["films"], ["films/f0", "films/f1"], ["films/f0", "films/f1", "--jobs", "2"]):
+        result = run(*sources, "--events", "events.csv", "-o", "made")
+        assert isinstance(result.exception, UsageError)
+        assert "--events events.csv: of one source, and here are 2" in str(result.exception)
+        assert not Path("made").exists()
