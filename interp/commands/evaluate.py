@@ -154,7 +154,7 @@ def kept(folder: Path) -> Iterator[None]:
 
 def _name(dataset: str) -> str:
     from interp.evaluate.naming import plain
-    from vid2ev.sources import SCENE_PREFIX
+    from vid2ev.sources import SCENE_PREFIX, short_name
 
     name = dataset.removeprefix(SCENE_PREFIX)
-    return plain(Path(name).stem if name == dataset else name)
+    return plain(short_name(dataset) if name == dataset else name)

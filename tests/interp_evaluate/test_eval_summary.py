@@ -232,6 +232,20 @@ def test_the_command_prints_a_table_and_writes_a_report(tmp_path: Path, monkeypa
 
 
 @pytest.mark.parametrize(
+    ("dataset", "made"),
+    [(".", "sets.v2_eval"), ("seq", "seq_eval"), ("../sets.v2", "sets.v2_eval"), ("../film.npz", "film_eval")],
+)
+def test_a_report_is_called_after_the_data_set_wherever_one_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dataset: str, made: str
+) -> None:
+    write_hsergb(tmp_path / "sets.v2" / "seq", pictures(5))
+    write_film(tmp_path / "film.npz", pictures(5))
+    monkeypatch.chdir(tmp_path / "sets.v2")
+    assert run(dataset, "--skip", 3, "--baseline", "linear", "-q").exit_code == 0
+    assert (tmp_path / "sets.v2" / made / "report.html").exists()
+
+
+@pytest.mark.parametrize(
     ("asked", "said"),
     [
         (["--start", "5"], "leave --start out"),
