@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -65,6 +65,7 @@ class Film:
     name    by which it is called
     called  what folders of others' pictures of it may be called; as it is if that is not known
     limit   groups that are scored, from the first on; None for all
+    besides   folders that are made of it, wherever they are
     Raises UsageError for a source that is not there, or is a recording, DataError for one that cannot be read.
     """
 
@@ -76,6 +77,7 @@ class Film:
         simulated: Simulated,
         limit: int | None = None,
         called: tuple[str, ...] = (),
+        besides: Collection[Path] = (),
     ):
         self.name, self.video, self.protocol, self.limit = name, video, protocol, limit
         self.called = called or (name,)
@@ -88,7 +90,7 @@ class Film:
         self._stored = str(about.get("pixel_format", ""))
         count = max((source.frames_expected or 0) - 1, 0) // protocol.multiple
         self.expected = count if limit is None else min(count, limit)
-        self.identity: dict[str, Any] = _identity(video, about)
+        self.identity: dict[str, Any] = _identity(video, about, besides)
 
     @cached_property
     def frames(self) -> int:
@@ -162,11 +164,11 @@ class Film:
         return Group(number, first, keys, positions, truth, times_us, counts, cameras, self.curve)
 
 
-def _identity(video: str, about: Mapping[str, Any]) -> dict[str, Any]:
+def _identity(video: str, about: Mapping[str, Any], besides: Collection[Path]) -> dict[str, Any]:
     """What tells a film from another: what is in its files, or of a scene every number of it."""
     path = Path(video)
     if os.path.exists(path):  # (settings of a scene may be longer than any name of a file)
-        return {"video": path.name, **identity(path, copies=True, deep=True)}
+        return {"video": path.name, **identity(path, copies=True, deep=True, besides=besides)}
     return {"video": video, "sha256": hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()}
 
 

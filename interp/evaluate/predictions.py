@@ -8,7 +8,7 @@ How folders are called, `prediction_folders.py` says, and `pairing.py` which fra
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -71,13 +71,15 @@ class Predictions:
             return None
 
 
-def predictions_in(folder: str | Path, footage: Sequence[Footage] = ()) -> list[Predictions]:
-    """The methods whose pictures of footage a folder holds, in order of their names.  Raises UsageError where there
-    are none."""
+def predictions_in(
+    folder: str | Path, footage: Sequence[Footage] = (), besides: Collection[Path] = ()
+) -> list[Predictions]:
+    """The methods whose pictures of footage a folder holds, in order of their names; `besides` are folders that are
+    made of them.  Raises UsageError where there are none."""
     folder = Path(folder)
     sequences = sequence_folders(folder, footage)
     inner = sorted({each.name for of in sequences for each in of.iterdir() if each.is_dir() and pictures_in(each)})
-    known = identity(folder, copies=True, deep=True) if sequences else {}
+    known = identity(folder, copies=True, deep=True, besides=besides) if sequences else {}
     found = [Predictions(plain(name), folder, name, known) for name in inner if name.lower() != TRUTH]
     if any(map(pictures_in, sequences)):
         found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,17 @@ class Recording:
     name    by which it is called
     called  what folders of others' pictures of it may be called; as it is if that is not known
     limit   groups that are scored, from the first on; None for all
+    besides   folders that are made of it, wherever they are
     """
 
     def __init__(
-        self, sequence: Sequence, protocol: Protocol, name: str, limit: int | None = None, called: tuple[str, ...] = ()
+        self,
+        sequence: Sequence,
+        protocol: Protocol,
+        name: str,
+        limit: int | None = None,
+        called: tuple[str, ...] = (),
+        besides: Collection[Path] = (),
     ):
         self.name, self._sequence, self.protocol, self.limit = name, sequence, protocol, limit
         self.called = called or (name,)
@@ -42,7 +50,7 @@ class Recording:
         if left := len(found.first) - len(self._firsts):
             self._not_scored[f"beyond the limit of {limit}"] = left
         self.expected, self._scored = len(self._firsts), 0
-        self.identity: dict[str, Any] = identity(sequence.folder, copies=True, deep=True)
+        self.identity: dict[str, Any] = identity(sequence.folder, copies=True, deep=True, besides=besides)
 
     def groups(self) -> Iterator[Group]:
         """See `interp.evaluate.group.Footage`; groups with a file that cannot be read are counted."""

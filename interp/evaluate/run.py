@@ -101,10 +101,10 @@ def evaluate(
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
     if not (methods or predictions):
         raise UsageError("nothing to score: expected a baseline, a network or predictions")
-    found = footage_of([*map(str, datasets)], protocol, sensor, limit)
+    found = footage_of([*map(str, datasets)], protocol, sensor, limit, [folder])
     check_simulated(found.footage, simulated)
     for place in predictions:
-        methods += predictions_in(place, found.footage)
+        methods += predictions_in(place, found.footage, [folder])
         if said := passed_over(Path(place), found.footage):
             found.unusable[str(place)] = said
     _check(methods)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,8 +29,15 @@ class Found(NamedTuple):
     unusable: dict[str, str]
 
 
-def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated, limit: int | None = None) -> Found:
-    """The footage of data sets: folders with recordings, videos, folders of them or of pictures, `scene:NAME`.
+def footage_of(
+    datasets: Sequence[str],
+    protocol: Protocol,
+    simulated: Simulated,
+    limit: int | None = None,
+    besides: Collection[Path] = (),
+) -> Found:
+    """The footage of data sets: folders with recordings, videos, folders of them or of pictures, `scene:NAME`;
+    `besides` are folders that are made of it.
 
     Raises UsageError for what is none of these, or where nothing can be used.
     """
@@ -44,7 +51,7 @@ def footage_of(datasets: Sequence[str], protocol: Protocol, simulated: Simulated
     folders = _folders_of(places, names, called)
     for (dataset, place), name, folder in zip(places, names, folders, strict=True):
         try:
-            made = _opened(place, protocol, name, simulated, limit, folder)
+            made = _opened(place, protocol, name, simulated, limit, folder, besides)
         except DataError as error:
             unusable[place if isinstance(place, str) else str(place.folder)] = str(error)
             continue
@@ -107,10 +114,11 @@ def _opened(
     simulated: Simulated,
     limit: int | None,
     called: tuple[str, ...],
+    besides: Collection[Path],
 ) -> Footage:
     if isinstance(place, str):
-        return Film(place, protocol, name, simulated, limit, called)
-    return Recording(place, protocol, name, limit, called)
+        return Film(place, protocol, name, simulated, limit, called, besides)
+    return Recording(place, protocol, name, limit, called, besides)
 
 
 def _places(dataset: str) -> tuple[list[str | Recorded], dict[str, str]]:

@@ -14,6 +14,7 @@ from rows_read import read_rows
 from interp.evaluate import run
 from interp.evaluate.protocol import Protocol
 from interp.evaluate.run import evaluate
+from interp.evaluate.simulated import Simulated
 from interp.networks import make
 from interp.weights import save
 from vid2ev import DataError, UsageError
@@ -127,6 +128,19 @@ def test_methods_can_be_added_and_other_settings_are_refused(
     with pytest.raises(UsageError, match=r"begun with methods.firenet.weights_sha256"):
         changed = options(data) | {"networks": [tmp_path / "firenet.safetensors"]}
         evaluate(datasets(data), tmp_path / "report", resume=True, **changed)
+
+
+@pytest.mark.parametrize("within", ["seq", "pictures", "theirs"])
+def test_a_report_may_lie_in_what_it_is_made_of(tmp_path: Path, within: str) -> None:
+    write_hsergb(tmp_path / "seq", pictures(5))
+    write_predictions(tmp_path / "pictures", pictures(5))
+    write_predictions(tmp_path / "theirs" / "seq", pictures(5))
+    asked = [str(tmp_path / name) for name in ("seq", "pictures")], tmp_path / within / "report"
+    more: dict[str, Any] = {"protocol": Protocol(3, 3), "simulated": Simulated.of("clean", fps=250)}
+    more["predictions"] = [tmp_path / "theirs"]
+    first = evaluate(*asked, baselines=["linear"], **more)
+    rows = evaluate(*asked, baselines=["linear", "nearest"], resume=True, **more).rows
+    assert repr([row for row in rows if row.method != "nearest"]) == repr(first.rows)
 
 
 def test_names_and_folders_that_are_taken_are_refused(
