@@ -202,7 +202,7 @@ def _facts(path: Path, made: dict[str, Any]) -> list[tuple[str, str]]:
     span_s = (made["stop_us"] - made["start_us"]) / 1e6
     facts.append(("from", f"{counted(made['key_frames'], 'key frame')}, {span_s:.6g} s"))
     if made["hdr"]:
-        facts.append(("hdr", f"all frames, by {Path(made['hdr']['weights']).stem}"))
+        facts.append(("hdr", f"all frames, by {pretrained.name_of(Path(made['hdr']['weights']))}"))
     if made["tiles"] != "none":
         facts.append(("tiles", made["tiles"]))
     for reason, gaps in made["gaps_s"].items():

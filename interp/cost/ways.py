@@ -19,6 +19,7 @@ from typing import Self
 import torch
 
 from interp import pretrained
+from interp.evaluate.naming import apart
 from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.gap import Together
 from interp.methods.of_networks import OfEvents, OfFrames, of_weights
@@ -90,14 +91,17 @@ def ways(networks: Sequence[str | Path], device: str) -> list[Way]:
 
     Raises UsageError, DataError for weights that cannot be used.
     """
-    asked = networks or [path.stem for names in KINDS if (path := pretrained.first(names)) is not None]
+    asked = list(dict.fromkeys(networks)) or [path.stem for names in KINDS if (path := pretrained.first(names))]
+    paths = [pretrained.path_of(name) for name in asked]
+    names = apart([*METHODS, *map(pretrained.name_of, paths)])[len(METHODS) :]
     found = [Way(name, "closed forms", partial(open_method, name), f"--method {name}") for name in METHODS]
-    opened = {f"--network {name}": of_weights(pretrained.path_of(name), device) for name in asked}
+    known = zip(asked, paths, names, strict=True)
+    opened = {f"--network {of}": of_weights(path, device, name) for of, path, name in known}
     found += [Way(plain.name, "networks", partial(_itself, plain), of) for of, plain in opened.items()]
     for of, plain in [*opened.items()][:1]:
         found += _otherwise(plain, of, device)
         if compiles(device):
-            found.append(_compiled(pretrained.path_of(asked[0]), of, device))
+            found.append(_compiled(paths[0], names[0], of, device))
     return found
 
 
@@ -119,10 +123,10 @@ def _otherwise(plain: OfFrames | OfEvents, asked: str, device: str) -> Iterator[
         yield Way(f"{name}, of size {size}", "larger", partial(_untrained, plain, size), scored=False)
 
 
-def _compiled(path: Path, asked: str, device: str) -> Way:
+def _compiled(path: Path, name: str, asked: str, device: str) -> Way:
     """The same network compiled: loaded once more, as it is compiled in place."""
     opened = partial(of_weights, path, device, running=Running(compiled=True))
-    return Way(f"{path.stem}, compiled", "compiled", opened, f"{asked} --compile")
+    return Way(f"{name}, compiled", "compiled", opened, f"{asked} --compile")
 
 
 def _itself(method: Method) -> Method:

@@ -21,7 +21,6 @@ from interp.methods import METHODS, Gap, Method, open_method
 from interp.methods.of_networks import of_weights
 from interp.methods.tiling import tiling_of
 from interp.own_codes import recoded, shown
-from interp.pretrained import OF_RUN
 from vid2ev.errors import UsageError, nearest
 from vid2ev.recording.manifest import sha256
 
@@ -115,10 +114,9 @@ def methods_of(
         if name not in METHODS:
             raise UsageError(f"baseline '{name}'{nearest(name, METHODS)}: expected some of {', '.join(METHODS)}")
     paths = [pretrained.path_of(network) for network in networks]
-    called = [path.parent.name if path.name == OF_RUN and path.parent.name else path.stem for path in paths]
     forms = list(dict.fromkeys(baselines))
     found = [OfMethod(name, {"closed_form": name}, open_method(name, device), protocol, device) for name in forms]
-    for name, path in zip(apart([*forms, *called])[len(forms) :], paths, strict=True):
+    for name, path in zip(apart([*forms, *map(pretrained.name_of, paths)])[len(forms) :], paths, strict=True):
         method = of_weights(path, device, name)
         found.append(OfMethod(name, {"weights_sha256": sha256(path)}, method, protocol, device))
     return found

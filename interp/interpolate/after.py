@@ -27,6 +27,7 @@ from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
 from interp.methods.tiling import Tile, parse_tiling, strips
 from interp.networks.hdr import AROUND, MULTIPLE, Hdr, HdrState
+from interp.pretrained import name_of
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
@@ -52,7 +53,8 @@ class After:
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
             raise UsageError(
-                f"HDR by {path.stem} needs events, with which it was trained; give some with --events, or leave it out"
+                f"HDR by {name_of(path)} needs events, with which it was trained; give some with --events, or leave it"
+                " out"
             )
         self._state: HdrState | None = None
         self._rest: torch.Tensor | None = None  # events since the key frame that the state is of

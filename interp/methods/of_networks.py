@@ -17,6 +17,7 @@ from interp.methods.tiling import Tiling, part
 from interp.networks.around import Around
 from interp.networks.event_fed import EventFed, States
 from interp.networks.frame_fed import FrameFed, Pair
+from interp.pretrained import name_of
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
@@ -117,9 +118,9 @@ class OfEvents(Together):
 def of_weights(
     path: Path, device: torch.device | str = "cpu", name: str | None = None, running: Running = PLAIN
 ) -> OfFrames | OfEvents:
-    """The network of a file as a method; it is called like the file unless told otherwise."""
+    """The network of a file as a method; it is called as `interp.pretrained.name_of` says unless told otherwise."""
     network: Any = running.ready(load(path).to(device))
-    name = name or path.stem
+    name = name or name_of(path)
     if isinstance(network, FrameFed):
         return OfFrames(name, network, network.spec.takes_events, running)
     if isinstance(network, EventFed):

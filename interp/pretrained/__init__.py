@@ -39,6 +39,11 @@ def path_of(weights: str | Path) -> Path:
     return found
 
 
+def name_of(weights: Path) -> str:
+    """What a network is called: like the file of its weights, or like the folder of its run."""
+    return weights.parent.name if weights.name == OF_RUN and weights.parent.name else weights.stem
+
+
 def first(names: tuple[str, ...]) -> Path | None:
     """The weights of the first of some names that come with this version; None if there are none."""
     paths = (HERE / f"{name}.safetensors" for name in names)

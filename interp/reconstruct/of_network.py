@@ -12,6 +12,7 @@ from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_light
 from interp.methods.tiling import Tile, parse_tiling
 from interp.networks.event_fed import EventFed, States
+from interp.pretrained import name_of
 from interp.representation.event_counts import as_voxels
 from interp.weights import load
 from vid2ev import Events
@@ -38,7 +39,7 @@ class OfNetwork:
         network = load(path).to(device)
         if not isinstance(network, EventFed):
             raise UsageError(f"{path} holds a network that takes frames; give weights of e2vid or firenet")
-        self.name, self.network, self.device, self.tile = path.stem, network, device, tile
+        self.name, self.network, self.device, self.tile = name_of(path), network, device, tile
         off, on = contrast
         self._worth = torch.tensor([-off, on], dtype=torch.float32)[:, None, None, None]
         self._voxel = Voxel(size, int(network.spec.bins), polarity=True)  # type: ignore[arg-type, union-attr]

@@ -189,6 +189,19 @@ def test_every_way_is_there_and_says_how_to_ask_for_it(monkeypatch: pytest.Monke
     assert 3.5 * plain < sizes[0] < 4.5 * plain and 3.5 * sizes[0] < sizes[1] < 4.5 * sizes[0]
 
 
+def test_networks_of_runs_are_called_like_these(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("interp.cost.ways.compiles", lambda device: True)
+    runs = [tmp_path / folder for folder in ("first", "second", "other/second", "linear")]
+    for run in runs:
+        run.mkdir(parents=True)
+        (run / "weights.safetensors").symlink_to(WEIGHTS)
+    found = ways(runs, "cpu")
+    assert [way.name for way in found if way.group == "networks"] == ["first", "second", "second_2", "linear_2"]
+    assert {"first, compiled", "first, tiles"} < {way.name for way in found}
+    assert len({way.name for way in found}) == len(found)
+    assert open_method(str(runs[0] / "weights.safetensors")).name == "first"
+
+
 def test_what_is_done_once_per_gap_may_be_done_for_each_frame() -> None:
     method, times = open_method(str(WEIGHTS)), torch.tensor([0.25, 0.5, 0.75])
     torch.testing.assert_close(Anew(method).between(gap(), times), method.between(gap(), times), atol=1e-5, rtol=0)
