@@ -125,4 +125,4 @@ def _by_its_name(said: str) -> str:
     """What a source says, with the options that there are here: --fps is that of the frames to make, and a single
     picture needs its events."""
     said = said.replace("let a camera move over it with --motion pan", "its events with --events")
-    return re.sub(r"(?<![\w-])--fps\b", "--source-fps", said)
+    return re.sub(r"^fps\b|(?<![\w-])--fps\b", "--source-fps", said)
