@@ -26,7 +26,8 @@ TRANSFERS = dict.fromkeys((1, 6, 11, 12, 14, 15), "bt709") | {
     18: "hlg",
 }
 
-PICTURES = ("apng", "bmp", "gif", "png", "tiff", "webp", "webp_anim")  # FFmpeg's names of codecs of pictures, not of cameras
+# FFmpeg's names of codecs of pictures, not of cameras
+PICTURES = ("apng", "bmp", "gif", "png", "tiff", "webp", "webp_anim")
 
 # table 4: shares of red and blue in luma
 MATRICES = {

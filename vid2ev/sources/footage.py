@@ -105,8 +105,8 @@ class VideoFile:
                 raise DataError(f"{self.path}: named as a picture is, but not one that can be read; {REMEDY}")
             if container.format.name == "webp_pipe" and recognise(self.path) == "video":
                 raise DataError(
-                    f"{self.path}: an animated WebP, of which this FFmpeg decodes nothing; make a video, an animated PNG or"
-                    " a folder of pictures of it"
+                    f"{self.path}: an animated WebP, of which this FFmpeg decodes nothing; make a video, an animated"
+                    " PNG or a folder of pictures of it"
                 )
             if container.format.name.endswith("_pipe"):
                 raise UsageError(f"{self.path}: a single picture; give the folder that holds the sequence")
