@@ -27,7 +27,7 @@ def around_tiles(network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tilin
     if network.spec.guided:
         light = _light(network, gap, times, tiling, around)
         around = replace(around, to_targets=flows_to(whole.frame_0, whole.frame_1, light, network.transfer))
-    return replace(around, between=sought(whole) if network.seeks_motion else None)
+    return replace(around, between=sought(whole, network.transfer) if network.seeks_motion else None)
 
 
 def _light(network: FrameFed, gap: Gap, times: torch.Tensor, tiling: Tiling, around: Around) -> torch.Tensor:

@@ -205,7 +205,7 @@ def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:
     return _carried((whole.frame_0, whole.frame_1), pair, flows_at)
 
 
-def sought(pair: Pair, transfer: Transfer = "srgb") -> torch.Tensor:
+def sought(pair: Pair, transfer: Transfer) -> torch.Tensor:
     """Motion between the frames by DIS, [B, 4, H, W] px."""
     if pair.around is not None and pair.around.between is not None:
         return pair.around.between

@@ -93,7 +93,7 @@ class RrinEventsSpec(FrameFedSpec):
     )
     gate: bool = Field(default=False, description="no residue where no event is near; costs one mean of counts")
     transfer: Transfer = Field(
-        default="srgb", description="how the frames are coded: srgb or linear; for the candidate"
+        default="srgb", description="how the frames are coded: srgb or linear; for the candidate and the flow of DIS"
     )
 
     @property

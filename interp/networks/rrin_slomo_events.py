@@ -69,7 +69,7 @@ class RrinSlomoEventsSpec(EventInputSpec):
         description="a picture from events alone per bin, first, last and target as input: firenet 38 k parameters and"
         " 38 kMAC/px, e2vid 10.7 M and 454, times the number of bins, once per pair",
     )
-    transfer: Transfer = Field(default="srgb", description="how the frames are coded, for flow guided; free")
+    transfer: Transfer = Field(default="srgb", description="how the frames are coded, for flow dis and guided; free")
     reconstruct_weights: Weights = Field(default="own", description="pretrained: weights of that network, frozen")
 
     @property
@@ -107,7 +107,7 @@ class RrinSlomoEvents(FrameFed):
     def flows_of(self, pair: Pair) -> torch.Tensor:
         """Flows between the frames."""
         if self.flow is None:
-            return sought(pair)
+            return sought(pair, self.spec.transfer)
         return self.flow(pair.frame_0, pair.frame_1, pair.events)
 
     def computed_once(self, pair: Pair) -> tuple[torch.Tensor, ...]:

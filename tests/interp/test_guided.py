@@ -242,6 +242,21 @@ def test_motion_between_is_of_the_first_and_then_of_the_second() -> None:
     torch.testing.assert_close(found, torch.tensor([-4.0, 0.0, 4.0, 0.0]), atol=0.3, rtol=0)
 
 
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("rrin", {"first_flow": "dis"}),
+        ("rrin_slomo_events", {"flow": "dis"}),
+        ("rrin_slomo_events", {"flow": "guided"}),
+    ],
+)
+def test_motion_is_that_of_the_light_however_frames_are_coded(name: str, options: dict[str, str]) -> None:
+    codes = 0.1 * shifted(0.0), 0.1 * shifted(4.0)
+    by_codes = make(name, **options, transfer="srgb").prepare(*codes)
+    by_light = make(name, **options, transfer="linear").prepare(*(to_light(each, "srgb") for each in codes))
+    assert by_codes.flows.abs().amax() > 1 and torch.equal(by_light.flows, by_codes.flows)
+
+
 @pytest.mark.parametrize("size", [(8, 30), (16, 16)])
 def test_any_size_will_do(size: tuple[int, int]) -> None:
     first, last = torch.rand(2, 1, 1, *size)

@@ -246,6 +246,21 @@ def test_motion_is_that_of_the_whole(name: str, options: dict[str, Any], event_s
         assert float(off.max()) < 2e-4
 
 
+@pytest.mark.parametrize(
+    ("name", "options"), [("rrin_light", {"depths": (3, 3, 3, 3)}), ("rrin_slomo_events", {"flow": "dis"})]
+)
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_motion_is_that_of_the_whole_however_frames_are_coded(
+    name: str, options: dict[str, Any], transfer: str
+) -> None:
+    network = make(name, transfer=transfer, **options).eval()
+    dark = replace(gap(), events=None)
+    dark = replace(dark, frame_0=0.05 * dark.frame_0, frame_1=0.05 * dark.frame_0.roll((2, 5), (1, 2)))
+    tiling, method = parse_tiling("128x128", SIZE, network.multiple), OfFrames(name, network, needs_events=False)
+    made, at_once = method.between(dark, TIMES, tiling), method.between(dark, TIMES)
+    torch.testing.assert_close(made, at_once, atol=1e-6, rtol=0)
+
+
 def test_a_tiling_says_what_it_is() -> None:
     assert parse_tiling("none", SIZE, 32).describe() == "none"
     assert parse_tiling("128x128", SIZE, 32).describe() == "6 tiles of 128x128"
