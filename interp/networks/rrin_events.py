@@ -91,7 +91,10 @@ class RrinEventsSpec(FrameFedSpec):
         description="into U4, with a candidate, what events say of each pixel before and after the target: 1,152"
         " parameters and 1.152 kMAC/px, coarse 9,216 and 2.304",
     )
-    gate: bool = Field(default=False, description="no residue where no event is near; costs one mean of counts")
+    gate: bool = Field(
+        default=False,
+        description="no residue where no event is near, of networks that take events; costs one mean of counts",
+    )
     transfer: Transfer = Field(
         default="srgb", description="how the frames are coded: srgb or linear; for the candidate and the flow of DIS"
     )
@@ -217,4 +220,5 @@ class RrinEvents(FrameFed):
         return found[:, :, :-1] + share * (draft - candidate[0])
 
     def _gate(self, pair: Pair) -> torch.Tensor:
-        return gate_of(pair) if self.spec.gate else torch.ones_like(pair.frame_0[:, :1])
+        closes = self.spec.gate and self.spec.takes_events  # (in use, too, whatever it was taught with)
+        return gate_of(pair) if closes else torch.ones_like(pair.frame_0[:, :1])

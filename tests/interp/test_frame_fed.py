@@ -162,13 +162,22 @@ def test_events_of_a_sensor_with_fewer_pixels_are_taken(name: str) -> None:
     assert images.shape == without.shape and torch.isfinite(images).all()
 
 
-@pytest.mark.parametrize("name", FRAME_FED)
-def test_events_matter_where_a_network_takes_them_and_only_there(name: str) -> None:
-    made = network(name)
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        *((name, {}) for name in FRAME_FED),
+        ("rrin", {"gate": True}),
+        ("rrin_slomo_events", {"events": "none", "flow": "dis"}),
+        ("rrin_slomo_events", {"events": "none", "flow_input": "frames+events"}),
+    ],
+)
+def test_events_matter_where_a_network_takes_them_and_only_there(name: str, options: dict) -> None:
+    made = network(name, **options)
     first, second = frames()
     with torch.no_grad():
         with_them, without = (made(first, second, TIMES, some).images for some in (counts(rate=1.0), counts(rate=0.0)))
-    assert torch.equal(with_them, without) == (name in ("superslomo", "rrin"))
+    assert torch.equal(with_them, without) == (not made.spec.takes_events)
+    assert made.spec.takes_events == (name not in ("superslomo", "rrin") and options.get("flow") != "dis")
 
 
 @pytest.mark.parametrize("candidate", ["base", "mixed", "softmax"])
