@@ -15,7 +15,7 @@ import torch
 from torch import nn
 
 from interp.blocks.frozen import Frozen
-from interp.networks import NETWORKS, make
+from interp.networks import NETWORKS, make, spec_of
 from vid2ev.errors import DataError, UsageError
 from vid2ev.untrusted import first_line, json_of
 
@@ -71,13 +71,21 @@ def fill(network: nn.Module, path: Path) -> None:
 
 def load_part(network: nn.Module, part: str, path: Path) -> None:
     """Give a part of a network, such as `flow` or `reconstruct`, the weights of a network trained for itself; raises
-    UsageError for a part that it does not have, and as `fill` does."""
-    module = getattr(network, part, None)
-    if not isinstance(module, nn.Module):
-        raise UsageError(
-            f"{type(network).__name__} has no part '{part}'; it has {', '.join(dict(network.named_children()))}"
-        )
-    fill(module.module if isinstance(module, Frozen) else module, path)
+    UsageError for a part that it does not have, for weights that mean something else there, and as `fill` does."""
+    parts = {name: each.module if isinstance(each, Frozen) else each for name, each in network.named_children()}
+    parts = {name: each for name, each in parts.items() if hasattr(each, "spec")}
+    if part not in parts:
+        there = ", ".join(parts) or "none that is trained for itself; leave it out"
+        raise UsageError(f"{type(network).__name__} has no part '{part}'; it has {there}")
+    fill(parts[part], path)
+    name, said = about(path)
+    theirs, ours = spec_of(name, **said).model_dump(), parts[part].spec.model_dump()  # type: ignore[operator, union-attr]
+    for key in theirs.keys() - {"zero_heads"}:  # (which decides how weights begin, and nothing later)
+        if theirs[key] != ours[key]:
+            raise UsageError(
+                f"{path} holds the weights of a network with {key} = {theirs[key]}, and {part} of this one has"
+                f" {ours[key]}; give those of one that is alike"
+            )
 
 
 def _of_network(path: Path) -> tuple[str, dict[str, Any], dict[str, torch.Tensor]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -72,6 +73,29 @@ def test_a_part_takes_the_weights_of_a_network_trained_for_itself(tmp_path: Path
         weights.load_part(network, "flow", tmp_path / "fire.safetensors")
     with pytest.raises(UsageError, match="no part 'flows'"):
         weights.load_part(network, "flows", tmp_path / "flow.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "options"),
+    [("flow", "flow", {"flow_scale": 20.0}), ("reconstruct", "firenet", {"output": "linear"})],
+)
+def test_weights_that_mean_something_else_in_a_part_are_refused(
+    part: str, name: str, options: dict[str, Any], tmp_path: Path
+) -> None:
+    """Shapes do not tell that flows are in other units, or pictures not between 0 and 1."""
+    weights.save(tmp_path / "other.safetensors", name, make(name, **options))
+    network = make("rrin_slomo_events", flow="pretrained", reconstruct="firenet")
+    (key, value), *_ = options.items()
+    with pytest.raises(UsageError, match=f"with {key} = {value}, and {part} of this one has"):
+        weights.load_part(network, part, tmp_path / "other.safetensors")
+
+
+@pytest.mark.parametrize("part", ["flow", "refine"])
+def test_parts_that_are_not_trained_for_themselves_take_no_weights(part: str, tmp_path: Path) -> None:
+    path, network = tmp_path / "whole.safetensors", make("rrin_events")
+    weights.save(path, "rrin_events", network)
+    with pytest.raises(UsageError, match=f"no part '{part}'; it has none that is trained for itself"):
+        weights.load_part(network, part, path)
 
 
 def test_what_is_not_weights_is_refused_in_a_sentence(tmp_path: Path) -> None:
