@@ -26,7 +26,7 @@ from interp.train.running_mean import RunningMean
 from interp.train.schedule import Schedule, Steps
 from interp.train.scores import Scores
 from interp.train.session import Limits, Session, validate_every
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, Vid2evError
 
 LOG_EVERY = 10  # steps
 Stop = Callable[[], bool]
@@ -189,9 +189,16 @@ class Fit:
 
 @contextmanager
 def made_by_workers() -> Iterator[None]:
-    """A process that makes samples and is killed, for want of memory as a rule, becomes one sentence."""
+    """What a process that makes samples says stays one sentence, without the traceback that torch puts before it; one
+    that is killed, for want of memory as a rule, becomes one."""
     try:
         yield
+    except Vid2evError as error:
+        kind = type(error)
+        _, named, said = str(error).rpartition(f" {kind.__module__}.{kind.__qualname__}: ")
+        if not named:  # (of this process)
+            raise
+        raise kind(said.strip()) from error
     except RuntimeError as error:
         if not str(error).startswith("DataLoader worker"):
             raise

@@ -5,8 +5,11 @@ from __future__ import annotations
 from itertools import chain, islice
 
 import pytest
+from torch.utils.data import DataLoader, Dataset
 
 from interp.train.batches import Steps
+from interp.train.fit import made_by_workers
+from vid2ev.errors import DataError, DiskError, UsageError
 
 
 @pytest.mark.parametrize("processes", [1, 2, 4])
@@ -19,3 +22,25 @@ def test_processes_share_what_one_would_take(processes: int) -> None:
 
 def test_steps_go_on_where_they_were() -> None:
     assert list(islice(Steps(3, 4), 2)) == list(islice(Steps(0, 4), 5))[3:]
+
+
+class Unmade(Dataset[int]):
+    """A sample that cannot be made."""
+
+    def __init__(self, error: Exception):
+        self.error = error
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, _: int) -> int:
+        raise self.error
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+@pytest.mark.parametrize("kind", [UsageError, DataError, DiskError])
+def test_what_makes_samples_says_one_sentence_whichever_process_it_is(kind: type[Exception], workers: int) -> None:
+    said = "clips cannot be written: No space left on device; make room"
+    with pytest.raises(kind) as error, made_by_workers():
+        list(DataLoader(Unmade(kind(said)), num_workers=workers))
+    assert type(error.value) is kind and str(error.value) == said
