@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ class Bar(Callback):
         self.batch, self.quiet = batch, quiet
         self._shown: tqdm | None = None
         self._ended_s = self._waited_s = 0.0
-        self._loss = self._step_s = self._wait_s = 0.0
+        self._loss, self._step_s, self._wait_s = math.nan, 0.0, 0.0
 
     def on_train_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Nothing is shown yet."""
@@ -41,9 +42,10 @@ class Bar(Callback):
         """A step more."""
         now = time.monotonic()
         step_s, self._ended_s = now - self._ended_s, now
-        loss = float(outputs["loss"]) if outputs else self._loss
+        loss = float(outputs["loss"]) if outputs else math.nan
         begun = self._shown is not None
-        self._loss = _smooth(self._loss, loss, begun)
+        if math.isfinite(loss):  # (a step that is skipped says nothing of the others)
+            self._loss = _smooth(self._loss, loss, not math.isnan(self._loss))
         self._step_s, self._wait_s = _smooth(self._step_s, step_s, begun), _smooth(self._wait_s, self._waited_s, begun)
         speed = self.batch / self._step_s
         pl_module.log_dict({"train/samples_per_s": speed, "train/waiting": self._wait_s / self._step_s})

@@ -13,6 +13,7 @@ from small_run import NETWORK, STEPS_OF_RUN, clips, kept, session
 
 from interp import weights
 from interp.methods import METHODS
+from interp.train import progress
 from interp.train.checkpoints import WholeFiles, read_checkpoint
 from interp.train.curves import read_curve
 from interp.train.frame_fed import FrameFedLearner
@@ -33,6 +34,23 @@ def test_steps_that_are_not_finite_change_nothing_and_are_counted(tmp_path: Path
     assert done.finished and done.skipped == 2
     assert all(bool(value.isfinite().all()) for value in kept(tmp_path / "run").values())
     assert float(read_curve(tmp_path / "run" / "training.csv")[-1]["skipped"]) == 2
+
+
+@pytest.mark.parametrize("spoilt", [range(0, 4), range(8, 12)])  # the first step of 4, or the third
+def test_the_loss_that_is_shown_is_of_steps_that_count(
+    spoilt: range, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = list[str]()
+
+    class Shown(progress.tqdm):  # type: ignore[type-arg]
+        def set_postfix_str(self, s: str = "", refresh: bool = True) -> None:
+            said.append(s)
+
+    monkeypatch.setattr(progress, "tqdm", Shown)
+    done = session(tmp_path / "run", spoilt=spoilt)
+    assert done.skipped == 1 and len(said) == STEPS_OF_RUN
+    unknown = [k for k, text in enumerate(said) if text.startswith("loss nan")]
+    assert unknown == ([] if spoilt.start else [0])
 
 
 def test_training_ends_where_nothing_is_finite_any_more(tmp_path: Path) -> None:
