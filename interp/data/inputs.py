@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from interp.data.settings import ClipSettings
 from vid2ev.recording.manifest import identity
+from vid2ev.scenes.scene_file import files_named, read_scene, scene_names
+from vid2ev.scenes.textures import PHOTOGRAPHS
 
 
 def digests_of(names: Iterable[str]) -> dict[str, str]:
@@ -24,8 +26,9 @@ def digests_of(names: Iterable[str]) -> dict[str, str]:
 
 def inputs_of(settings: ClipSettings, videos: Iterable[str] = ()) -> dict[str, str]:
     """Those of settings of clips, and of further videos."""
-    named = (settings.video_files, settings.recording_folders, settings.textures, settings.environments, videos)
-    return digests_of(name for names in named for name in names)
+    pictures = (name for name in (*settings.textures, *settings.environments) if name not in PHOTOGRAPHS)
+    scenes = (file for name in settings.scene_names for file in _files_of_scene(name))
+    return digests_of([*settings.video_files, *settings.recording_folders, *pictures, *scenes, *videos])
 
 
 def trained_with(settings: ClipSettings, videos: Sequence[str]) -> list[str]:
@@ -38,6 +41,16 @@ def trained_with(settings: ClipSettings, videos: Sequence[str]) -> list[str]:
         for video in dict.fromkeys(videos)
         if known.get(video) in ours
     ]
+
+
+def _files_of_scene(name: str) -> Iterator[str]:
+    """The file of somebody's own scene, and its meshes and environment beside it; of those that come along none."""
+    if name in scene_names() or not Path(name).is_file():
+        return
+    yield name
+    for table, key, _ in files_named(read_scene(name).tables):
+        if key in ("file", "environment") and table[key] not in PHOTOGRAPHS:
+            yield str(Path(name).parent / table[key])
 
 
 def known_by(settings: ClipSettings, *more: object) -> str:

@@ -105,6 +105,28 @@ def test_a_job_is_known_by_what_is_in_the_files_that_it_names(tmp_path: Path) ->
     assert "inputs" not in Job.of().kept()
 
 
+def test_a_scene_of_one_s_own_is_known_by_what_is_in_it_and_in_the_meshes_that_it_names(tmp_path: Path) -> None:
+    scene, mesh = tmp_path / "mine.toml", tmp_path / "wing.obj"
+    mesh.write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n")
+    scene.write_text('[[objects]]\nname = "wing"\nkind = "mesh"\nfile = "wing.obj"\ntexture = "cat"\n')
+    job = Job.of(settings=[f'clips.scene_names=["room", "{scene}"]'])
+    known, clips = job.kept(), known_by(job.clips)
+    assert set(known["inputs"]) == {str(scene), str(mesh)}
+    for file in (scene, mesh):
+        file.write_text(file.read_text() + "# once more\n")
+        assert job.kept() != known and known_by(job.clips) != clips
+        known, clips = job.kept(), known_by(job.clips)
+
+
+def test_what_comes_with_vid2ev_is_no_file_whatever_lies_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = known_by(Job.of().clips)
+    for name in (*Job.of().clips.textures, *Job.of().clips.scene_names):
+        Path(name).mkdir()
+        Path(name, "holiday.jpg").touch()
+    assert "inputs" not in Job.of().kept() and known_by(Job.of().clips) == before
+
+
 def test_clips_to_validate_with_are_those_of_the_job_whatever_others_have_left(tmp_path: Path) -> None:
     small = ["clips.scenes=0.0", "clips.multiples=[4]", "clips.coarser=[2]"]
     for clips, side in ((1, 32), (2, 32), (2, 48)):
