@@ -23,13 +23,16 @@ class Machines:
     def of(cls, devices: int | Literal["auto"], nodes: int, cpu: bool, processes: int) -> Self:
         """Machines as asked for: all GPUs by default; without one, or where it is not wanted, so many processes.
 
-        Two processes of one thread take 1.4 times as many samples a second as one of two threads.
+        Two processes of one thread take 1.4 times as many samples a second as one of two threads.  Raises UsageError
+        for more GPUs than there are.
         """
         import torch
 
         gpus = 0 if cpu else torch.cuda.device_count()
         if devices == "auto":
             devices = gpus or processes
+        elif gpus and devices > gpus:
+            raise UsageError(f"--devices {devices}: expected up to {gpus}, the GPUs of this machine; or give --cpu")
         return cls(devices, nodes, "cuda" if gpus else "cpu")
 
     def check_batch(self, batch: int) -> None:

@@ -51,7 +51,9 @@ class Recipe(BaseModel):
         ge=1,
         description="processes that train without a GPU, which --devices sets; decides the last bits",
     )
-    threads: int = Field(1, ge=1, description="threads of a process that trains without a GPU; decides the last bits")
+    threads: int = Field(
+        1, ge=1, le=1024, description="threads of a process that trains without a GPU; decides the last bits"
+    )
     save_s: float = Field(60.0, gt=0, description="time between checkpoints [s]")
 
 

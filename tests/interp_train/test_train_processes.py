@@ -72,6 +72,13 @@ def test_what_it_runs_on_is_known_from_the_start(
         machines.check_clips(processes - 1)
 
 
+def test_more_gpus_than_there_are_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
+    assert Machines.of(1, 1, False, 2).accelerator == "cuda" and Machines.of(2, 1, True, 2).accelerator == "cpu"
+    with pytest.raises(UsageError, match="--devices 2: expected up to 1, the GPUs of this machine"):
+        Machines.of(2, 1, False, 2)
+
+
 def test_a_machine_that_does_not_lead_may_be_there_first(tmp_path: Path) -> None:
     """And make clips already, while the one that leads begins the run."""
     other = RunFolder(tmp_path / "run", {}, resume=False, first=False)
