@@ -41,7 +41,7 @@ Weights = Literal["own", "pretrained"]
 
 
 class RrinSlomoEventsSpec(EventInputSpec):
-    """Options of RRINSloMoEvents; by default 14.4 million parameters and 614 kMAC/px at size paper."""
+    """Options of RRINSloMoEvents; by default 14.4 million parameters and 611 kMAC/px at size paper."""
 
     flow_input: Literal["frames", "frames+events"] = Field(
         default="frames",
