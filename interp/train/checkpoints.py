@@ -17,7 +17,7 @@ from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
-from interp.train.run_folder import MOST_STEPS
+from interp.train.run_folder import MAKE_ROOM, MOST_STEPS
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.untrusted import check_bytes
@@ -28,7 +28,7 @@ class WholeFiles(TorchCheckpointIO):
 
     def save_checkpoint(self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any = None) -> None:
         """Write a checkpoint; raises DataError where that cannot be."""
-        with writing(Path(path), "make room or access there, then --resume"), whole_file(Path(path)) as file:
+        with writing(Path(path), MAKE_ROOM), whole_file(Path(path)) as file:
             try:
                 torch.save(checkpoint, file)
             except RuntimeError as error:  # (of the library, for whatever the disk says)

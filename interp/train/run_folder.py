@@ -40,6 +40,7 @@ from vid2ev.untrusted import json_of, read_text
 LIBRARIES = ("torch", "lightning")
 FINISHED, WENT_ON = "finished.json", "went_on_with"
 MOST_STEPS = 1 << 40
+MAKE_ROOM = "make room or access there, then --resume"
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
 OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end
 
@@ -88,7 +89,7 @@ class RunFolder:
     def finish(self, outcome: Mapping[str, Any]) -> None:
         """Training is done: keep how it came out, and nothing that is needed to go on only."""
         if self.first:
-            self._write(FINISHED, outcome)
+            self._keep(FINISHED, outcome)
         self.forget_clips()
 
     def forget_clips(self) -> None:
@@ -149,7 +150,7 @@ class RunFolder:
     def plan(self, steps: Steps) -> None:
         """Write them down."""
         if self.first:
-            self._write("steps.json", asdict(steps))
+            self._keep("steps.json", asdict(steps))
 
     def baselines(self) -> dict[str, dict[str, dict[str, float]]]:
         """Scores of methods without training: method, group of clips, score; empty until they are measured."""
@@ -172,7 +173,7 @@ class RunFolder:
             }
             for method, table in tables.items()
         }
-        self._write("baselines.json", plain)
+        self._keep("baselines.json", plain)
 
     def _begin(self, job: Mapping[str, Any], resume: bool, starts: Mapping[str, Path]) -> None:
         """Clear up after a session that was killed; write down what is trained."""
@@ -212,6 +213,11 @@ class RunFolder:
         if child == self.clips:
             return child.is_dir() and all(OF_CLIPS.fullmatch(each.name) for each in child.iterdir())
         return LEFT.fullmatch(child.name) is not None
+
+    def _keep(self, name: str, content: Mapping[str, Any]) -> None:
+        """Write what comes to be known while it trains."""
+        with writing(self.path / name, MAKE_ROOM):
+            self._write(name, content)
 
     def _write(self, name: str, content: Mapping[str, Any]) -> None:
         with whole_file(self.path / name) as file:

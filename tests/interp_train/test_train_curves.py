@@ -66,6 +66,22 @@ def test_a_damaged_curve_is_one_sentence_and_stays_as_it_is(tmp_path: Path, name
     assert (tmp_path / name).read_bytes() == content
 
 
+@pytest.mark.parametrize("rows", [0, 1])  # a file is made for the first; others are added to it
+def test_a_row_that_the_disk_does_not_take_is_one_sentence(
+    rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    curves = Curves(tmp_path)
+    log(curves, *range(1, rows + 1))
+    monkeypatch.setattr("os.fsync", full)
+    monkeypatch.setattr("csv.DictWriter.writerow", full)
+    with pytest.raises(DataError, match=r"training\.csv cannot be written: No space left on device; make room"):
+        log(curves, rows + 1)
+    assert len(read_curve(tmp_path / "training.csv")) == rows
+
+
 def test_columns_may_come_later(tmp_path: Path) -> None:
     curves = Curves(tmp_path)
     log(curves, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -49,3 +50,23 @@ def test_what_is_no_plan_is_one_sentence(folder: RunFolder, said: Any) -> None:
     with pytest.raises(DataError, match=r"steps\.json ") as error:
         folder.steps()
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("steps.json", lambda folder: folder.plan(Steps(((7, 7),), 1))),
+        ("baselines.json", lambda folder: folder.write_baselines({"linear": {"scenes": {"psnr": 30.0}}})),
+        ("finished.json", lambda folder: folder.finish({"step": 7})),
+    ],
+)
+def test_what_the_disk_does_not_take_is_one_sentence(
+    name: str, kept: Callable[[RunFolder], None], folder: RunFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(DataError, match=rf"{name} cannot be written: No space left on device; make room"):
+        kept(folder)
+    assert not (folder.path / name).exists()
