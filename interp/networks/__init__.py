@@ -85,7 +85,8 @@ def spec_of(name: str, /, size: str = "tiny", **options: Any) -> NetworkSpec:
             hint = nearest(key, model.model_fields)
             raise UsageError(f"{name} has no option '{key}'{hint}; it has {', '.join(model.model_fields)}") from error
         what = f"{key} = {complaint['input']!r}"
-        raise UsageError(f"{name}: {what} is impossible: {clause(complaint['msg'])}") from error
+        why = "it has too few values" if complaint["type"] == "missing" else clause(complaint["msg"])
+        raise UsageError(f"{name}: {what} is impossible: {why}") from error
 
 
 def _entry(name: str) -> Entry:

@@ -199,6 +199,5 @@ def _valid(model: type[Any], values: dict[str, Any], prefix: str) -> Any:
             raise UsageError(
                 f"setting '{prefix}{key}' is unknown{hint}; expected one of {', '.join(model.model_fields)}"
             ) from error
-        raise UsageError(
-            f"setting {prefix}{key} = {complaint['input']!r} is impossible: {clause(complaint['msg'])}"
-        ) from error
+        why = "it has too few values" if complaint["type"] == "missing" else clause(complaint["msg"])
+        raise UsageError(f"setting {prefix}{key} = {complaint['input']!r} is impossible: {why}") from error
