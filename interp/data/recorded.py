@@ -12,7 +12,7 @@ from interp.data.chance import chance
 from interp.data.clip import Clip
 from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
 from interp.data.layouts.own import Own
-from interp.data.settings import ClipSettings
+from interp.data.settings import MULTIPLES, ClipSettings
 from interp.data.simulate import kept_counts
 from interp.representation.carried import over
 from vid2ev.errors import DataError, UsageError
@@ -142,7 +142,8 @@ def _between_pictures(sequence: Own, first: np.ndarray, multiple: int) -> tuple[
     if between.any():
         return first[between], ""
     step = int(np.median(np.diff(taken))) if len(taken) > 1 else len(sequence.times_us)
+    remedy = f"; --set clips.multiples=[{step}] uses them" if step in MULTIPLES else ""
     return first, (
         f"{sequence.folder}: the pictures of its slow camera, one in {step}: key frames of x{multiple} are of the fast"
-        f" one; --set clips.multiples=[{step}] uses them"
+        f" one{remedy}"
     )

@@ -14,6 +14,7 @@ from vid2ev.scenes.textures import PHOTOGRAPHS
 HELD_OUT = ("coffee", "motorcycle", "gravel", "rocket")  # photographs that are kept for validation
 TRAINED_ON = tuple(name for name in PHOTOGRAPHS if name not in HELD_OUT)
 MOST_PX = 1000  # of motion: what turns and grows with much more is soon beyond all numbers
+MULTIPLES = (4, 8, 16, 32)
 SOURCES = ("scenes", "photographs", "videos", "recordings")
 
 
@@ -72,7 +73,7 @@ class ClipSettings(BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> ClipSettings:
-        if not self.multiples or not set(self.multiples) <= {4, 8, 16, 32}:
+        if not self.multiples or not set(self.multiples) <= {*MULTIPLES}:
             raise ValueError(f"multiples {self.multiples}: expected some of 4, 8, 16, 32")
         if self.bins % max(self.multiples) or self.bins > 64:
             raise ValueError(f"bins {self.bins}: expected a multiple of {max(self.multiples)} up to 64")

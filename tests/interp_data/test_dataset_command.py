@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -97,6 +98,16 @@ def test_clips_to_train_with_begin_and_end_with_pictures_of_the_slow_camera(made
     assert recorded(settings, 0, 0, 4).truth.shape[0] == 5
     said = left_out(settings, 4)
     assert len(said) == 2 and all("one in 8: key frames of x4 are of the fast one" in each for each in said)
+
+
+@pytest.mark.parametrize("step", [3, 8])
+def test_clips_are_only_advised_that_there_can_be(step: int, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Own, "key_frames", property(lambda _: [1, 1 + step]))
+    settings = ClipSettings(size=(16, 16 + step), recordings=1, recording_folders=(str(made),))
+    for said in left_out(settings, 4):
+        advised = re.findall(r"clips\.multiples=\[(\d+)\]", said)
+        assert f"one in {step}: " in said and advised == [str(step)] * (step == 8)
+        assert all(ClipSettings(multiples=(int(multiple),)) for multiple in advised)
 
 
 def test_the_papers_set_is_that_of_table_i() -> None:
