@@ -43,7 +43,9 @@ class ClipSettings(BaseModel):
     recording_folders: tuple[str, ...] = Field(
         default=(), description="recordings: own, or in the HS-ERGB or BS-ERGB layout"
     )
-    slowdown: float = Field(default=1.0, gt=0, description="how many times slower than the world the videos play")
+    slowdown: float = Field(
+        default=1.0, ge=1e-6, le=1000, description="how many times slower than the world the videos play"
+    )
     scene_names: tuple[str, ...] = Field(default=tuple(scene_names()), min_length=1, description="of the scenes")
     textures: tuple[str, ...] = Field(
         default=TRAINED_ON, min_length=1, description="photographs: bundled ones by name, or files"

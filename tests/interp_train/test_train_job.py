@@ -64,6 +64,7 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["network.bins=true"], r"bins = True is impossible"),
         ("rrin", ["clips.motion=[[nan, 1, 2]]"], r"nan is impossible: it must be a finite number"),
         ("rrin", ["clips.motion=[[2, 1, 2], [-1, 3, 4]]"], r"clips.motion.1.0 = -1 is impossible"),
+        ("rrin", ["clips.slowdown=1e-300"], r"clips.slowdown = 1e-300 is impossible: it must be greater than or equal"),
         ("rrin", ["clips.step_px=inf"], r"inf is impossible: it must be a finite number"),
         ("rrin", ["samples.lost=[0.5, 2]"], r"range 0.5 to 2: expected both ends 0, or from 1e-12 to 1"),
         ("rrin", ["samples.threshold_error=[0, 1]"], r"range 0 to 1: expected both ends from 0.01 to 100"),
