@@ -126,7 +126,7 @@ def train(
     device = _device(clips_on, machines)
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts, device)
     if machines.first:
-        _tell(outcome, path, as_json, quiet)
+        _tell(outcome, path, job.network, as_json, quiet)
 
 
 def _run(
@@ -159,7 +159,7 @@ def _device(asked: str, machines: Machines) -> Device:
     return Device(asked, asked)
 
 
-def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
+def _tell(outcome: Outcome, path: Path, network: str, as_json: bool, quiet: bool) -> None:
     from interp.train import told
 
     if as_json:
@@ -171,7 +171,7 @@ def _tell(outcome: Outcome, path: Path, as_json: bool, quiet: bool) -> None:
         click.echo(f"{path}: step {outcome.step}{of}{skipped}{rest}")
         if outcome.finished:
             click.echo(f"weights.safetensors: those of step {outcome.best}, the best by validation")
-            click.echo(f"\n{told.table(outcome)}")
+            click.echo(f"\n{told.table(outcome, network)}")
 
 
 def _usual_name(options: Mapping[str, Any], starts: Mapping[str, Path]) -> str:

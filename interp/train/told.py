@@ -14,6 +14,7 @@ from vid2ev.terminal import lines
 
 COLUMNS = ("psnr", "ssim", "moving", "static")
 HEADS = ("PSNR", "SSIM", "moving", "static")
+OF_HDR = ("PSNR", "SSIM", "above", "below")  # the range of the frames (`hdr.py`)
 
 
 def described(job: Job, path: Path) -> str:
@@ -37,11 +38,11 @@ def _starts(job: Job) -> str:
     return ", ".join(f"{part or 'all'} of sha256 {digest[:12]}" for part, digest in sorted(job.starts.items()))
 
 
-def table(outcome: Outcome) -> str:
+def table(outcome: Outcome, network: str) -> str:
     """Scores of each group of clips, the best last."""
-    blocks = []
+    blocks, heads = [], OF_HDR if network == "hdr" else HEADS
     for group, methods in outcome.scores.items():
-        rows = [f"{group:<14}" + "".join(f"{head:>9}" for head in HEADS)]
+        rows = [f"{group:<14}" + "".join(f"{head:>9}" for head in heads)]
         for name, scores in sorted(methods.items(), key=lambda item: item[1].psnr):
             values = [getattr(scores, column) for column in COLUMNS]
             rows.append(f"{name:<14}{values[0]:9.2f}{values[1]:9.4f}{values[2]:9.2f}{values[3]:9.2f}")

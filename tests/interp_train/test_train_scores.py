@@ -8,7 +8,9 @@ import pytest
 import torch
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from interp.train.fit import Outcome
 from interp.train.scores import Scores, rounded, scores
+from interp.train.told import table
 from vid2ev.compare.pictures import HIGHEST_DB
 
 
@@ -48,3 +50,12 @@ def test_what_is_not_there_is_left_out_of_means() -> None:
     assert "static" not in other.named("x.")
     small = scores(torch.zeros(1, 1, 8, 8), torch.zeros(1, 1, 8, 8), torch.zeros(1, 8, 8), torch.zeros(1, 8, 8))[0]
     assert math.isnan(small.ssim) and small.psnr == HIGHEST_DB
+
+
+@pytest.mark.parametrize(("network", "parts"), [("rrin", "moving static"), ("hdr", "above below")])
+def test_a_table_says_what_its_columns_are_of(network: str, parts: str) -> None:
+    """Of HDR they are parts of what is beyond the range of the frames."""
+    outcome = Outcome(7, 7, 0, 7, {"scenes": {"network": Scores(30.0, 0.9, 28.0, 32.0)}})
+    head, row = table(outcome, network).splitlines()
+    assert head.split() == ["scenes", "PSNR", "SSIM", *parts.split()] and row.split()[0] == "network"
+    assert len(head) == len(row)
