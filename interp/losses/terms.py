@@ -5,8 +5,8 @@
     pyramid       sum over levels of mean |L_k(d)|, L_k the k-th level of the Laplacian pyramid; kornia's pyrdown and
                   pyrup are none: they lose the last of an odd number of pixels
     smoothness    mean |dF/dx| + mean |dF/dy|
-    log error     mean over images of ln(mean d^2 + e), e = 1e-6, where PSNR is 60 dB: PSNR in nepers, so that a decibel
-                  counts the same in pictures that are nearly right as in those that are far off
+    log error     mean over images of ln(mean d^2 + e), e = 1e-6, where PSNR is 60 dB: PSNR in another unit, so that a
+                  decibel counts the same in pictures that are nearly right as in those that are far off
 
 Sources: Charbonnier et al. (1994), "Two deterministic half-quadratic regularization algorithms for computed imaging",
 ICIP; Burt and Adelson (1983), "The Laplacian pyramid as a compact image code", IEEE Trans. Communications 31(4);
