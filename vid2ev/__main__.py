@@ -8,7 +8,7 @@ from vid2ev import commands
 
 def main() -> None:
     """The command line; ends with SystemExit."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="surrogateescape")  # (names of files may be any bytes, and are printed as these)
     try:
         commands.main()
