@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 
 from hypothesis import settings
@@ -12,3 +13,6 @@ settings.load_profile("without a clock")
 
 # (a shell has what it starts in the background ignore Ctrl-C, and so would all that tests start)
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# (what a program says on a slow machine is what it says on any: tqdm shows nothing where no terminal is)
+os.environ["TQDM_DISABLE"] = "1"

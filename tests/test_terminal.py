@@ -26,7 +26,7 @@ def logged(monkeypatch: pytest.MonkeyPatch, steps: int, step_s: float) -> list[t
     """The lines of so many steps, and after what time each came."""
     clock, log, found = Clock(monkeypatch), io.StringIO(), []
     monkeypatch.setattr(sys, "stderr", log)
-    with bar_of(False, STEPS, total=steps) as bar:
+    with bar_of(False, STEPS, total=steps, disable=False) as bar:
         for _ in range(steps):
             clock.now_s += step_s
             bar.set_postfix_str("loss 0.5", refresh=False)
@@ -67,7 +67,8 @@ def test_work_goes_on_where_nobody_reads_its_log(monkeypatch, stderr):
 
     clock = Clock(monkeypatch)
     monkeypatch.setattr(sys, "stderr", Closed() if stderr == "closed" else None)
-    with bar_of(False, STEPS, total=2) as bar:
+    shown = {"disable": False} if stderr == "closed" else {}
+    with bar_of(False, STEPS, total=2, **shown) as bar:
         for _ in range(2):
             clock.now_s += 100.0
             bar.update()

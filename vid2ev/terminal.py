@@ -30,7 +30,8 @@ def counted(count: int, name: str) -> str:
 
 
 def bar_of(quiet: bool, bar_format: str, **look: Any) -> tqdm:
-    """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then."""
+    """A progress bar on a terminal; where that is none, as in the log of a cluster, a line of the same now and then,
+    but for TQDM_DISABLE=1 in the environment."""
     from tqdm import tqdm
 
     if quiet or sys.stderr is None or sys.stderr.isatty():
