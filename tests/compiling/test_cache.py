@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,14 +26,20 @@ def twice(x):
 """
 
 
-def loaded(path: Path) -> tuple[int, int]:
-    """How often a kernel of a file was found compiled, and how often not, when it is called."""
+def kernel_of(path: Path) -> Any:
+    """The kernel of a file, not yet called."""
     spec = importlib.util.spec_from_file_location("kernel_of_a_test", path)
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert module.twice(21) == 42
-    stats = module.twice.stats
+    return module.twice
+
+
+def loaded(path: Path) -> tuple[int, int]:
+    """How often a kernel of a file was found compiled, and how often not, when it is called."""
+    kernel = kernel_of(path)
+    assert kernel(21) == 42
+    stats = kernel.stats
     return sum(Counter(stats.cache_hits).values()), sum(Counter(stats.cache_misses).values())
 
 
@@ -46,6 +53,20 @@ def test_a_kernel_is_compiled_again_where_any_of_its_files_has_changed(
     changed = (*stamp[:-1], (stamp[-1][0], stamp[-1][1] + 1, stamp[-1][2]))
     monkeypatch.setattr(cache, "_versions", lambda *rooms: changed)
     assert loaded(tmp_path / "kernel.py") == (0, 1)
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("left", [0.0, 0.5, None])
+def test_a_kernel_is_compiled_again_where_what_was_kept_of_it_is_damaged(
+    suffix: str, left: float | None, tmp_path: Path
+) -> None:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    assert loaded(tmp_path / "kernel.py") == (0, 1)
+    (kept,) = Path(kernel_of(tmp_path / "kernel.py").stats.cache_path).glob(f"*.{suffix}")
+    size = kept.stat().st_size
+    kept.write_bytes(bytes(size) if left is None else kept.read_bytes()[: int(left * size)])
+    assert loaded(tmp_path / "kernel.py") == (0, 1)
+    assert loaded(tmp_path / "kernel.py") == (1, 0)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ changed, what was compiled of them is deleted.
 
 numba also numbers the files of a function's variants 1, 2, ...: two processes that compile different variants at the
 same time both write number 1, and whoever reads the index then runs the wrong code.  A process's own mark in the
-names keeps them apart; the variant whose place in the index is lost that way is compiled again.
+names keeps them apart; the variant whose place in the index is lost that way is compiled again.  So is one whose files
+are damaged, as after a power failure, where numba would end with what pickle says of them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ COLOURS = ("pictures",)  # of which functions of many rooms take numbers
 _MARK = uuid.uuid4().hex[:8]
 
 
-_save = IndexDataCacheFile.save
+_save, _load_index, _load_data = IndexDataCacheFile.save, IndexDataCacheFile._load_index, IndexDataCacheFile._load_data
 
 
 def cached(function: Callable) -> Any:
@@ -62,14 +63,29 @@ def _versions(*rooms: Path) -> tuple[tuple[str, int, int], ...]:
 
 def _mark_ours() -> None:
     """Let what this process compiles have names that no other process writes; where it cannot be written, as on a full
-    disk, it is compiled again the next time."""
+    disk, or is not whole, it is compiled again the next time."""
     IndexDataCacheFile._data_name = lambda cache, number: f"{Path(cache._index_name).stem}.{_MARK}.{number}.nbc"  # type: ignore[method-assign]
     IndexDataCacheFile.save = _save_if_possible  # type: ignore[method-assign]
+    IndexDataCacheFile._load_index = _index_if_whole  # type: ignore[method-assign]
+    IndexDataCacheFile._load_data = _data_if_whole  # type: ignore[method-assign]
 
 
 def _save_if_possible(cache: IndexDataCacheFile, key: Any, data: Any) -> None:
     with contextlib.suppress(OSError):
         _save(cache, key, data)
+
+
+def _index_if_whole(cache: IndexDataCacheFile) -> dict[Any, str]:
+    with contextlib.suppress(Exception):  # (what a damaged pickle raises may be anything)
+        return _load_index(cache)  # type: ignore[no-any-return]
+    return {}
+
+
+def _data_if_whole(cache: IndexDataCacheFile, name: str) -> Any:
+    try:
+        return _load_data(cache, name)
+    except Exception as error:
+        raise OSError(f"{name} is damaged") from error  # (as numba takes what is not there)
 
 
 def drop_stale_kernels() -> None:
