@@ -269,6 +269,42 @@ def test_light_is_taken_however_it_lies(memory):
     assert np.isinf(memory.get(memory.light(np.array([[1e300]])))).all()
 
 
+def test_lists_of_light_are_seen_as_on_a_cpu():
+    light = np.exp(np.random.default_rng(2).normal(0, 0.7, (4, *SIZE[::-1])))
+    cpu, card = both("paper", Clip(np.zeros(1), light, 0, 3))
+    assert_same([cpu.step(light[0].tolist(), 0)], [card.step(light[0].tolist(), 0)])
+    assert_same(cpu.steps(light[1:].tolist(), [1000, 2000, 3000]), card.steps(light[1:].tolist(), [1000, 2000, 3000]))
+    assert_same_state(cpu, card)
+
+
+def test_what_a_batch_refuses_it_has_not_seen():
+    """Light of another shape or of codes, other numbers of times, times too late, and sensors that it cannot be."""
+    spec, memory, hour_ns = COMPILED["paper"], Simulated(), 3600 * 10**9
+    frames = np.exp(np.random.default_rng(6).normal(0, 0.7, (4, 2, *SIZE[::-1]))).astype(np.float32)
+    t_ns = np.repeat(1_000_000 * np.arange(4)[:, None], 2, axis=1)
+    light, codes = frames[1:], (100 * frames[1:]).astype(np.uint8)
+    plain, tried = (DvsBatchOnCard([spec, spec], SIZE, [8, 9], memory=memory) for _ in range(2))
+    for wrong, said in ((frames[0].swapaxes(1, 2), "shape"), (frames[0, :1], "shape"), (codes[0], "type uint8")):
+        with pytest.raises(UsageError, match=f"light of {said}"):
+            tried.restart(wrong, [5, 5])
+    with pytest.raises(UsageError, match="at times of shape"):
+        tried.restart(frames[0], [5])
+    for batch in (plain, tried):
+        batch.restart(frames[0], t_ns[0])
+    for wrong in (light.swapaxes(2, 3), light[:, :1], codes, torch.from_numpy(codes), light[:2]):
+        with pytest.raises(UsageError, match="light of"):
+            tried.steps(wrong, t_ns[1:])
+    for wrong_ns in (t_ns[1:] * 8 * hour_ns // 10**6, t_ns[1:] * 0, t_ns[1:, :1], t_ns[:0]):
+        with pytest.raises(UsageError, match="times of"):
+            tried.steps(light, wrong_ns)
+    with pytest.raises(UsageError, match="different effects"):
+        tried.renew([COMPILED["nothing"], spec], [1, 2])
+    ours, theirs = (batch.steps(light, t_ns[1:]) for batch in (tried, plain))
+    for k in range(2):
+        assert_same(ours.of(k), theirs.of(k))
+    assert len(ours) > 50
+
+
 def test_what_cannot_be_is_said():
     with pytest.raises(UsageError, match="different effects"):
         DvsBatchOnCard([COMPILED["paper"], COMPILED["nothing"]], SIZE, [1, 2], memory=Simulated())

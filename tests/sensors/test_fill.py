@@ -90,6 +90,28 @@ def test_a_batch_is_its_clips_each_with_a_sensor_of_its_own(spec: DvsSpec) -> No
         assert sum(map(len, parts)) == sum(len(events) for clip in ours for events in clip)
 
 
+def test_what_a_batch_refuses_no_clip_has_seen() -> None:
+    """Where times of one clip alone go back; light may be a list."""
+    light, t_ns = light_of(3, clips=2)
+    plain, tried = (DvsBatch([DvsSpec()] * 2, SIZE, [1, 2]) for _ in range(2))
+    plain.restart(light[0], t_ns[0])
+    tried.restart(light[0].tolist(), t_ns[0].tolist())
+    wrong_ns = t_ns.copy()
+    wrong_ns[5, 1] = wrong_ns[4, 1]
+    grids_of_clips = [NetCounts(SIZE, t_ns[:, k] // 1000) for k in range(2)]
+    for refused in (
+        lambda: tried.steps(light[1:], wrong_ns[1:]),
+        lambda: tried.fill(grids_of_clips, light[1:], wrong_ns[1:]),
+        lambda: tried.restart(light[1], [int(t_ns[1, 0]), 0]),
+    ):
+        with pytest.raises(UsageError, match="expected a later one"):
+            refused()
+    ours, theirs = (batch.steps(light[1:], t_ns[1:]) for batch in (tried, plain))
+    for k in range(2):
+        for a, b in zip(ours.of(k), theirs.of(k), strict=True):
+            np.testing.assert_array_equal(a.t, b.t)
+
+
 def test_a_batch_fills_a_grid_of_each_clip() -> None:
     light, t_ns = light_of(4, clips=2)
     batch = DvsBatch([DvsSpec()] * 2, SIZE, [1, 2])

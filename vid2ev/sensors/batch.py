@@ -74,34 +74,34 @@ class DvsBatch:
 
     def restart(self, light: np.ndarray, t_ns: Sequence[int]) -> None:
         """Settle each sensor in a frame of light [clips, height, width] at its t_ns [clips]."""
-        self._checked(light[None], np.asarray(t_ns)[None])
-        self._all(lambda k: self._sensors[k].restart(light[k], t_ns[k]))
+        light, times = self._checked(np.asarray(light)[None], np.asarray(t_ns)[None])
+        self._all(lambda k: self._sensors[k].restart(light[0, k], times[k][0]))
 
     def steps(self, light: np.ndarray, t_ns: np.ndarray) -> BatchEvents:
         """Advance all through frames of light [frames, clips, height, width] at t_ns [frames, clips].
 
         A sensor without light settles in the first.  Raises UsageError for times that are not after those before, or
-        not as many as the frames.
+        not as many as the frames; then none of them has been seen.
         """
         light, times = self._checked(light, t_ns)
-        return BatchEvents(self._all(lambda k: self._sensors[k].steps_of(light, k, times[:, k])))
+        return BatchEvents(self._all(lambda k: self._sensors[k].steps_of(light, k, times[k])))
 
     def fill(self, grids: Sequence[Grid], light: np.ndarray, t_ns: np.ndarray) -> None:
         """`steps`, but the events of each clip go straight into a grid of its own (`Dvs.fill`)."""
         light, times = self._checked(light, t_ns)
         if len(grids) != len(self._sensors):
             raise UsageError(f"{len(grids)} grids for {len(self._sensors)} clips: expected one for each")
-        self._all(lambda k: self._sensors[k].fill_of(grids[k], light, k, times[:, k]))
+        self._all(lambda k: self._sensors[k].fill_of(grids[k], light, k, times[k]))
 
-    def _checked(self, light: Any, t_ns: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Light as an array of as many clips as there are sensors, in one piece, and a time for each of its frames."""
+    def _checked(self, light: Any, t_ns: Any) -> tuple[np.ndarray, list[list[int]]]:
+        """Light as an array of as many clips as there are sensors, in one piece, and the times of its frames."""
         light, times = np.ascontiguousarray(light), np.asarray(t_ns)
         clips, (width, height) = len(self._sensors), self.size
         if light.ndim != 4 or light.shape[1:] != (clips, height, width):
             raise UsageError(f"light of shape {light.shape}: expected (frames, {clips}, {height}, {width})")
         if times.shape != light.shape[:2]:
             raise UsageError(f"times of shape {times.shape}: expected {light.shape[:2]}, one for each frame and clip")
-        return light, times
+        return light, [sensor.times_of(light, times[:, k]) for k, sensor in enumerate(self._sensors)]
 
     def _all(self, work: Callable[[int], R]) -> list[R]:
         """[work(0), work(1) ...], of each clip, some at the same time."""

@@ -124,7 +124,20 @@ class Dvs:
 
     def steps_of(self, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> list[Events]:
         """`steps` of one of the clips of light [frames, clips, height, width]."""
-        return list(self._each(light, clip, self._times_of(light, t_ns)))
+        return list(self._each(light, clip, self.times_of(light, t_ns)))
+
+    def times_of(self, light: np.ndarray, t_ns: Sequence[int] | np.ndarray) -> list[int]:
+        """The times of frames of light [frames, clips, height, width], each after the one before it.
+
+        Raises UsageError as `steps` does.
+        """
+        self._intake.check(np.shape(light)[2:])
+        if np.shape(t_ns) != (len(light),):
+            raise UsageError(f"{np.size(t_ns)} times for {len(light)} frames of light: expected a list of one for each")
+        times: list[int] = []
+        for t in t_ns:
+            times.append(later(t, times[-1] if times else self._t_ns))
+        return times
 
     def fill(self, grid: Grid, light: np.ndarray, t_ns: Sequence[int]) -> None:
         """`steps`, but events go straight into a grid (`vid2ev.views.grid`), without being put in order.
@@ -135,7 +148,7 @@ class Dvs:
 
     def fill_of(self, grid: Grid, light: np.ndarray, clip: int, t_ns: Sequence[int] | np.ndarray) -> None:
         """`fill` of one of the clips of light [frames, clips, height, width]."""
-        times = self._times_of(light, t_ns)
+        times = self.times_of(light, t_ns)
         if not self._readout.at_once:
             for events in self._each(light, clip, times):
                 grid.add(events)
@@ -255,16 +268,6 @@ class Dvs:
         return self._pixels.sleep.count
 
     # ------------------------------------------------------------------------------------------------- inside
-
-    def _times_of(self, light: np.ndarray, t_ns: Sequence[int] | np.ndarray) -> list[int]:
-        """The times of frames of light [frames, clips, height, width], each after the one before it."""
-        self._intake.check(np.shape(light)[2:])
-        if np.shape(t_ns) != (len(light),):
-            raise UsageError(f"{np.size(t_ns)} times for {len(light)} frames of light: expected a list of one for each")
-        times: list[int] = []
-        for t in t_ns:
-            times.append(later(t, times[-1] if times else self._t_ns))
-        return times
 
     def _mark(self) -> dict[str, np.ndarray]:
         return mark_of(self.spec, self.size, self.seed, self.camera)

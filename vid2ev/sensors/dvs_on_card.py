@@ -67,11 +67,12 @@ class DvsOnCard(Dvs):
     def step(self, light: Any, t_ns: int, still: Still | None = None) -> Events:
         """`Dvs.step`; light may be a tensor.  What is `still` saves nothing here: all pixels are glanced at."""
         self._intake.check(np.shape(light))
-        return self.steps(light[None], [t_ns])[0]
+        return self.steps(_in_one(light)[None], [t_ns])[0]
 
     def steps(self, light: Any, t_ns: Sequence[int]) -> list[Events]:
         """`step` for each frame of light [frames, height, width] at t_ns [frames], in a few launches of kernels."""
-        sent, times = [], self._times_of(light[:, None], t_ns)
+        light = _in_one(light)
+        sent, times = [], self.times_of(light[:, None], t_ns)
         if self._t_ns is None and times:
             sent.append(self.restart(light[0], times[0]))
         while len(sent) < len(times):
@@ -156,3 +157,8 @@ class DvsOnCard(Dvs):
             if plane.size:
                 plane[...] = planes[name].view(plane.dtype)
         self._pixels.tallies[0] = self._card.tallies()
+
+
+def _in_one(light: Any) -> Any:
+    """Light as an array, unless it is a tensor."""
+    return light if hasattr(light, "is_floating_point") else np.asarray(light)
