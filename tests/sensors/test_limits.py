@@ -92,6 +92,27 @@ def test_a_time_that_is_none_is_refused(t_ns: Any) -> None:
         Dvs(DvsSpec(), (2, 2)).steps(np.zeros((1, 2, 2)), 5)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("origin_ns", ["2", float("nan"), [1, 2], 1.5, 2**63])
+def test_an_origin_that_is_no_time_is_refused_when_the_sensor_is_made(origin_ns: Any) -> None:
+    with pytest.raises(UsageError, match=r"origin_ns .*: expected a whole number of nanoseconds"):
+        Dvs(DvsSpec(), (2, 2), origin_ns=origin_ns)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", [np.float32, np.float64, ">f8", np.longdouble])
+def test_light_beyond_float32_is_mended_of_whatever_type(kind: Any) -> None:
+    light = np.full((2, 2), np.finfo(kind).max, kind)
+    for sensor in (Dvs(DvsSpec(), (2, 2)), Cis(load_cis("ideal", ["colour=false"]), (2, 2))):
+        sensor.step(light, 0)
+        assert sensor.counts["not_finite"] == 4
+
+
+def test_a_burst_is_over_whatever_times_there_are() -> None:
+    """From the first to the last, which are more than 2^63 ns apart; no exposure opens, and so on without end."""
+    cis = Cis(load_cis("ideal", ["colour=false", "exposure_us=0", "burst=1"]), (2, 2))
+    assert [len(cis.step(np.ones((2, 2)), t_ns)) for t_ns in (1 - 2**63, 0, 2**63 - 1)] == [1, 0, 0]
+
+
 def test_what_is_no_state_of_the_sensor_is_refused() -> None:
     late = load_sensor("ideal", ["delay_us=5", "frame_rate_hz=100"])
     dvs, cis = (Dvs(late, (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))

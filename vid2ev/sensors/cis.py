@@ -21,7 +21,7 @@ from vid2ev.stream.saved import check_mark, clock, entry, mark_of
 __all__ = ["Cis", "CisSpec"]
 
 OPEN_BYTES = 1 << 32  # of the sums of all exposures that are open at a time
-NEVER_NS = 1 << 63  # later than any frame
+NEVER_NS = 1 << 64  # after the first frame: later than any other
 
 
 @dataclass(slots=True)
@@ -235,7 +235,8 @@ class Cis:
         light = np.asarray(light)
         self._check(light.shape, light.dtype, light.dtype.kind == "f")
         wanted = None if light.dtype in (np.float32, np.float64) else np.float32
-        return np.ascontiguousarray(light, wanted).reshape(self._rows.shape)
+        with np.errstate(over="ignore"):  # (what is beyond float32 becomes infinite, and is mended)
+            return np.ascontiguousarray(light, wanted).reshape(self._rows.shape)
 
     def _check(self, shape: tuple[int, ...], dtype: Any, floating: bool) -> None:
         """Raises UsageError for light of another shape than the sensor's, and for codes."""

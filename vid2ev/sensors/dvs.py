@@ -16,7 +16,7 @@ from vid2ev.sensors.clock import Clock, Step, first_count, later
 from vid2ev.sensors.dvs_readout import DvsReadout
 from vid2ev.sensors.inside import Inside
 from vid2ev.sensors.intake import Intake
-from vid2ev.sensors.limits import check_sensor, check_spec
+from vid2ev.sensors.limits import check_sensor, check_spec, time_ns
 from vid2ev.sensors.pixels import Pixels
 from vid2ev.sensors.sent import Sent
 from vid2ev.sensors.spec import DvsSpec
@@ -70,7 +70,7 @@ class Dvs:
         self.size, self.labels, self.transfer = check_sensor(size, seed, camera, threads), labels, transfer
         self._intake = Intake(self.size, transfer)
         self._pixels = Pixels(self.size, labels, threads, skip, part)
-        self._first_ns = origin_ns
+        self._first_ns = None if origin_ns is None else time_ns(origin_ns, "origin_ns")
         pixels = self.size[0] * self.size[1]
         self.at_once = max(1, min(MOST, AT_ONCE_PX // pixels))  # frames best given together to `see_all`
         self._be(spec, seed, camera)

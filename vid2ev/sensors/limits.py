@@ -47,8 +47,8 @@ def check_seed(seed: int) -> None:
         raise UsageError(f"seed {seed!r}: expected a whole number from 0 to 2**64 - 1")
 
 
-def time_ns(t_ns: Any) -> int:
-    """The time of a frame; raises UsageError for what is none."""
+def time_ns(t_ns: Any, name: str = "frame time") -> int:
+    """The time of a frame, or another of this name; raises UsageError for what is none."""
     try:
         if isinstance(t_ns, str | bytes):
             raise TypeError
@@ -57,7 +57,7 @@ def time_ns(t_ns: Any) -> int:
             raise ValueError
         return whole
     except (TypeError, ValueError, OverflowError) as error:
-        raise UsageError(f"frame time {t_ns!r}: expected a whole number of nanoseconds, below 2**63") from error
+        raise UsageError(f"{name} {t_ns!r}: expected a whole number of nanoseconds, below 2**63") from error
 
 
 def is_whole(number: Any, least: int, most: int | None = None) -> bool:
