@@ -10,7 +10,8 @@ import pytest
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sensors.dvs import Dvs
-from vid2ev.sensors.presets import CIS, DVS, Kind, load, load_sensor, preset_names, read_sensor
+from vid2ev.sensors.presets import CIS, DVS, Kind, load, load_cis, load_sensor, preset_names, read_sensor
+from vid2ev.sensors.record import changed
 from vid2ev.sensors.spec import DvsSpec
 
 NAMES = preset_names()
@@ -136,6 +137,16 @@ def test_true_is_neither_a_number_nor_a_word(kind: Kind) -> None:
         with pytest.raises(UsageError, match=rf"^{key} = [tT]rue in sensor ideal is impossible: it must be "):
             load(kind, "ideal", [f"{key}=true"])
     assert len(fields) > 15
+
+
+@pytest.mark.parametrize(("value", "expected"), [("foo", "a valid number"), ("50", "less than or equal to 10")])
+def test_of_a_value_that_may_be_a_number_or_a_word_both_are_said(value: str, expected: str) -> None:
+    with pytest.raises(UsageError, match=rf"gamma = .* is impossible: it must be {expected} or 'srgb' "):
+        load_cis("ideal", [f"gamma={value}"])
+    with pytest.raises(UsageError, match=rf"gamma={value}: it must be {expected} or 'srgb'$"):
+        changed(load_cis("ideal"), {"gamma": value})
+    with pytest.raises(UsageError, match=r"shading = 'a' .* it must be a valid number \(default"):
+        load_cis("ideal", ["shading=['a', 'b']"])
 
 
 def test_values_that_do_not_go_together_are_refused_in_one_sentence() -> None:

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ValidationError
 from vid2ev.errors import DataError, UsageError, clause, nearest
 from vid2ev.requests import setting
 from vid2ev.sensors.cis_spec import CisSpec
+from vid2ev.sensors.record import first_said
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.toml_text import parsed_toml, toml_text
 from vid2ev.untrusted import read_text
@@ -214,7 +215,7 @@ def _sentence(error: ValidationError, name: str, kind: Kind) -> str:
         return f"Key '{key}' {where} is unknown{hint}; `vid2ev sensors {name}` lists the keys."
     default = kind.spec.model_fields[key].default
     value = reprlib.repr(complaint["input"])
-    return f"{key} = {value} {where} is impossible: {clause(complaint['msg'])} (default {default!r})."
+    return f"{key} = {value} {where} is impossible: {first_said(error)} (default {default!r})."
 
 
 def _list(names: Sequence[str]) -> str:

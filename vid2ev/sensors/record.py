@@ -33,4 +33,12 @@ def changed(spec: Spec, changes: Mapping[str, Any]) -> Spec:
         return type(spec)(**(spec.model_dump() | {**changes}))
     except ValidationError as error:
         said = ", ".join(f"{key}={value}" for key, value in changes.items())
-        raise UsageError(f"{said}: {clause(error.errors()[0]['msg'])}") from error
+        raise UsageError(f"{said}: {first_said(error)}") from error
+
+
+def first_said(error: ValidationError) -> str:
+    """What is said of the first value that cannot be, as a clause; of one that may be of two kinds, of both."""
+    first, *others = error.errors()
+    kinds = [each for each in others if each["loc"][:1] == first["loc"][:1] and isinstance(each["loc"][-1], str)]
+    said = [clause(each["msg"]) for each in (first, *kinds)]
+    return " or ".join([said[0], *(other.removeprefix("it must be ") for other in said[1:])])
