@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import av
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from vid2ev.pictures.colours import GROUND, MOST, NEUTRAL, OFF, ON, codes, event_colours, in_8_bits
-from vid2ev.pictures.film import Film, planes
+from vid2ev.pictures.film import Film, join_films, planes, write_film
 
 
 def split(coded: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -66,6 +67,19 @@ def test_a_decoder_shows_what_was_drawn_and_the_same_bytes_come_again(tmp_path: 
     assert len(frames) == 20
     for k, frame in enumerate(frames):
         assert np.abs(frame.astype(int) - np.roll(picture, 8 * k, axis=1)).mean() < 4
+
+
+@pytest.mark.parametrize("name", ["12:00.mp4", "http:film.mp4", "pipe:1", os.fsdecode(b"\xff.mp4"), "100%d.mp4"])
+def test_films_are_made_and_joined_whatever_they_are_called(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    picture, films = np.zeros((16, 16, 3), np.uint8), [Path("film.mp4"), Path(name)]
+    for path in films:
+        write_film(path, [picture] * 3, 30)
+        join_films(Path(f"{path}.joined"), [(path, 0), (path, 3)], 30)
+    assert films[0].read_bytes() == films[1].read_bytes()
+    assert Path("film.mp4.joined").read_bytes() == Path(f"{name}.joined").read_bytes()
 
 
 def test_a_film_that_cannot_be_written_is_an_os_error(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from itertools import chain
 from math import ceil
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import av
 import numpy as np
@@ -108,10 +108,10 @@ def remarks_on_size(name: str, size: tuple[int, int]) -> list[str]:
 def join_films(path: Path, pieces: Iterable[tuple[Path, int]], rate: Fraction | int) -> None:
     """One film of several at a rate, without encoding them again: each with the number of its first picture in the
     whole.  They must have been made by `open_film` with one size, rate and encoder.  Raises OSError."""
-    with av.open(str(path), "w", format="mp4", options=MUXER) as whole:
+    with _opened(path, "w", options=MUXER) as whole:
         stream: Any = None
         for piece, first in pieces:
-            with av.open(str(piece)) as part:
+            with _opened(piece, "r") as part:
                 stream = stream or whole.add_stream_from_template(part.streams.video[0])
                 for packet in part.demux(video=0):
                     if packet.dts is not None and packet.pts is not None and packet.time_base:
@@ -130,7 +130,7 @@ def open_film(
     transfer: int = BT709,
 ) -> tuple[Any, Any]:
     """A container to be written, and its stream; what is encoded does not depend on the machine's cores."""
-    container = av.open(str(path), "w", format="mp4", options=muxer or {})
+    container = _opened(path, "w", options=muxer or {})
     stream = container.add_stream("libx264", rate=rate, options=encoder)
     stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
     context = stream.codec_context
@@ -142,6 +142,11 @@ def open_film(
     context.color_trc = transfer
     context.color_range = LIMITED
     return container, stream
+
+
+def _opened(path: Path, mode: Literal["r", "w"], **options: Any) -> Any:
+    """A film to be read or written.  (Without `file:`, what is before a colon in a name is taken for a protocol.)"""
+    return av.open(f"file:{path}", mode, format="mp4", **options)
 
 
 def film_frame(picture: np.ndarray, number: int, rate: Fraction, transfer: int = BT709) -> Any:
