@@ -18,7 +18,7 @@ import pytest
 
 from vid2ev import convert
 from vid2ev.errors import DataError, UsageError
-from vid2ev.sources import live, open_source
+from vid2ev.sources import live, open_source, short_name
 from vid2ev.tracks.recorder import Progress
 
 ROOT = Path(__file__).parents[2]
@@ -282,6 +282,11 @@ def test_no_camera_is_one_sentence() -> None:
 ])  # fmt: skip
 def test_names_of_cameras(text: str, platform: str, device: str, form: str) -> None:
     assert live.device_of(text, platform)[0] == device and live.device_of(text, platform)[1]["format"] == form
+
+
+@pytest.mark.parametrize("name", ["0", "/dev/video7", "Integrated Camera"])
+def test_recordings_are_called_after_their_camera_and_made_where_one_is(name: str) -> None:
+    assert short_name(f"camera:{name}") == f"camera{name.removeprefix('/dev/')}"
 
 
 @pytest.mark.parametrize(("text", "platform"), [("", "linux"), ("0", "win32")])

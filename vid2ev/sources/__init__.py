@@ -198,8 +198,10 @@ def _existing(path: Path) -> Path:
 
 def short_name(name: str) -> str:
     """What a source is called after: without folder, suffix, or what is asked of a scene or a synthetic clip."""
-    if name == STANDARD_INPUT or name.startswith(CAMERA_PREFIX):
-        return "stdin" if name == STANDARD_INPUT else name.replace(":", "")
+    if name == STANDARD_INPUT:
+        return "stdin"
+    if name.startswith(CAMERA_PREFIX):  # (a name may be a path, such as /dev/video0)
+        return f"camera{Path(name.removeprefix(CAMERA_PREFIX)).name}"
     for prefix in (SYNTHETIC_PREFIX, SCENE_PREFIX):
         if name.startswith(prefix):
             name = name.removeprefix(prefix).partition(",")[0]
