@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -141,6 +142,13 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
     assert describe_events("long.dat")["events"] == 5000 and not describe_events("long.dat")["warnings"]
 
 
+@pytest.mark.parametrize("part", [{"start_s": math.nan}, {"stop_s": math.inf}, {"start_s": -1e300}], ids=str)
+def test_instants_that_are_none_are_refused(recording: Path, part: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match="expected seconds after the beginning"):
+        reformat(recording, "out.h5", **part)
+    assert not Path("out.h5").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "exit_code", "sentence"),
     [
@@ -152,6 +160,8 @@ def test_dat_splits_at_its_wrap_and_is_one_recording_again(recording: Path) -> N
         (["whole.h5", "out.h5", "--start", "3", "--stop", "2"], 2, "after the start"),
         (["noise.raw", "out.h5"], 1, "no event file"),
         (["whole.h5", "whole.h5/out.h5"], 1, "cannot be written"),
+        (["whole.h5", ".", "--format", "npz"], 2, ". is a folder; give a file in it, such as events.npz"),
+        (["whole.h5", "/", "--format", "npz", "--overwrite"], 2, "/ is a folder"),
         (["wide.h5", "out.raw"], 2, "cannot hold 4000x3 pixels, at most 2048x2048; choose --format hdf5"),
         (["long.h5", "out.h5", "--format", "v2e-hdf5"], 2, "hold 8589.934592 s, at most 4294.967295 s"),
         (["edge.npz", "out.h5"], 2, "65536x2 pixels, at most 65535x65535; choose --format npz"),

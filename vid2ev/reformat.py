@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.formats import FORMATS, check_holds, format_named, of_only_camera, open_events, recognise, survey
+from vid2ev.formats import (
+    FORMATS,
+    LATEST_US,
+    check_holds,
+    format_named,
+    of_only_camera,
+    open_events,
+    recognise,
+    survey,
+)
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.recording.disk import sync, writing
 from vid2ev.stream.events import Events
@@ -46,6 +55,8 @@ def reformat(
     kind = format_named(name) if name else format_of_suffix(target)
     if kind.write is None:
         raise UsageError(f"format '{kind.name}' is only read; expected one of {', '.join(writable())}")
+    if target.is_dir():
+        raise UsageError(f"{target} is a folder; give a file in it, such as {target / f'events{kind.suffix}'}")
     if target.exists() and not overwrite:
         raise UsageError(f"{target} exists; --overwrite replaces it")
     file = open_events(of_only_camera(source))
@@ -87,6 +98,9 @@ def format_of_suffix(path: Path) -> Format:
 
 
 def _part(file: Any, start_s: float | None, stop_s: float | None) -> Recording:
+    for t_s in (start_s or 0, stop_s or 0):
+        if not abs(t_s) * 10**6 < LATEST_US:
+            raise UsageError(f"part from {start_s or 0} s to {stop_s} s: expected seconds after the beginning")
     first_us = beginning_us(file)
     start_us = first_us + round(1e6 * (start_s or 0))
     stop_us = None if stop_s is None else first_us + round(1e6 * stop_s)
