@@ -93,6 +93,15 @@ def test_other_arrays_are_refused(tmp_path: Path, array: np.ndarray) -> None:
         open_source(saved(tmp_path, array), fps=1)
 
 
+@pytest.mark.parametrize("shape", [(2, 1, 65536), (2, 65536, 1)], ids=str)
+def test_pictures_larger_than_any_lens_is_described_for_are_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    np.save(tmp_path / "wide.npy", np.ones(shape, np.float32))
+    with pytest.raises(DataError, match="at most 65535 along each side"):
+        open_source(tmp_path / "wide.npy", fps=30, crop="1x1")
+    np.save(tmp_path / "fits.npy", np.ones([min(side, 65535) for side in shape], np.float32))
+    assert max(open_source(tmp_path / "fits.npy", fps=30).size) == 65535
+
+
 @pytest.mark.parametrize("content", [b"", b"not numpy", b"\x93NUMPY\x01\x00", None])
 def test_broken_files_are_refused(tmp_path: Path, content: bytes | None) -> None:
     path = saved(tmp_path, np.zeros((9, 9, 9)))

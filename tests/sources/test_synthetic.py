@@ -64,7 +64,9 @@ def test_an_edge_crosses_when_it_should() -> None:
     "text",
     ["", "nothing", "ramp,speed=3", "ramp,fps", "ramp,fps=fast", "ramp,size=4", "ramp,size=0x4", "ramp,fps=0",
      "ramp,duration_s=-1", "ramp,duration_s=0", "ramp,low=0", "ramp,low=-1", "moving-edge,width=0",
-     "sine,amplitude_nat=1e3", "step,low=-1", "flash,dark=-1", "ramp,low=nan", "ramp,warnings=3"],
+     "sine,amplitude_nat=1e3", "step,low=-1", "flash,dark=-1", "ramp,low=nan", "ramp,warnings=3",
+     "sine,frequency_hz=1e308", "flash,at_s=1e300", "flash,length_s=1e300", "moving-edge,high=1e300",
+     "black,size=65536x1", "black,size=1x65536"],
 )  # fmt: skip
 def test_refusals(text: str) -> None:
     with pytest.raises(UsageError):

@@ -14,8 +14,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vid2ev.errors import UsageError
-from vid2ev.sources.source import Source, begins_s
+from vid2ev.errors import DataError, UsageError
+from vid2ev.sources.source import LARGEST, Source, begins_s
 from vid2ev.stream.frames import Colour
 
 if TYPE_CHECKING:
@@ -67,6 +67,11 @@ def open_source(
     else:
         source = _in_motion(Path(path), motion, transfer=transfer, fps=fps, colour=colour, crop=crop, size=size)
         crop = size = None
+    if max(source.size) > LARGEST:
+        raise DataError(
+            f"{path}: {source.size[0]}x{source.size[1]} pixels; expected at most {LARGEST} along each side, so make the"
+            " pictures smaller first"
+        )
     if seen_through is not None:
         source = seen_through(source, _framing(source, crop, size))
     if start is not None or stop is not None:

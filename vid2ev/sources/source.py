@@ -8,6 +8,8 @@ from typing import Any, Protocol
 from vid2ev.sources.kept import Kept
 from vid2ev.stream.frames import Frame
 
+LARGEST = 65535  # pixels along a side: what the lens of a camera is described for (`rig/intrinsics.py`)
+
 
 class Source(Protocol):
     """A clip that can be read from its start as often as one likes, one frame at a time, in memory that does not grow.

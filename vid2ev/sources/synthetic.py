@@ -19,8 +19,10 @@ import numpy as np
 
 from vid2ev.errors import UsageError
 from vid2ev.requests import number_of
+from vid2ev.sources.source import LARGEST
 from vid2ev.sources.times import parse_fps, round_ns
 from vid2ev.stream.frames import Frame
+from vid2ev.stream.still import BRIGHTEST
 
 WIDEST_NAT = 61.0  # of a swing: from what float32 can still hold to the brightest light that sensors take
 
@@ -41,8 +43,11 @@ class SyntheticClip(ABC):
     def __post_init__(self) -> None:
         parse_fps(self.fps)
         numbers = [getattr(self, f.name) for f in fields(self) if f.name not in ("size", "warnings")]
-        if min(self.size) < 1 or not all(map(math.isfinite, numbers)):
-            raise UsageError(f"synthetic:{self.name}: {self}; expected finite numbers, and a size from 1x1")
+        if min(self.size) < 1 or max(self.size) > LARGEST or not all(abs(number) <= BRIGHTEST for number in numbers):
+            raise UsageError(
+                f"synthetic:{self.name}: {self}; expected numbers up to {BRIGHTEST:g}, and a size from 1x1 to"
+                f" {LARGEST}x{LARGEST}"
+            )
         for key in (*self.above_0, *self.from_0):
             if (value := getattr(self, key)) < 0 or (value == 0 and key in self.above_0):
                 least = "above 0" if key in self.above_0 else "from 0 on"
