@@ -76,6 +76,7 @@ def test_a_preview_that_nobody_waits_for_ends_without_a_word(source: str, monkey
     with pytest.raises(SystemExit) as ended:
         _serve(theirs, SimpleNamespace(value=1))
     assert ended.value.code is None
+    assert not isinstance(ended.value.__context__, OSError)  # (which would keep what was to be sent)
 
 
 PARENT = """

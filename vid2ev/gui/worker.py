@@ -153,11 +153,12 @@ def _serve(pipe: Connection, newest: Any) -> None:
             raise Superseded
 
     def send(reply: Any) -> None:
-        with sending:
-            try:
-                pipe.send(reply)
-            except OSError:  # (nobody listens any more: this thread ends, and with the main one the process)
-                sys.exit()
+        with sending, suppress(OSError):
+            pipe.send(reply)
+            return
+        # (nobody listens any more: this thread ends, and with the main one the process.  An end that is raised while
+        # the error is handled keeps what was to be sent, and Python 3.13.0 complains of that as it clears up)
+        sys.exit()
 
     previewer, planner = Previewer(check), Planner(send, lambda: newest.value)
     planner.start()
