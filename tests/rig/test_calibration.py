@@ -16,7 +16,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.rig.calibration import FORMATS, calibration_format, left_out, read_calibration, write_calibration
+from vid2ev.rig.calibration import (
+    FORMATS,
+    UNITS_M,
+    calibration_format,
+    left_out,
+    read_calibration,
+    write_calibration,
+)
 from vid2ev.rig.camera import LATEST_US, Camera, Rig, Source, Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
 
@@ -110,6 +117,30 @@ def test_a_unit_may_be_given_where_it_is_the_files_own(tmp_path: Path) -> None:
     assert turned == moved_m == 0
     with pytest.raises(UsageError, match="counts in m; leave --unit mm out"):
         read_calibration(tmp_path / "camchain.yaml", "mm")
+
+
+@pytest.mark.parametrize(("unit", "other"), [("m", "mm"), ("cm", "m"), ("mm", "cm")])
+def test_the_unit_that_opencvs_yaml_says_is_that_of_its_translations(tmp_path: Path, unit: str, other: str) -> None:
+    path = tmp_path / "pair.yml"
+    write_calibration(path, pair(), "opencv")
+    path.write_text(path.read_text().replace("unit: m\n", f"unit: {unit}\n"))
+    far = [read_calibration(path, said).rig.cameras[1].pose.translation_m for said in (None, unit)]
+    wanted = UNITS_M[unit] * (pair().cameras[0].pose.inverse() @ pair().cameras[1].pose).translation_m
+    np.testing.assert_allclose(far, [wanted] * 2, atol=1e-12)
+    assert not read_calibration(path).notes
+    with pytest.raises(UsageError, match=f"counts in {unit}; leave --unit {other} out"):
+        read_calibration(path, other)
+    path.write_text(path.read_text().replace(f"unit: {unit}\n", "unit: inch\n"))
+    with pytest.raises(DataError, match="unit is 'inch', not one of m, cm, mm"):
+        read_calibration(path)
+
+
+def test_a_rig_file_counts_in_mm_whatever_is_asked(tmp_path: Path) -> None:
+    write_calibration(tmp_path / "rig.toml", pair(), "rig")
+    assert read_calibration(tmp_path / "rig.toml", "mm").rig == pair()
+    for unit in ("m", "cm"):
+        with pytest.raises(UsageError, match=f"rig.toml counts in mm; leave --unit {unit} out"):
+            read_calibration(tmp_path / "rig.toml", unit)
 
 
 def test_kalibrs_documentation_is_read_as_it_means_it(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from vid2ev.errors import DataError, UsageError
-from vid2ev.rig.calibration.calibrated import Calibrated, CalibrationFormat, rig_of
+from vid2ev.rig.calibration.calibrated import UNITS_M, Calibrated, CalibrationFormat, rig_of
 from vid2ev.rig.calibration.node import read_tree
 from vid2ev.rig.camera import Camera, Rig, Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
@@ -40,7 +40,6 @@ FORMATS = {
     "dv": "vid2ev.rig.calibration.dv",
     "opencv": "vid2ev.rig.calibration.opencv",
 }
-UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,7 @@ def read_calibration(path: str | Path, unit: str | None = None) -> Calibration:
     """
     path = Path(path)
     if is_rig_file(path):
+        _check_unit(path, "mm", unit)
         return Calibration("rig", read_rig(path))
     tree = read_tree(path)
     kind = next((kind for kind in map(calibration_format, FORMATS) if kind.recognises(tree)), None)
@@ -76,13 +76,10 @@ def read_calibration(path: str | Path, unit: str | None = None) -> Calibration:
     cameras = kind.read(tree)
     if not cameras:
         raise DataError(f"{path} holds no camera; complete or replace the file")
-    notes = []
-    if kind.says_unit(tree):
-        if unit not in (None, "m"):
-            raise UsageError(f"{path} counts in m; leave --unit {unit} out")
-    elif len(cameras) > 1:
-        cameras = [_scaled(camera, UNITS_M[unit or "m"]) for camera in cameras]
-        notes = [] if unit else [_guess(cameras)]
+    said = kind.says_unit(tree)
+    _check_unit(path, said, unit)
+    cameras = [_scaled(camera, UNITS_M[said or unit or "m"]) for camera in cameras]
+    notes = [] if said or unit or len(cameras) == 1 else [_guess(cameras)]
     if any(np.abs(camera.from_first.translation_m).max() > 1e6 for camera in cameras):
         raise DataError(f"{path}: cameras stand more than 1000 km apart; correct the translations")
     if "kinds" not in kind.keeps:
@@ -132,6 +129,12 @@ def _lens(rig: Rig, camera: Camera) -> Intrinsics:
             " the rig, or state the size and fov_deg of the video in [source]"
         )
     return camera.intrinsics(source.intrinsics(source.size or size))  # (a field in degrees is that of any size)
+
+
+def _check_unit(path: Path, said: str | None, unit: str | None) -> None:
+    """Raise UsageError where a file says another unit than is asked for."""
+    if said and unit not in (None, said):
+        raise UsageError(f"{path} counts in {said}; leave --unit {unit} out")
 
 
 def _scaled(camera: Calibrated, unit_m: float) -> Calibrated:

@@ -22,6 +22,7 @@ from vid2ev.rig.intrinsics import DistortionModel, Intrinsics
 from vid2ev.rig.pose import Pose, rotation_vector_deg
 
 Kind = Literal["dvs", "cis"]
+UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class CalibrationFormat:
     read        its cameras, the first one first; raises DataError
     write       the text of a file with these cameras; raises UsageError for a lens that it cannot hold
     keeps       what it holds beside lenses and poses: of "names", "kinds", "clocks"
-    says_unit   whether a file says in which unit its translations are; if not, they are taken as metres
+    says_unit   in which unit, of `UNITS_M`, a file says that its translations are; None where it says nothing
     """
 
     name: str
@@ -54,7 +55,7 @@ class CalibrationFormat:
     read: Callable[[Node], list[Calibrated]]
     write: Callable[[Sequence[Viewpoint]], str]
     keeps: frozenset[str] = frozenset()
-    says_unit: Callable[[Node], bool] = lambda tree: True
+    says_unit: Callable[[Node], str | None] = lambda tree: "m"
 
 
 def intrinsics_at(

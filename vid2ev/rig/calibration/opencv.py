@@ -9,7 +9,7 @@
     cameras: [{camera_name, kind, image_width, ...  above are there as well
                rotation, translation}]              X_camera = R X_first + T
 
-The unit of T is that of the board that was seen, which no file of OpenCV's says.
+The unit of T is that of the board that was seen, which no file of OpenCV's says; `unit` may be cm or mm, too.
 
 Sources: OpenCV 4.x, samples calibration.cpp and stereo_calib.cpp, `FileStorage`; ROS, camera_calibration_parsers (the
 names plumb_bob, rational_polynomial, equidistant).
@@ -24,6 +24,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.rig.calibration.calibrated import (
+    UNITS_M,
     Calibrated,
     CalibrationFormat,
     Kind,
@@ -46,7 +47,6 @@ MODELS: dict[str, DistortionModel] = {
 MATRICES = ("M{}", "K{}", "cameraMatrix{}", "camera_matrix_{}")  # of the cameras 1 and 2 of a pair
 COEFFICIENTS = ("D{}", "distCoeffs{}", "dist_coeffs{}", "distortion_coefficients_{}")
 KINDS: dict[str, Kind] = {"dvs": "dvs", "cis": "cis"}
-UNIT = "m"
 
 
 def read(tree: Node) -> list[Calibrated]:
@@ -65,7 +65,7 @@ def write(views: Sequence[Viewpoint]) -> str:
 
     file = cv2.FileStorage(".yml", cv2.FileStorage_WRITE | cv2.FileStorage_MEMORY)
     poses = from_first(views)
-    file.write("unit", UNIT)
+    file.write("unit", "m")
     if len(views) == 1:
         _write_lens(file, views[0])
     elif len(views) == 2:
@@ -169,6 +169,13 @@ def _first_eight(place: Node, values: list[float]) -> list[float]:
     return values[:8]
 
 
+def _unit(tree: Node) -> str | None:
+    """That of the translations, where the file says it."""
+    if "unit" in tree and tree["unit"].text() not in UNITS_M:
+        raise tree["unit"].wrong(f"one of {', '.join(UNITS_M)}")
+    return tree["unit"].text() if "unit" in tree else None
+
+
 def _recognises(tree: Node) -> bool:
     cameras = tree["cameras"].value if "cameras" in tree else None
     keys = ["camera_matrix", "cameraMatrix", "K", *(pattern.format(1) for pattern in MATRICES)]
@@ -182,5 +189,5 @@ FORMAT = CalibrationFormat(
     read=read,
     write=write,
     keeps=frozenset({"names", "kinds"}),
-    says_unit=lambda tree: "unit" in tree and tree["unit"].text() == UNIT,
+    says_unit=_unit,
 )
