@@ -45,7 +45,7 @@ class CalibrationFormat:
     recognises  whether a file is of this kind
     read        its cameras, the first one first; raises DataError
     write       the text of a file with these cameras; raises UsageError for a lens that it cannot hold
-    keeps       what it holds beside lenses and poses: of "names", "kinds", "clocks"
+    keeps       what it holds beside lenses, poses and names: of "kinds", "clocks"
     says_unit   in which unit, of `UNITS_M`, a file says that its translations are; None where it says nothing
     """
 
@@ -126,10 +126,8 @@ def _exact_if_same(first: Viewpoint, view: Viewpoint) -> Pose:
 def _free_name(text: str, kind: Kind, taken: set[str]) -> str:
     """A name for a folder, as near to a text as can be, that no other camera has."""
     base = re.sub(r"[^\w-]+", "_", text).strip("_-")[:48] or kind
-    for name in (text, base, *(f"{base}_{number}" for number in range(2, len(taken) + 4))):
-        if name.casefold() not in taken and _can_be(name, kind):
-            return name
-    return _free_name(f"camera_{base}", kind, taken)
+    names = text, base, *(f"{base}_{number}" for number in range(2, len(taken) + 3))
+    return next(name for name in names if name.casefold() not in taken and _can_be(name, kind))
 
 
 def _can_be(name: str, kind: Kind) -> bool:

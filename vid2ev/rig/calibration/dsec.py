@@ -134,5 +134,5 @@ FORMAT = CalibrationFormat(
     recognises=_recognises,
     read=read,
     write=write,
-    keeps=frozenset({"names", "kinds"}),
+    keeps=frozenset({"kinds"}),
 )

@@ -103,5 +103,4 @@ FORMAT = CalibrationFormat(
     recognises=_recognises,
     read=read,
     write=write,
-    keeps=frozenset({"names"}),
 )

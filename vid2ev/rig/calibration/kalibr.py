@@ -130,5 +130,5 @@ FORMAT = CalibrationFormat(
     recognises=_recognises,
     read=read,
     write=write,
-    keeps=frozenset({"names", "kinds", "clocks"}),
+    keeps=frozenset({"kinds", "clocks"}),
 )

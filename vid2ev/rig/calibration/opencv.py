@@ -188,6 +188,6 @@ FORMAT = CalibrationFormat(
     recognises=_recognises,
     read=read,
     write=write,
-    keeps=frozenset({"names", "kinds"}),
+    keeps=frozenset({"kinds"}),
     says_unit=_unit,
 )
