@@ -109,6 +109,8 @@ def test_poses_count_from_the_first_camera(tmp_path: Path, name: str) -> None:
         first = rig.cameras[0].model_copy(update=moved)
         assert "the camera of the video, from which poses counted" in left_out(Rig(cameras=(first,)), name)
     assert left_out(Rig(cameras=(Camera(name="a", kind="dvs"),)), name) == []
+    for stated in (Source(fov_deg=90.0), Source(size=(64, 48))):
+        assert "[source], the lens of the video" in left_out(Rig(source=stated, cameras=rig.cameras), name)
 
 
 def test_a_unit_may_be_given_where_it_is_the_files_own(tmp_path: Path) -> None:

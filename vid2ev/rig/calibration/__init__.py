@@ -18,7 +18,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.calibration.calibrated import UNITS_M, Calibrated, CalibrationFormat, rig_of
 from vid2ev.rig.calibration.node import read_tree
-from vid2ev.rig.camera import Camera, Rig, Viewpoint
+from vid2ev.rig.camera import Camera, Rig, Source, Viewpoint
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.pose import Pose
 from vid2ev.rig.rig_file import is_rig_file, read_rig, write_rig, write_text
@@ -109,6 +109,7 @@ def left_out(rig: Rig, name: str) -> list[str]:
         ("sensor, set and seed", any(camera.sensor or camera.set or camera.seed is not None for camera in cameras)),
         ("clock_offset_us", "clocks" not in keeps and any(camera.clock_offset_us for camera in cameras)),
         ("kind", "kinds" not in keeps and any(camera.kind != "dvs" for camera in cameras)),
+        ("[source], the lens of the video", rig.source != Source()),
         ("the camera of the video, from which poses counted", _moves(rig)),
     ]
     return [what for what, so in lost if so]
