@@ -259,6 +259,7 @@ def test_rows_of_a_rectified_pair_show_the_same(tmp_path: Path) -> None:
     [
         {"size": (320, 240)},
         {"translation_mm": (1e-8, 0, 0)},
+        {"translation_mm": (0, 0, 150), "rotation_deg": (0, 0, 0)},  # (one before the other)
         {"distortion_model": "equidistant", "distortion": (0.1, 0, 0, 0)},
         {"kind": "cis"},
     ],

@@ -2,7 +2,7 @@
 
     x_rectified = R x_camera,   [X, Y, Z, W] = Q [u, v, disparity, 1]
 
-Where a rig has exactly two cameras of a kind, of one size and apart from each other, they are rectified together, and
+Where a rig has exactly two cameras of a kind, of one size and beside each other, they are rectified together, and
 turned as little as can be; the others keep their direction, and lose their distortion.
 
 Source: OpenCV 4.x, `stereoRectify` and `fisheye::stereoRectify`, after J.-Y. Bouguet.
@@ -71,6 +71,8 @@ def _together(one: Intrinsics, other: Intrinsics, between: Pose) -> tuple[Any, .
     function: Any = cv2.fisheye.stereoRectify if all(fisheye) else cv2.stereoRectify
     border = {} if all(fisheye) else {"alpha": 0}  # (no pixels without light)
     try:
-        return function(*stated, flags=cv2.CALIB_ZERO_DISPARITY, **border)
+        found = function(*stated, flags=cv2.CALIB_ZERO_DISPARITY, **border)
     except cv2.error:
         return None
+    # (turned so far that both see backwards, as where one stands before the other)
+    return found if all(projection[0, 0] > 0 for projection in found[2:4]) else None
