@@ -278,6 +278,31 @@ def test_a_scene_with_meshes_and_a_rig_is_rendered_and_converted_again_from_its_
     assert len(Recipe.of("close/scene.toml").mounts) == 2
 
 
+def test_a_folder_of_other_files_is_not_taken_for_this_one() -> None:
+    Path("own").mkdir()
+    arguments = (str(scene_with_meshes_and_a_rig(Path("own"))), "-o", "first", "-q")
+    assert vid2ev("scene", *arguments).exit_code == 0
+    for name in ("obj/skins/skin.png", "obj/box.obj", "obj/material.mtl", "gltf/model.gltf", "mine.toml", "sheet.ply"):
+        file = Path("own", name)
+        content = file.read_bytes()
+        file.write_bytes(content + b"\n")
+        refused(2, "made with other options or files", *arguments, "--resume")
+        file.write_bytes(content)
+        assert vid2ev("scene", *arguments, "--resume").exit_code == 0
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\rb", "a\x01b", "a\udcffb", "aäb"])
+def test_a_scene_file_may_have_any_name(name: str) -> None:
+    try:
+        Path(f"{name}.toml").write_text("[scene]\nduration_s = 0.01\n[camera]\nsize = [4, 3]\n")
+    except OSError:
+        pytest.skip("this file system has no such names")
+    arguments = (f"{name}.toml", "-o", "out", "-q")
+    assert vid2ev("scene", *arguments).exit_code == 0
+    assert read_scene("out/scene.toml").resolved() == read_scene(f"{name}.toml").resolved()
+    assert vid2ev("scene", *arguments, "--resume").exit_code == 0
+
+
 def test_a_dry_run_names_files_as_they_are_seen_from_here() -> None:
     Path("own").mkdir()
     scene_file = scene_with_meshes_and_a_rig(Path("own"))

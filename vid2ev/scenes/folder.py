@@ -8,12 +8,14 @@ NAME/        what a camera of the scene's rig saw, likewise
 
 from __future__ import annotations
 
+import filecmp
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from vid2ev.errors import UsageError
 from vid2ev.recording.destination import check_folder
@@ -42,16 +44,16 @@ def write_scene(
 ) -> bool:
     """Render a scene into a folder; False if `resume` finds it made already.
 
-    how  how it was made, in a line; a folder that was made otherwise is not taken for this one
+    how  how it was made, in a line; a folder that was made otherwise, or of other files, is not taken for this one
 
     Raises UsageError where the folder is taken, DataError where it cannot be written.
     """
     world = source.world
     source.watched_by((view.intrinsics, view.pose) for view in world.viewpoints)
-    said = f"{MADE}{version('vid2ev')}: {how}; {contents.describe()}"
+    said = f"{MADE}{version('vid2ev')}: {_in_a_comment(how)}; {contents.describe()}"
     tables, files = with_own_files(world.scene.tables())
     text = f"{said}\n\n{toml_text(tables)}"
-    if _is_made(directory, text, overwrite, resume):
+    if _is_made(directory, text, files, overwrite, resume):
         return False
     with writing(directory, "make room or access there, or use -o"), whole(directory) as made:
         made.mkdir()
@@ -61,7 +63,12 @@ def write_scene(
     return True
 
 
-def _is_made(directory: Path, text: str, overwrite: bool, resume: bool) -> bool:
+def _in_a_comment(text: str) -> str:
+    """A text as TOML has it in a comment: names of files may have lines, and letters that are none."""
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in text)
+
+
+def _is_made(directory: Path, text: str, files: Mapping[str, Path], overwrite: bool, resume: bool) -> bool:
     check_folder(directory)
     if not directory.exists() or not any(directory.iterdir()):
         return False
@@ -74,9 +81,19 @@ def _is_made(directory: Path, text: str, overwrite: bool, resume: bool) -> bool:
         return False
     if not resume:
         raise UsageError(f"{directory} exists; --resume leaves it, --overwrite replaces it, -o chooses another folder")
-    if made != text:
-        raise UsageError(f"{directory} was made with other options; --overwrite replaces it, -o chooses another folder")
+    if made != text or not _has_copies(directory, files):
+        raise UsageError(
+            f"{directory} was made with other options or files; --overwrite replaces it, -o chooses another folder"
+        )
     return True
+
+
+def _has_copies(directory: Path, files: Mapping[str, Path]) -> bool:
+    """Whether a folder has what `copy_files` would put there."""
+    with TemporaryDirectory() as place:
+        copy_files(files, Path(place))
+        copies = [(copy, directory / copy.relative_to(place)) for copy in Path(place).rglob("*") if copy.is_file()]
+        return all(kept.is_file() and filecmp.cmp(copy, kept, shallow=False) for copy, kept in copies)
 
 
 def _check_replaceable(directory: Path) -> None:
