@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,8 +13,9 @@ from kornia.geometry.transform import warp_perspective
 from view_rigs import Texture, homography, pinhole, psnr
 
 from vid2ev.errors import UsageError
+from vid2ev.rig.camera import Camera, Rig
 from vid2ev.rig.homography import places_on_plane
-from vid2ev.rig.intrinsics import Intrinsics
+from vid2ev.rig.intrinsics import SHORTEST_PX, Intrinsics
 from vid2ev.rig.lens import pixel_grid, pixels_of, rays_of
 from vid2ev.rig.pose import IDENTITY, Pose
 from vid2ev.rig.views import Views
@@ -222,3 +224,18 @@ def test_what_cannot_be_meant_is_refused() -> None:
             Views(SOURCE, [(SOURCE, POSES["beside"])], plane_m)
     with pytest.raises(UsageError, match="threads 0"):
         Views(SOURCE, [], threads=0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("bent", [{}, {"distortion_model": "radtan", "distortion": (0, 0, 1e12, -1e12)}], ids=str)
+@pytest.mark.parametrize("centre_px", [(3.5, 2.5), (1e12, -1e12)])
+@pytest.mark.parametrize("far_mm", [0, 1e12])
+@pytest.mark.parametrize("focal_px", [(SHORTEST_PX, 1e12), (1e12, SHORTEST_PX), (SHORTEST_PX, SHORTEST_PX)])
+def test_cameras_at_the_ends_of_what_rig_files_may_say_see_light(
+    focal_px: tuple[float, float], far_mm: float, centre_px: tuple[float, float], bent: dict[str, Any]
+) -> None:
+    lens = {"size": (8, 6), "focal_px": focal_px, "centre_px": centre_px, "translation_mm": (far_mm,) * 3, **bent}
+    rig = Rig(cameras=(Camera(name="a", kind="dvs", **lens),)).resolved((8, 6))
+    for plane_m in (1e-6, 1e12, math.inf):
+        views = Views(rig.source, [(view.intrinsics, view.pose) for view in rig.viewpoints], plane_m)
+        np.testing.assert_array_equal(views.see(np.ones((6, 8), np.float32))[0].light, 1)

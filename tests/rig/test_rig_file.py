@@ -137,6 +137,8 @@ def test_sensor_files_are_found_beside_the_rig(tmp_path: Path, monkeypatch: pyte
         (f"{CAMERA}fov_deg = 60\nfocal_px = [1, 2]", "keep one of them"),
         (f"{CAMERA}centre_px = [1, 2]", "centre_px needs focal_px"),
         (f"{CAMERA}focal_px = [1, 2]", "focal_px needs size"),
+        (f"{CAMERA}size = [8, 8]\nfocal_px = [1e-320, 1]", "it must be greater than or equal to"),
+        (f"{CAMERA}fov_deg = 179\ndistortion_model = 'radtan'\ndistortion = [0, 0, 0, 0, 1e12]", "1e-12 px or more"),
         (f"{CAMERA}distortion = [1, 2]", "distortion needs distortion_model beside it"),
         (f"{CAMERA}distortion_model = 'fisheye'", "it must be 'none', 'radtan' or 'equidistant'"),
         (f"{CAMERA}distortion_model = 'radtan'", "'radtan' takes 4 or 5 or 8 coefficients"),

@@ -19,12 +19,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from vid2ev.errors import UsageError
-from vid2ev.rig.intrinsics import COUNTS, DistortionModel, Framing, Intrinsics
+from vid2ev.rig.intrinsics import COUNTS, SHORTEST_PX, DistortionModel, Framing, Intrinsics
 from vid2ev.rig.pose import Pose, rotation_of
 
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12)]  # (what is made of it stays finite)
 Side = Annotated[int, Field(strict=True, ge=1, le=65535)]
-Positive = Annotated[float, Field(strict=True, gt=0, le=1e12)]
+Focal = Annotated[float, Field(strict=True, ge=SHORTEST_PX, le=1e12)]
 Angle = Annotated[float, Field(strict=True, ge=0.01, le=179)]
 Row = tuple[Number, Number, Number]
 Value = bool | int | float | str
@@ -48,7 +48,7 @@ class Optics(BaseModel):
     fov_deg: Angle | None = Field(
         default=None, description="horizontal field of view [deg] through the lens, with the centre in the middle"
     )
-    focal_px: tuple[Positive, Positive] | None = Field(
+    focal_px: tuple[Focal, Focal] | None = Field(
         default=None, description="focal lengths across and down [px], in place of fov_deg"
     )
     centre_px: tuple[Number, Number] | None = Field(

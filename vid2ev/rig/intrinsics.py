@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 DistortionModel = Literal["none", "radtan", "equidistant"]
+SHORTEST_PX = 1e-12  # of focal lengths: what pixels look at through shorter ones is beyond all numbers
 COUNTS = {"none": (0,), "radtan": (4, 5, 8), "equidistant": (4,)}  # of coefficients
 
 
@@ -41,8 +42,8 @@ class Intrinsics(BaseModel):
     def _fits(self) -> Intrinsics:
         if min(self.size) < 1 or max(self.size) > 65535:
             raise ValueError(f"size {self.size[0]}x{self.size[1]} must be 1 to 65535 pixels each way")
-        if min(self.focal_px) <= 0:
-            raise ValueError("focal lengths must be greater than 0")
+        if min(self.focal_px) < SHORTEST_PX:
+            raise ValueError(f"focal lengths must be greater than 0, {SHORTEST_PX:g} px or more")
         if len(self.distortion) not in COUNTS[self.model]:
             wanted = " or ".join(map(str, COUNTS[self.model]))
             raise ValueError(f"distortion '{self.model}' takes {wanted} coefficients, not {len(self.distortion)}")
@@ -60,13 +61,11 @@ class Intrinsics(BaseModel):
 
         Raises ValueError for a lens that does not see so far.
         """
-        width, height = size
-        middle = (width - 1) / 2, (height - 1) / 2
-        unit = cls(size=size, focal_px=(1.0, 1.0), centre_px=middle, model=model, distortion=distortion)
         from vid2ev.rig.lens import focal_of_field
 
-        focal = focal_of_field(width, fov_deg, model, distortion)
-        return unit.model_copy(update={"focal_px": (focal, focal)})
+        (width, height), focal = size, focal_of_field(size[0], fov_deg, model, distortion)
+        middle = (width - 1) / 2, (height - 1) / 2
+        return cls(size=size, focal_px=(focal, focal), centre_px=middle, model=model, distortion=distortion)
 
     @property
     def matrix(self) -> np.ndarray:
