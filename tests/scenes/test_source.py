@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -38,6 +40,19 @@ def test_a_scene_is_a_source() -> None:
     assert all(frame.light.shape == (36, 48) and frame.light.dtype == np.float32 for frame in frames)
     about = json.loads(json.dumps(source.describe()))
     assert about["kind"] == "scene" and about["seed"] == 3 and about["scene"]["objects"]
+
+
+@pytest.mark.parametrize("key", ["environment", "objects.crate.texture"])
+def test_it_is_another_with_another_photograph_under_the_same_name(tmp_path: Path, key: str) -> None:
+    photograph = tmp_path / "photograph.png"
+
+    def with_light(code: int) -> dict[str, Any]:
+        cv2.imwrite(str(photograph), np.full((4, 4, 3), code, np.uint8))
+        os.utime(photograph, (1, 1))
+        return open_source(f"scene:room,size=16x12,duration_s=0.01,{key}={photograph}").describe()
+
+    first = with_light(40)
+    assert with_light(40) == first != with_light(220)
 
 
 @pytest.mark.parametrize("fps", [None, 200])

@@ -12,14 +12,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vid2ev.errors import UsageError
+from vid2ev.recording.manifest import identity
 from vid2ev.scenes.instants import Eye, Instants, others, rate_of
 from vid2ev.scenes.reel import Reel
-from vid2ev.scenes.scene_file import plain_size, read_scene
+from vid2ev.scenes.scene_file import files_named, plain_size, read_scene
 from vid2ev.scenes.world import World
 from vid2ev.stream.frames import LUMINANCE, Colour, Frame
 from vid2ev.stream.still import Still
@@ -96,7 +98,8 @@ class SceneSource:
         return 1e-9 * self.instants[len(self.instants) - 1]
 
     def describe(self) -> dict[str, Any]:
-        """What the scene is, every number settled, for the manifest."""
+        """What the scene is, every number settled, and by what its photographs and meshes are known again, for the
+        manifest."""
         return {
             "kind": "scene",
             "path": self.name,
@@ -105,7 +108,14 @@ class SceneSource:
             "frames_expected": self.frames_expected,
             "duration_expected_s": self.duration_expected_s,
             "scene": self.world.scene.tables(),
+            "files": self._files,
         }
+
+    @cached_property
+    def _files(self) -> dict[str, Any]:
+        """What tells its photographs and meshes from others of their names; its rig is settled."""
+        named = [Path(table[key]) for table, key, _ in files_named(self.world.scene.tables()) if key != "rig"]
+        return {str(file): identity(file) for file in named if file.is_absolute()}
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on; earlier ones are not rendered."""
