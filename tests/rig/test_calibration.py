@@ -113,6 +113,17 @@ def test_poses_count_from_the_first_camera(tmp_path: Path, name: str) -> None:
         assert "[source], the lens of the video" in left_out(Rig(source=stated, cameras=rig.cameras), name)
 
 
+def test_the_first_camera_is_at_the_origin_of_the_rig_wherever_a_file_has_it(tmp_path: Path) -> None:
+    path = tmp_path / "pair.yml"
+    write_calibration(path, pair(), "opencv")
+    still, moved = "data: [ 0., 0., 0. ]", "data: [ 1., -2., 3. ]"
+    assert path.read_text().count(still) == 1
+    path.write_text(path.read_text().replace(still, moved))
+    first = read_calibration(path).rig.cameras[0].pose
+    np.testing.assert_allclose(first.rotation, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(first.translation_m, 0, atol=1e-12)
+
+
 def test_a_unit_may_be_given_where_it_is_the_files_own(tmp_path: Path) -> None:
     (tmp_path / "camchain.yaml").write_text(KALIBR)
     turned, moved_m = differences(*(read_calibration(tmp_path / "camchain.yaml", unit).rig for unit in ("m", None)))

@@ -78,7 +78,8 @@ def read_calibration(path: str | Path, unit: str | None = None) -> Calibration:
         raise DataError(f"{path} holds no camera; complete or replace the file")
     said = kind.says_unit(tree)
     _check_unit(path, said, unit)
-    cameras = [_scaled(camera, UNITS_M[said or unit or "m"]) for camera in cameras]
+    first = cameras[0].from_first.inverse()  # (of nothing, where files mean it; a set of dv may begin with another one)
+    cameras = [_placed(camera, first, UNITS_M[said or unit or "m"]) for camera in cameras]
     notes = [] if said or unit or len(cameras) == 1 else [_guess(cameras)]
     if any(np.abs(camera.from_first.translation_m).max() > 1e6 for camera in cameras):
         raise DataError(f"{path}: cameras stand more than 1000 km apart; correct the translations")
@@ -138,8 +139,8 @@ def _check_unit(path: Path, said: str | None, unit: str | None) -> None:
         raise UsageError(f"{path} counts in {said}; leave --unit {unit} out")
 
 
-def _scaled(camera: Calibrated, unit_m: float) -> Calibrated:
-    pose = camera.from_first
+def _placed(camera: Calibrated, first: Pose, unit_m: float) -> Calibrated:
+    pose = camera.from_first @ first
     return replace(camera, from_first=Pose(pose.rotation, pose.translation_m * unit_m))
 
 

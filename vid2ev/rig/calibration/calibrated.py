@@ -27,7 +27,7 @@ UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A camera of a calibration file; `from_first` takes points of the first camera to this one's coordinates [m]."""
+    """A camera of a calibration file; `from_first` takes points of the first camera to this one's coordinates."""
 
     name: str
     intrinsics: Intrinsics
@@ -43,7 +43,7 @@ class CalibrationFormat:
     name        of `--as`
     title       what it is, in a line
     recognises  whether a file is of this kind
-    read        its cameras, the first one first; raises DataError
+    read        its cameras, the first one first, placed against any of them; raises DataError
     write       the text of a file with these cameras; raises UsageError for a lens that it cannot hold
     keeps       what it holds beside lenses, poses and names: of "kinds", "clocks"
     says_unit   in which unit, of `UNITS_M`, a file says that its translations are; None where it says nothing

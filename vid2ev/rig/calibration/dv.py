@@ -42,9 +42,7 @@ MODELS: dict[str, DistortionModel] = {name: model for model, name in NAMES.items
 def read(tree: Node) -> list[Calibrated]:
     """The cameras of a set, in the order of their keys.  Raises DataError."""
     cameras = dict(tree["cameras"].items())
-    found = [_camera(cameras[key], key) for key in sorted(cameras, key=_number)]
-    first = found[0].from_first.inverse()  # (that of C0 is 1; a set may begin with another camera)
-    return [Calibrated(camera.name, camera.intrinsics, camera.from_first @ first) for camera in found]
+    return [_camera(cameras[key], key) for key in sorted(cameras, key=_number)]
 
 
 def write(views: Sequence[Viewpoint]) -> str:
