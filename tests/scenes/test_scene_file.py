@@ -124,6 +124,9 @@ def test_files_are_found_beside_the_scene_file(tmp_path: Path) -> None:
     for bad in ("photos/none.png", "phot"):
         with pytest.raises(UsageError, match=r"objects.a-1.texture = .*no such file"):
             read_scene(file, [f"objects.a.texture={bad}"])
+    for bad in ("none.png", f"{photographs}/none.png"):
+        with pytest.raises(UsageError, match=f"environment = '{bad}': no such file in {(tmp_path / bad).parent}"):
+            read_scene(file, [f"environment={bad}"])
 
 
 @pytest.mark.parametrize(

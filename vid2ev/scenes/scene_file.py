@@ -108,7 +108,7 @@ class SceneFile:
         if not file.is_file():
             names = f"; photographs that come along are {', '.join(PHOTOGRAPHS)}" if "texture" in path else ""
             hint = nearest(text, [*PHOTOGRAPHS, ANY]) if names else ""
-            raise UsageError(f"{self.name}: {path} = '{text}'{hint}: no such file{names}")
+            raise UsageError(f"{self.name}: {path} = '{text}'{hint}: no such file in {file.parent}{names}")
         return str(file)
 
 
