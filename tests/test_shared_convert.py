@@ -99,7 +99,7 @@ def test_a_program_that_is_killed_leaves_what_the_next_one_finishes() -> None:
 def test_control_c_ends_it_with_130_and_one_line() -> None:
     arguments = ["convert", "synthetic:moving-edge,size=64x48,fps=100,duration_s=1000", "clips", "-o", "stopped"]
     child = subprocess.Popen(
-        [sys.executable, "-m", "vid2ev", *arguments, "--jobs", "2", *QUICK],
+        [sys.executable, "-m", "vid2ev", *arguments, "--jobs", "2", "-q", *QUICK],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     while not list(Path().glob("stopped/*_events")) and child.poll() is None:
@@ -108,6 +108,29 @@ def test_control_c_ends_it_with_130_and_one_line() -> None:
     _, said = child.communicate()
     lines = [line for line in said.splitlines() if "broken.mp4" not in line]
     assert child.returncode == 130 and len(lines) == 1 and lines[0].startswith("interrupted"), said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("asks", [signal.SIGINT, signal.SIGTERM])
+def test_who_asks_all_processes_to_end_as_they_begin_is_told_in_one_line(asks: signal.Signals) -> None:
+    arguments = ["convert", "clips", "-o", "begun", "--jobs", "2", "-q", *QUICK]
+    child = subprocess.Popen(
+        [sys.executable, "-m", "vid2ev", *arguments],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    while not _begins(child.pid) and child.poll() is None:
+        time.sleep(0.01)
+    os.killpg(child.pid, asks)
+    _, said = child.communicate()
+    lines = [line for line in said.splitlines() if "broken.mp4" not in line]
+    assert child.returncode == 130 and len(lines) == 1 and lines[0].startswith("interrupted"), said
+
+
+def _begins(number: int) -> bool:
+    """Whether a process that is to share the work of a program is about to: it imports what it needs."""
+    psutil = pytest.importorskip("psutil")
+    begun = [each for each in psutil.Process(number).children() if "spawn_main" in " ".join(each.cmdline())]
+    return any(each.memory_info().rss > 20 << 20 for each in begun)
 
 
 def _held(folder: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Ctrl-C while compiled code runs, or is made.
+"""What asks a program to end; and Ctrl-C while compiled code runs, or is made.
 
 Python hears signals between its own instructions.  The first ones after compiled code are those of a function by which
 Numba (0.68) makes arrays of what that code returns, and Numba does not look whether it raised: a KeyboardInterrupt
@@ -8,12 +8,14 @@ raised there nobody gets: Numba goes on without what it was called for, and comp
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 RETURNING = "_numba_unpickle"
 
 

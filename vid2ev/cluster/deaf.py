@@ -1,11 +1,39 @@
-"""What Dask loads into each process of `--jobs`: Ctrl-C, which a terminal sends to all, is the business of the command,
-which then ends them."""
+"""Processes of `--jobs` are deaf to what asks to end, which a terminal or a service sends to all of a group: it is the
+business of the command, which then ends them.  Dask loads this into each."""
 
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+
+from vid2ev.interrupts import ENDING
 
 
 def dask_setup(_: object) -> None:
-    """Called by Dask when the process begins."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Called by Dask when the process begins.  SIGTERM ends it the second time: then it is from who began it."""
+    for each in ENDING:
+        signal.signal(each, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end_next_time)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+
+
+def _end_next_time(*_: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+@contextmanager
+def born_deaf() -> Iterator[None]:
+    """Processes that begin within, or by threads that do, hear nothing until they say what they do of it; here all is
+    heard in the end."""
+    if not hasattr(signal, "pthread_sigmask"):  # (not on Windows)
+        yield
+        return
+    resource_tracker.ensure_running()  # (Python has the thread that begins it hear again)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

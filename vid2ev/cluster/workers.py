@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from vid2ev.cluster import deaf
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError
 
@@ -91,13 +92,14 @@ class Workers:
 
         threads = dict.fromkeys(ONE_THREAD_EACH, str(self.threads))
         memory: Any = 1 / self.jobs if self.memory is None else _bytes_of(self.memory)
-        with dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries}):
-            cluster = LocalCluster(
-                n_workers=self.jobs, threads_per_worker=1, memory_limit=memory, host="127.0.0.1",
-                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},  # (or else one fixed port)
-                silence_logs=logging.CRITICAL, env=threads, preload="vid2ev.cluster.deaf",
-            )  # fmt: skip
-        with cluster, Client(cluster) as client:
+        with ExitStack() as ends:
+            with dask.config.set(HERE | {"distributed.scheduler.allowed-failures": self.retries}), deaf.born_deaf():
+                cluster = ends.enter_context(LocalCluster(
+                    n_workers=self.jobs, threads_per_worker=1, memory_limit=memory, host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},  # (or else one fixed port)
+                    silence_logs=logging.CRITICAL, env=threads, preload=deaf.__name__,
+                ))  # fmt: skip
+                client = ends.enter_context(Client(cluster))
             yield client
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.interrupts import never_lost
+from vid2ev.interrupts import ENDING, never_lost
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
@@ -33,8 +33,7 @@ def asks_to_end() -> list[signal.Signals]:
     """The signals, beside Ctrl-C's, that ask this program to end and that nobody else has taken: SIGTERM, SIGHUP."""
     if threading.current_thread() is not threading.main_thread():
         return []
-    asks = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    return [each for each in asks if signal.getsignal(each) is signal.SIG_DFL]
+    return [each for each in ENDING if each != signal.SIGINT and signal.getsignal(each) is signal.SIG_DFL]
 
 
 @contextmanager

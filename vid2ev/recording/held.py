@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Self
 
 from vid2ev.errors import UsageError
+from vid2ev.interrupts import ENDING
 
 try:
     import fcntl
@@ -18,7 +19,6 @@ except ImportError:  # not on Windows
     fcntl = None  # type: ignore[assignment]
 
 LOCK = "lock"  # the file of a folder that who writes it has locked
-ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Held:
