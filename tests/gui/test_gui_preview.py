@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -518,6 +519,20 @@ def unheard(tell: Tell) -> None:
     time.sleep(600)
 
 
+def asked_at_every_step(tell: Tell) -> None:
+    """A task that is asked to end at every line of telling how far it is."""
+
+    def ask(*_: Any) -> Any:
+        signal.raise_signal(signal.SIGTERM)
+        return ask
+
+    sys.settrace(ask)
+    try:
+        tell(0, None, "")
+    finally:
+        sys.settrace(None)
+
+
 def finish(job: Job, cancel_after: int | None = None) -> tuple[list[Progress], Done]:
     told: list[Progress] = []
     for _ in range(3000):
@@ -546,6 +561,14 @@ def test_long_work_tells_how_far_it_is_and_hears_when_nobody_wants_it(
     for job in (whole, broken, wrong, deaf):
         job.close()
         assert not job.alive
+
+
+def test_long_work_hears_what_asks_it_to_end_in_the_midst_of_anything() -> None:
+    job = Job(asked_at_every_step)
+    try:
+        assert finish(job)[1] == Done(why_not="cancelled")
+    finally:
+        job._process.kill()
 
 
 def test_a_session_keeps_the_last_good_setup_and_leaves_nothing_behind(

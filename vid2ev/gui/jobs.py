@@ -51,7 +51,8 @@ class Job:
 
     def __init__(self, task: Callable[..., Any], **arguments: Any):
         context = multiprocessing.get_context("spawn")
-        self._cancelled: Any = context.Event()
+        # (without a lock, which a process that is killed would keep, or asked to end while it has it would wait for)
+        self._cancelled: Any = context.RawValue("b", False)
         self._pipe, theirs = context.Pipe(duplex=False)
         self._process = context.Process(target=_work, args=(task, theirs, self._cancelled, arguments), daemon=True)
         self._process.start()
@@ -70,11 +71,11 @@ class Job:
                 yield said
         except (EOFError, OSError):
             self.ended = True
-            yield Done(why_not=CANCELLED if self._cancelled.is_set() else "the work's process has ended")
+            yield Done(why_not=CANCELLED if self._cancelled.value else "the work's process has ended")
 
     def cancel(self) -> None:
         """Ask the task to end; `news` says when it has, and ends it if it does not hear."""
-        self._cancelled.set()
+        self._cancelled.value = True
         self._cancelled_s = self._cancelled_s or time.monotonic()
 
     def close(self) -> None:
@@ -95,10 +96,14 @@ class Job:
 
 def _work(task: Callable[..., Any], pipe: Connection, cancelled: Any, arguments: dict[str, Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: cancelled.set())  # (the end of the program: leave nothing half done)
+
+    def end(*_: object) -> None:  # (the end of the program: leave nothing half done)
+        cancelled.value = True
+
+    signal.signal(signal.SIGTERM, end)
 
     def tell(done: float, of: float | None, text: str = "") -> None:
-        if cancelled.is_set() or not multiprocessing.parent_process().is_alive():  # type: ignore[union-attr]
+        if cancelled.value or not multiprocessing.parent_process().is_alive():  # type: ignore[union-attr]
             raise Cancelled
         pipe.send(Progress(done, of, text))
 

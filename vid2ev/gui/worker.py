@@ -46,7 +46,7 @@ class Worker:
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self._newest: Any = context.Value("q", 0)
+        self._newest: Any = context.RawValue("q", 0)  # (without a lock, which a process that is killed would keep)
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, self._newest), daemon=True)
         self._process.start()
