@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,6 +49,29 @@ def test_processes_do_not_begin_what_is_queued_where_something_goes_wrong(
             submit(os.mkdir, tmp_path / str(number))
         raise error
     assert (tmp_path / "first").exists() and len(list(tmp_path.iterdir())) < 5  # (a few are on their way already)
+
+
+def test_control_c_of_all_processes_ends_them_at_once_and_only_one_says_so() -> None:
+    program = """
+from vid2ev.cluster.processes import processes
+try:
+    with processes(2) as submit:
+        waiting = [submit(exec, "import time; print('at work', flush=True); time.sleep(1000)") for _ in range(6)]
+        waiting[0].result()
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    child = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    try:
+        assert child.stdout and [child.stdout.readline() for _ in range(2)] == ["at work\n"] * 2
+        os.killpg(child.pid, signal.SIGINT)  # (as a terminal does)
+        assert child.communicate(timeout=60) == ("interrupted\n", "")
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
 
 
 def test_a_process_that_is_killed_is_one_sentence() -> None:

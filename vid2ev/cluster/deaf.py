@@ -16,6 +16,11 @@ def dask_setup(_: object) -> None:
     for each in ENDING:
         signal.signal(each, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_next_time)
+    hearing()
+
+
+def hearing() -> None:
+    """Said by a process that was born deaf, when it has said what it does of what it hears."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
 
@@ -26,8 +31,8 @@ def _end_next_time(*_: object) -> None:
 
 @contextmanager
 def born_deaf() -> Iterator[None]:
-    """Processes that begin within, or by threads that do, hear nothing until they say what they do of it; here all is
-    heard in the end."""
+    """Processes that begin within, or by threads that do, hear nothing until they are `hearing`; here all is heard in
+    the end."""
     if not hasattr(signal, "pthread_sigmask"):  # (not on Windows)
         yield
         return

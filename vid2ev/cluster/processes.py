@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import Any
 
+from vid2ev.cluster.deaf import born_deaf, hearing
 from vid2ev.errors import DataError
 
 Submit = Callable[..., "Future[Any]"]  # a function that can be imported, and what it takes
@@ -18,18 +20,36 @@ Submit = Callable[..., "Future[Any]"]  # a function that can be imported, and wh
 def processes(count: int, begin: Callable[[], object] | None = None) -> Iterator[Submit]:
     """So many processes, each of which calls `begin` at first; what this yields gives them a task.
 
-    Whatever goes wrong within, Ctrl-C included, ends it as soon as the tasks that are begun have ended: the others are
-    dropped.  Raises DataError where one of the processes is killed.
+    Whatever goes wrong within ends it as soon as the tasks that are begun have ended, and Ctrl-C, which a terminal
+    sends to all processes and these leave to this one, at once: the others are dropped.  Raises DataError where one of
+    the processes is killed.
     """
+    others = active_children()
     # (processes that are not forked: threads of torch and numba do not survive it)
-    with ProcessPoolExecutor(count, get_context("spawn"), begin) as pool:
+    with ProcessPoolExecutor(count, get_context("spawn"), _begun, (begin,)) as pool:
+
+        def submit(*task: Any) -> Future[Any]:
+            with born_deaf():
+                return pool.submit(*task)
+
         try:
-            yield pool.submit
+            yield submit
         except BrokenProcessPool as error:
             raise DataError(
                 "a process that did part of the work was ended, for want of memory as a rule; make room, and go on with"
                 " --resume"
             ) from error
-        except BaseException:
+        except BaseException as error:
             pool.shutdown(wait=False, cancel_futures=True)
+            if not isinstance(error, Exception):
+                for each in active_children():
+                    if each not in others:
+                        each.kill()
             raise
+
+
+def _begun(begin: Callable[[], object] | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    hearing()
+    if begin:
+        begin()
