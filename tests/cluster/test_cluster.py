@@ -56,7 +56,8 @@ def test_control_c_of_all_processes_ends_them_at_once_and_only_one_says_so() -> 
 from vid2ev.cluster.processes import processes
 try:
     with processes(2) as submit:
-        waiting = [submit(exec, "import time; print('at work', flush=True); time.sleep(1000)") for _ in range(6)]
+        work = "import os, time; os.write(1, b'at work' + bytes([10])); time.sleep(1000)"  # (a line in one go)
+        waiting = [submit(exec, work) for _ in range(6)]
         waiting[0].result()
 except KeyboardInterrupt:
     print("interrupted")
