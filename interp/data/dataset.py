@@ -64,11 +64,11 @@ def write_dataset(
     Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, no
     scene can be made, or the workers of one died.
     """
-    inputs = {"inputs": digests_of(spec.videos)} if spec.videos else {}
+    made_in = directory.with_name(f"{directory.name}.partial")
+    inputs = {"inputs": digests_of(spec.videos, [directory, made_in])} if spec.videos else {}
     job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")} | inputs))
     if directory.exists():
         return _finished(directory, job, resume)
-    made_in = directory.with_name(f"{directory.name}.partial")
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
     scenes, unusable = scenes_of(spec)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from interp.data.settings import ClipSettings
@@ -18,17 +18,18 @@ from vid2ev.scenes.scene_file import files_named, read_scene, scene_names
 from vid2ev.scenes.textures import PHOTOGRAPHS
 
 
-def digests_of(names: Iterable[str]) -> dict[str, str]:
-    """Digests of those of the names that are paths of files or folders."""
+def digests_of(names: Iterable[str], besides: Collection[Path] = ()) -> dict[str, str]:
+    """Digests of those of the names that are paths of files or folders; `besides` are folders that are made of them,
+    wherever they are."""
     there = sorted({name for name in names if Path(name).exists()})
-    return {name: identity(Path(name), copies=True, deep=True)["sha256"] for name in there}
+    return {name: identity(Path(name), copies=True, deep=True, besides=besides)["sha256"] for name in there}
 
 
-def inputs_of(settings: ClipSettings, videos: Iterable[str] = ()) -> dict[str, str]:
+def inputs_of(settings: ClipSettings, videos: Iterable[str] = (), besides: Collection[Path] = ()) -> dict[str, str]:
     """Those of settings of clips, and of further videos."""
     pictures = (name for name in (*settings.textures, *settings.environments) if name not in PHOTOGRAPHS)
     scenes = (file for name in settings.scene_names for file in _files_of_scene(name))
-    return digests_of([*settings.video_files, *settings.recording_folders, *pictures, *scenes, *videos])
+    return digests_of([*settings.video_files, *settings.recording_folders, *pictures, *scenes, *videos], besides)
 
 
 def trained_with(settings: ClipSettings, videos: Sequence[str]) -> list[str]:
@@ -53,7 +54,7 @@ def _files_of_scene(name: str) -> Iterator[str]:
             yield str(Path(name).parent / table[key])
 
 
-def known_by(settings: ClipSettings, *more: object) -> str:
+def known_by(settings: ClipSettings, *more: object, besides: Collection[Path] = ()) -> str:
     """A short name of clips; those of other settings, other files and others of what else decides have another."""
-    said = [settings.model_dump_json(), json.dumps(inputs_of(settings)), *map(str, more)]
+    said = [settings.model_dump_json(), json.dumps(inputs_of(settings, besides=besides)), *map(str, more)]
     return hashlib.sha256(" ".join(said).encode()).hexdigest()[:12]

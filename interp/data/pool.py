@@ -16,7 +16,7 @@ load samples share the work, and removes one that is needed no more.  With a GPU
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import as_completed
 from pathlib import Path
 
@@ -43,6 +43,7 @@ class Pool:
     most    clips in the window; each of 128x128 pixels takes 2.6 MB
     fresh   clips that join it with each sample
     device  what clips are made on; one that is needed and not there yet is made on the CPU
+    besides folders that are no part of what clips are made of, wherever they are
     Raises UsageError for a window that cannot be.
     """
 
@@ -56,6 +57,7 @@ class Pool:
         most: int = 1500,
         fresh: float = 0.02,
         device: Device = CPU,
+        besides: Collection[Path] = (),
     ):
         if not 1 <= begin <= most or fresh < 0:
             raise UsageError(
@@ -63,7 +65,7 @@ class Pool:
             )
         self.settings, self.seed, self.begin, self.most, self.fresh = settings, seed, begin, most, fresh
         self.device = device
-        self.folder = folder / f"{known_by(settings)}-{seed}-{VERSION}"
+        self.folder = folder / f"{known_by(settings, besides=besides)}-{seed}-{VERSION}"
         with writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
 

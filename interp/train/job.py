@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -131,9 +131,10 @@ class Job(BaseModel):
         """The same by so many processes, without a GPU: that decides the last bits."""
         return self.model_copy(update={"recipe": self.recipe.model_copy(update={"processes": processes})})
 
-    def kept(self) -> dict[str, Any]:
-        """It as JSON, as a run's folder keeps it, with what is in the files that it names now."""
-        now = {"starts": self.starts, "inputs": inputs_of(self.clips, self.validation.videos)}
+    def kept(self, besides: Collection[Path] = ()) -> dict[str, Any]:
+        """It as JSON, as a run's folder keeps it, with what is in the files that it names now; `besides` are folders
+        that are no part of these, wherever they are."""
+        now = {"starts": self.starts, "inputs": inputs_of(self.clips, self.validation.videos, besides)}
         return self.model_dump(mode="json", exclude=set(now)) | {name: known for name, known in now.items() if known}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,7 @@ def feed_of(
     report: Report | None = None,
     device: Device = CPU,
     leads: bool = True,
+    besides: Collection[Path] = (),
 ) -> Feed:
     """Samples from a step on, and clips to validate with; `close` of what is returned ends who makes clips.
 
@@ -72,8 +74,9 @@ def feed_of(
     jobs    processes that make the first clips
     device  what clips to train with are made on: a GPU, by another process, beside the processes that train, for the
             one of them that leads
+    besides  folders that are no part of what clips are made of, wherever they are
     """
-    pool = Pool(cache, job.clips, job.recipe.seed, device=device, **job.window.model_dump())
+    pool = Pool(cache, job.clips, job.recipe.seed, device=device, besides=besides, **job.window.model_dump())
     sample = step * job.recipe.batch
     with ExitStack() as undoing:  # (what fails here leaves no process that makes clips for nobody)
         ahead = Ahead(pool, sample) if device.name != "cpu" and leads else None
@@ -82,7 +85,7 @@ def feed_of(
             ahead.fill(sample, report)
         else:
             pool.fill(sample, jobs, report)
-        validation = validation_of(job, cache / "validation")
+        validation = validation_of(job, cache / "validation", besides)
         feed = Feed(_samples(job, pool), validation, job.recipe.batch, workers, ahead)
         undoing.pop_all()
     return feed
@@ -95,12 +98,13 @@ def _samples(job: Job, pool: Pool) -> Dataset[Batch]:
     return WithFlows(Sequences(pool, job.samples, WITHOUT_END, job.colours))
 
 
-def validation_of(job: Job, cache: Path) -> list[tuple[str, Batch]]:
+def validation_of(job: Job, cache: Path, besides: Collection[Path] = ()) -> list[tuple[str, Batch]]:
     """Clips of two event sensors, each as a batch of its own, with every instant a target; and what they count for."""
     batches = []
     for sensor in MEASURED_WITH:
         clips = job.clips.model_copy(update={"sensors": SENSORS[sensor]})
-        for number, clip in enumerate(_kept_clips(job, clips, cache / f"{sensor}-{_known_by(job, clips)}")):
+        kept = cache / f"{sensor}-{_known_by(job, clips, besides)}"
+        for number, clip in enumerate(_kept_clips(job, clips, kept)):
             group = f"{'scenes' if number < job.validation.clips else 'real'}-{sensor}"
             batches.append((group, default_collate([_whole(job, clip, number)])))
     return batches
@@ -117,9 +121,10 @@ def _whole(job: Job, clip: Clip, number: int) -> Batch:
     return sample | {"times": inner.float() / clip.multiple, "truth": as_tensor(clip.truth[1:-1])}
 
 
-def _known_by(job: Job, settings: ClipSettings) -> str:
+def _known_by(job: Job, settings: ClipSettings, besides: Collection[Path]) -> str:
     """A short name of clips to validate with; others have another."""
-    return known_by(settings, job.validation.model_dump_json(), digests_of(job.validation.videos), VERSION)
+    videos = digests_of(job.validation.videos, besides)
+    return known_by(settings, job.validation.model_dump_json(), videos, VERSION, besides=besides)
 
 
 def _kept_clips(job: Job, settings: ClipSettings, cache: Path) -> list[Clip]:

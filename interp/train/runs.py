@@ -53,7 +53,7 @@ def run(
     learner = learner_of(job)
     if not resume:
         begin(learner, starts)
-    folder = RunFolder(path, job.kept(), resume, machines.first, starts)
+    folder = RunFolder(path, job.kept([path]), resume, machines.first, starts)
     try:
         if resume and (done := folder.finished()) is not None:
             folder.forget_clips()  # (where it was killed just as it was done)
@@ -67,7 +67,8 @@ def run(
         with ExitStack() as fed:
             try:
                 with counting(quiet, CLIPS) as report:
-                    feed = feed_of(job, folder.clips, step, spare, usable_cores(), report, clips_on, machines.first)
+                    leads, jobs = machines.first, usable_cores()
+                    feed = feed_of(job, folder.clips, step, spare, jobs, report, clips_on, leads, [path])
                 fed.callback(feed.close)
                 machines.check_clips(len(feed.validation))
             except UsageError:

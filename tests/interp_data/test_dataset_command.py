@@ -272,6 +272,14 @@ def test_what_was_killed_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -
     assert write_dataset(directory, spec, resume=True) == again  # (a finished one is left as it is)
 
 
+def test_a_set_may_lie_in_the_folder_of_the_pictures_that_it_is_made_of(tmp_path: Path) -> None:
+    for k, frame in enumerate(open_source("synthetic:moving-edge,size=32x24,fps=30,duration_s=1.2").frames()):
+        write_codes(tmp_path / f"{k:03d}.png", np.repeat((255 * frame.light[..., :1]).astype(np.uint8), 3, axis=2))
+    spec = DatasetSpec(videos=(str(tmp_path),), frames=2, slowdown=4, count=1)
+    made = write_dataset(tmp_path / "set", spec)
+    assert write_dataset(tmp_path / "set", spec, resume=True) == made
+
+
 def test_who_is_asked_to_end_while_it_begins_lets_others_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fcntl = pytest.importorskip("fcntl", reason="no file locks on this system")
     flock = fcntl.flock

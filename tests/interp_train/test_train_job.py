@@ -12,6 +12,7 @@ import torch
 from pydantic import ValidationError
 
 from interp.data.inputs import known_by
+from interp.data.pool import Pool
 from interp.networks import names
 from interp.train.job import Job
 from interp.train.made_of import validation_of
@@ -107,6 +108,19 @@ def test_a_job_is_known_by_what_is_in_the_files_that_it_names(tmp_path: Path) ->
         assert job.kept() != known and (known_by(job.clips) != clips or file == files[3])
         known, clips = job.kept(), known_by(job.clips)
     assert "inputs" not in Job.of().kept()
+
+
+def test_clips_have_the_name_that_they_have_whatever_their_run_writes_beside_its_data(tmp_path: Path) -> None:
+    """Processes that train look at different moments for them, and later sessions do."""
+    film, run = tmp_path / "frames", tmp_path / "frames" / "run"
+    film.mkdir()
+    (film / "1.png").write_bytes(bytes(1000))
+    job = Job.of(videos=[str(film)])
+    names = []
+    for _ in range(2):
+        names.append((Pool(run / "clips", job.clips, 0, besides=[run]).folder.name, job.kept([run])))
+        (run / "steps.json").write_text("{}")
+    assert names[0] == names[1]
 
 
 def test_a_scene_of_one_s_own_is_known_by_what_is_in_it_and_in_the_meshes_that_it_names(tmp_path: Path) -> None:
