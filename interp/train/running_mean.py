@@ -11,7 +11,7 @@ from lightning.pytorch.callbacks import WeightAveraging
 
 class RunningMean(WeightAveraging):
     """mean <- share mean + (1 - share) weight after each step, share = min(most, (1 + n) / (10 + n)) after n others: at
-    first over fewer steps, so that it does not hang on the start."""
+    first over fewer steps, so that it does not hang on the start, of which after the first step nothing is left."""
 
     def __init__(self, most: float):
         self._most, self._share = most, 0.0
