@@ -274,7 +274,8 @@ def test_what_was_killed_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -
 
 def test_a_set_may_lie_in_the_folder_of_the_pictures_that_it_is_made_of(tmp_path: Path) -> None:
     for k, frame in enumerate(open_source("synthetic:moving-edge,size=32x24,fps=30,duration_s=1.2").frames()):
-        write_codes(tmp_path / f"{k:03d}.png", np.repeat((255 * frame.light[..., :1]).astype(np.uint8), 3, axis=2))
+        write_codes(tmp_path / f"{k:03d}.png", (255 * frame.light).astype(np.uint8))
+    (tmp_path / "timestamps.txt").write_text("".join(f"{k * 33_333}\n" for k in range(37)))
     spec = DatasetSpec(videos=(str(tmp_path),), frames=2, slowdown=4, count=1)
     made = write_dataset(tmp_path / "set", spec)
     assert write_dataset(tmp_path / "set", spec, resume=True) == made
