@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -97,7 +97,7 @@ def evaluate(
         if not isinstance(value, kind | None):
             raise UsageError(f"{name} {value!r}: expected a {kind.__name__}; leave it out for the usual one")
     folder, protocol = Path(folder), protocol or Protocol()
-    sensor = simulated or Simulated.of("clean")
+    sensor = replace(simulated or Simulated.of("clean"), threads=None if workers.alone else workers.threads)
     methods: list[Rebuilder] = [*methods_of(baselines, networks, protocol, device)]
     if not (methods or predictions):
         raise UsageError("nothing to score: expected a baseline, a network or predictions")

@@ -18,6 +18,7 @@ from vid2ev import Dvs, DvsSpec, Events, load_sensor, open_source
 from vid2ev.rig.camera import default_rig
 from vid2ev.seen.instants import Instant, instants
 from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import scene_behind
 from vid2ev.sources import is_scene
 from vid2ev.sources.source import Source
 from vid2ev.toml_text import toml_value
@@ -49,12 +50,14 @@ class Simulated:
     name      what they were found by
     seed      of its noise
     options   of `open_source`
+    threads   that render scenes; None for all cores.  They change nothing but the time it takes
     """
 
     spec: DvsSpec
     name: str = "clean"
     seed: int = 0
     options: dict[str, Any] = field(default_factory=dict)
+    threads: int | None = None
 
     @classmethod
     def of(cls, sensor: str | Path, overrides: Sequence[str] = (), seed: int = 0, **options: Any) -> Simulated:
@@ -79,7 +82,10 @@ class Simulated:
 
     def opened(self, video: str) -> Source:
         """A film as it is looked at."""
-        return open_source(video, colour="rgb", **self.edited(video))
+        film = open_source(video, colour="rgb", **self.edited(video))
+        if scene := scene_behind(film):
+            scene.world.threads = self.threads
+        return film
 
     def seen(self, video: str, film: Source) -> Generator[Seen]:
         """The frames of a film that is `opened`, all originals, with the events of the light of all of them and in
@@ -89,7 +95,7 @@ class Simulated:
         # (where the frames are from, whatever cameras a scene comes with)
         recipe = Recipe.of(video, self.spec, seed=self.seed, rig=default_rig(), **(edited | denser))
         dvs, curve = recipe.mounts[0].dvs(), curve_of(film.describe())
-        with closing(instants(recipe)) as light:
+        with closing(instants(recipe, threads=self.threads)) as light:
             for frame in film.frames():
                 yield Seen(codes_of(frame.light, curve), frame.t_ns // 1000, *_until(frame.t_ns, light, dvs))
 

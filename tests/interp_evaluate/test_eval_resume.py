@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,12 @@ from interp.evaluate.simulated import Simulated
 from interp.networks import make
 from interp.weights import save
 from vid2ev import DataError, UsageError
+from vid2ev.cluster import workers as cluster_workers
 from vid2ev.cluster.task import Task
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 from vid2ev.recording.exposures import write_codes
+from vid2ev.scenes import render
 
 pytestmark = pytest.mark.long
 
@@ -86,6 +89,28 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
     evaluate(datasets(data), tmp_path / "report", resume=True, **options(data))
     assert contents(tmp_path / "report") == whole
     assert len(rebuilt) == 4 * (9 - stop)  # nothing is scored twice
+
+
+@pytest.mark.parametrize(("jobs", "pools"), [(1, {4}), (2, {2}), (4, set())])
+def test_a_worker_renders_scenes_by_its_share_of_the_cores(
+    jobs: int, pools: set[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: set[int] = set()
+
+    def here(tasks: Sequence[Task], _: Workers) -> Iterator[Outcome]:
+        return (Outcome(task.name, task.call(lambda _: None)) for task in tasks)
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, threads: int):
+            begun.add(threads)
+            super().__init__(threads)
+
+    monkeypatch.setattr(render, "ThreadPoolExecutor", Pool)
+    for module in (render, cluster_workers):
+        monkeypatch.setattr(module, "usable_cores", lambda: 4)
+    sources = ["scene:flicker,size=128x96,scene.duration_s=0.04"]
+    evaluate(sources, tmp_path, baselines=["nearest"], limit=1, workers=Workers(jobs), share=here)
+    assert begun == pools
 
 
 def test_workers_change_no_byte(data: Path, whole: dict[str, bytes], tmp_path: Path) -> None:
