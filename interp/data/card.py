@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from vid2ev.sources import SYNTHETIC_PREFIX, is_scene
+
 KNOWN = """\
 * Frames of the truth are the light of an instant, without exposure and noise.{exposures}
 * Events are simulated from the very light that the truth is made of. That is kinder to every method that uses events
@@ -37,8 +39,9 @@ def card_text(facts: dict[str, Any]) -> str:
     table = "\n".join(f"| {name} | {value} |" for name, value in rows.items())
     exposures = EXPOSED if spec["layout"] == "own" else KEYS
     known = KNOWN.format(exposures=exposures, scenes=CUT if videos else RENDERED)
-    if videos:
-        known += "\n" + FILMED.format(filmed="They are real films.", interpolated=facts["interpolated_fps"])
+    if films := [video for video in videos if not (is_scene(video) or video.startswith(SYNTHETIC_PREFIX))]:
+        filmed = "They are real films." if len(films) == len(videos) else "Some of the videos are real films."
+        known += "\n" + FILMED.format(filmed=filmed, interpolated=facts["interpolated_fps"])
     left_out = "\n".join(f"* {name}: {reason}" for name, reason in facts["left_out"].items())
     return (
         f"# Data card\n\nMade by vid2ev {facts['versions']['vid2ev']}; `dataset.json` has the same and each scene.\n\n"

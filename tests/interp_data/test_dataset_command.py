@@ -192,6 +192,24 @@ def test_the_card_counts_the_videos_that_there_are_scenes_of(film: Path, count: 
     assert f"| Source | {said}" in card and f"({'4 to 5' if count is None else 4} CIS frames a scene)" in card
 
 
+@pytest.mark.parametrize(
+    ("videos", "said"),
+    [
+        (("film.npz", "film.mp4"), "They are real films."),
+        (("scene:flicker", "film.mp4"), "Some of the videos are real films."),
+        (("scene:flicker", "synthetic:moving-edge"), ""),
+    ],
+)
+def test_the_card_calls_films_what_was_filmed(videos: tuple[str, ...], said: str) -> None:
+    facts = {
+        "spec": DatasetSpec(videos=videos).model_dump(mode="json"), "versions": {"vid2ev": "1"}, "scenes": 1,
+        "samples": 0, "cis_fps": 30.0, "interpolated_fps": 240.0, "events": 0, "disparity_mm": 0.0, "left_out": {},
+        "of_scenes": {"a-0": {"key_frames": 2}},
+    }  # fmt: skip
+    card = card_text(facts)
+    assert (f"* {said} " in card and "Films have been exposed" in card) if said else "ilms" not in card
+
+
 def test_a_full_disk_is_no_fault_of_a_scene(film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene that cannot be made is left out; one that cannot be written is made when there is room again."""
     from interp.data import dataset as module
