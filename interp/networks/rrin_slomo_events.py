@@ -45,7 +45,8 @@ class RrinSlomoEventsSpec(EventInputSpec):
 
     flow_input: Literal["frames", "frames+events"] = Field(
         default="frames",
-        description="of the flow network: all bins as well; 288 parameters and 0.288 kMAC/px a bin, once per pair",
+        description="of the flow network, where there is one: all bins as well; 288 parameters and 0.288 kMAC/px a bin,"
+        " once per pair",
     )
     flow: Literal[Weights, "dis", "guided"] = Field(
         default="own",
@@ -74,8 +75,8 @@ class RrinSlomoEventsSpec(EventInputSpec):
 
     @property
     def takes_events(self) -> bool:
-        elsewhere = self.flow_input != "frames" or self.guided or self.reconstruct != "none"
-        return super().takes_events or elsewhere
+        into_flow = self.flow_input != "frames" and self.flow != "dis"
+        return super().takes_events or into_flow or self.guided or self.reconstruct != "none"
 
     @property
     def guided(self) -> bool:

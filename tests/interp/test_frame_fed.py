@@ -169,6 +169,7 @@ def test_events_of_a_sensor_with_fewer_pixels_are_taken(name: str) -> None:
         ("rrin", {"gate": True}),
         ("rrin_slomo_events", {"events": "none", "flow": "dis"}),
         ("rrin_slomo_events", {"events": "none", "flow_input": "frames+events"}),
+        ("rrin_slomo_events", {"events": "none", "flow_input": "frames+events", "flow": "dis"}),
     ],
 )
 def test_events_matter_where_a_network_takes_them_and_only_there(name: str, options: dict) -> None:
