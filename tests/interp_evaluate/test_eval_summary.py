@@ -267,6 +267,14 @@ def test_what_is_said_of_films_is_refused_where_there_are_recordings_alone(
     assert run(tmp_path / "set", tmp_path / "film.npz", *options, "--seed", "1", "-q").exit_code == 0
 
 
+def test_the_report_says_how_films_were_read(tmp_path: Path) -> None:
+    """That decides the scores, and whether it can be gone on with."""
+    write_film(tmp_path / "film.npz", pictures(9))
+    options = ["--skip", 3, "--baseline", "linear", "-o", tmp_path / "out"]
+    assert run(tmp_path / "film.npz", *options, "--slowdown", 8, "--size", "16x12", "-q").exit_code == 0
+    assert "| how films are read | slowdown 8, size 16x12 |" in (tmp_path / "out" / "report.md").read_text()
+
+
 def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     write_film(tmp_path / "film.npz", pictures(9))
     done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4",
@@ -278,7 +286,7 @@ def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     assert f"[default: {', '.join(METHODS)}]" in " ".join(run("--help").stdout.split())
     text = (tmp_path / "out" / "report.md").read_text()
     assert FROM_TRUTH in text and "| event camera | clean, seed 0 |" in text
-    assert "threshold_on 0.4," in text and "shading [1, -0.25]," in text
+    assert "threshold_on 0.4," in text and "shading [1, -0.25]," in text and "how films are read" not in text
     noisy = Simulated.of("noisy", ["shot_rate_hz=3"]).spec
     assert (noisy.threshold_on, noisy.shot_rate_hz, noisy.photoreceptor_tau_us) == (0.25, 3.0, 100.0)
     wrong = run(tmp_path / "film.npz", "-o", tmp_path / "other", "--sensor", "davis")

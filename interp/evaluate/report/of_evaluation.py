@@ -19,6 +19,7 @@ from vid2ev.recording.exposures import read_codes
 from vid2ev.recording.manifest import versions
 
 FILMS = ("video", "scene")
+OF_SENSOR = ("name", "seed", "parameters")  # beside options of the films that it looks at (`Simulated.describe`)
 SIMULATED = (*FILMS, "own")  # sequences whose events are of light that passes through the truth
 FACTS = {
     "kind": "kind", "size": "pixels", "event_size": "of events", "frames": "frames", "rate_hz": "per second",
@@ -75,6 +76,8 @@ def _settings(summary: Mapping[str, Any]) -> dict[str, object]:
         settings["its parameters"] = [
             f"{name} {_parameter(value)}" for name, value in sensor["parameters"].items() if value != []
         ]
+        if edits := [f"{name} {_fact(value)}" for name, value in sensor.items() if name not in OF_SENSOR]:
+            settings["how films are read"] = edits
     return settings
 
 
@@ -86,4 +89,4 @@ def _parameter(value: object) -> object:
 def _fact(value: object) -> object:
     if isinstance(value, float):
         return f"{value:g}"
-    return "×".join(map(str, value)) if isinstance(value, list) else value
+    return "×".join(map(str, value)) if isinstance(value, list | tuple) else value
