@@ -123,7 +123,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         if as_json:
             click.echo(json.dumps(made, indent=2))
         return
-    if output and output.suffix == ".mp4" and not single:
+    if output and output.suffix.lower() == ".mp4" and not output.is_dir() and not single:
         raise UsageError(
             f"-o {output}: a film, of {len(found)} source(s) in {sources[0]}; expected the name of a folder"
         )

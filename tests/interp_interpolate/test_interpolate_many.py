@@ -62,9 +62,10 @@ def test_where_none_can_be_made_nothing_appears() -> None:
 
 def test_a_film_is_of_one_source() -> None:
     for sources in (["films"], ["films/f0", "films/f1"]):
-        result = run(*sources, "-o", "film.mp4")
-        assert isinstance(result.exception, UsageError) and "expected the name of a folder" in str(result.exception)
-        assert not Path("film.mp4").exists()
+        for name in ("film.mp4", "FILM.MP4"):
+            result = run(*sources, "-o", name)
+            assert isinstance(result.exception, UsageError) and "expected the name of a folder" in str(result.exception)
+            assert not Path(name).exists()
 
 
 def test_a_file_of_events_is_of_one_source() -> None:
