@@ -16,7 +16,7 @@ import torch
 from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
-from interp.interpolate.destination import kind_of, manifest_of, places_of
+from interp.interpolate.destination import check_apart, kind_of, manifest_of, places_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
@@ -86,6 +86,8 @@ def interpolate(
     kind = kind_of(output, format)
     ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options, running)
     take, grid, fill = ready.take, ready.grid, ready.fill
+    if overwrite:
+        check_apart(Path(source), output)
     if told:
         told(f"{fill.method.name}: {ready.why}")
     rate = film_rate(take, grid, play, kind)

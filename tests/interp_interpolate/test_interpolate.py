@@ -286,6 +286,19 @@ def test_a_file_of_somebody_else_is_not_replaced_by_the_manifest_of_a_film(tmp_p
     interpolate(source, tmp_path / "clip.mp4", multiple=2, method="nearest")  # (what is left of ours is no obstacle)
 
 
+@pytest.mark.parametrize("name", ["clip.mp4", "in"])
+def test_frames_do_not_take_the_place_of_what_they_are_made_of(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interpolate(images(tmp_path / "in", moving(2)), tmp_path / "clip.mp4", multiple=2, method="nearest")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    monkeypatch.chdir(tmp_path)
+    for asked in ({"overwrite": True}, {"overwrite": True, "resume": True}):
+        with pytest.raises(UsageError, match="holds what frames are to be made of"):
+            interpolate(tmp_path / name, name, multiple=2, method="nearest", **asked)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
 @pytest.mark.parametrize("name", ["out", "out.mp4"])
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege there")
 def test_what_frames_cannot_take_the_place_of_is_refused_before_any_is_made(tmp_path: Path, name: str) -> None:
