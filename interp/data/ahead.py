@@ -61,7 +61,8 @@ class Ahead:
 
 def _keep_filled(pool: Pool, reached: Any, failed: Any) -> None:
     """Make clips until there is nobody to draw from them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # (Ctrl-C is for the process that trains)
+    for asked in (signal.SIGINT, signal.SIGTERM):  # (Ctrl-C, and a cluster that ends all, are for who trains)
+        signal.signal(asked, signal.SIG_IGN)
     try:
         while _wanted(reached):
             missing = pool.missing(reached.value, 2 * AHEAD)

@@ -135,6 +135,21 @@ def test_clips_are_made_ahead_of_samples(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGTERM])
+def test_who_makes_clips_ends_when_the_process_that_trains_says_so(tmp_path: Path, asked: signal.Signals) -> None:
+    """Not where all processes are asked to: training ends after the step, for which there are to be clips."""
+    pool = pool_of_recordings(tmp_path, begin=1, most=1, fresh=0.0)
+    ahead = Ahead(pool, 0)
+    ahead.fill(0)
+    assert ahead._process.pid
+    os.kill(ahead._process.pid, asked)
+    ahead._process.join(1.0)
+    ahead.reached(1)
+    ahead.close()
+    assert ahead._process.exitcode == 0
+
+
+@pytest.mark.long
 def test_who_makes_clips_and_ends_is_told_of(tmp_path: Path) -> None:
     pool = pool_of_recordings(tmp_path, begin=1, most=1, fresh=0.0)
     ahead = Ahead(pool, 0)
