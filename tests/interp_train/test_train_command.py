@@ -375,6 +375,6 @@ def test_a_run_may_lie_in_the_folder_that_it_learns_from() -> None:
     write_hsergb(Path("data", "long"), 9)
     small = ("--set", "clips.size=[32,24]", "--set", "samples.size=16")
     begun = run(*FEW, *small, "--data", "data", "-o", "data/run", "--session", "0.001s")
-    assert begun.exit_code == 0 and begun.output == "data/run: step 1 of 3; the same command with --resume goes on\n"
+    assert begun.exit_code == 0 and "data/run: step 1 of 3; the same command with --resume" in begun.output
     again = run("-o", "data/run", "--resume", "--workers", "0", "--cpu")
     assert again.exit_code == 0 and "data/run: step 3 of 3\n" in again.output
