@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -140,12 +141,20 @@ def _run(
     starts: Mapping[str, Path],
     device: Device,
 ) -> Outcome:
-    """A session; the first Ctrl-C ends it after the step, with a checkpoint."""
+    """A session; the first Ctrl-C ends it after the step, with a checkpoint, or before the first one at once."""
     from interp.train.runs import run
+    from vid2ev.commands import INTERRUPTED
     from vid2ev.commands.progress import heard
 
-    with heard(gently=True) as check:
-        return run(job, path, resume, machines, session_s, workers, quiet, check, starts, device)
+    try:
+        with heard(gently=True) as check:
+            return run(job, path, resume, machines, session_s, workers, quiet, check, starts, device, check)
+    except KeyboardInterrupt:
+        if machines.first:
+            begun = (path / "run.json").exists()
+            remedy = f"; what is done is kept in {path}, the same command with --resume goes on" * begun
+            click.echo(f"interrupted{remedy}", err=True)
+        sys.exit(INTERRUPTED)
 
 
 def _device(asked: str, machines: Machines) -> Device:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from interp.data.pool import Report
 from interp.train import told
 from interp.train.checkpoints import read_checkpoint
 from interp.train.curves import check_curves
@@ -17,7 +18,7 @@ from interp.train.made_of import feed_of, learner_of
 from interp.train.run_folder import FINISHED, RunFolder
 from interp.train.starts import begin
 from vid2ev.cores import usable_cores
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import as_stated
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.terminal import counting
@@ -36,6 +37,7 @@ def run(
     stop: Stop = lambda: False,
     starts: Mapping[str, Path] = NOTHING,
     clips_on: Device = CPU,
+    interrupted: Stop = lambda: False,
 ) -> Outcome:
     """Train in the folder `path`, or go on there; what is done is left as it is.
 
@@ -45,7 +47,9 @@ def run(
     stop        asked after each step
     starts      files of weights to begin with, by part, as the job says; to go on the run has its own
     clips_on    the device that clips to train with are made on
-    Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on.
+    interrupted asked while the first of them are made: whether somebody has asked to end
+    Raises UsageError where the folder is taken or was begun otherwise, DataError where training does not get on, and
+    KeyboardInterrupt if it is interrupted.
     """
     begun_s = time.monotonic()
     machines = machines or Machines.of("auto", 1, False, job.recipe.processes)
@@ -66,9 +70,9 @@ def run(
         spare = machines.spare(job.recipe.threads) if workers is None else workers
         with ExitStack() as fed:
             try:
-                with counting(quiet, CLIPS) as report:
+                with counting(quiet, CLIPS) as report, _until(interrupted, report) as made:
                     leads, jobs = machines.first, usable_cores()
-                    feed = feed_of(job, folder.clips, step, spare, jobs, report, clips_on, leads, [path])
+                    feed = feed_of(job, folder.clips, step, spare, jobs, made, clips_on, leads, [path])
                 fed.callback(feed.close)
                 machines.check_clips(len(feed.validation))
             except UsageError:
@@ -83,3 +87,21 @@ def run(
         return outcome
     finally:
         folder.close()
+
+
+@contextmanager
+def _until(interrupted: Stop, report: Report) -> Iterator[Report]:
+    """What is told of each clip and ends where somebody has asked to; so does what goes wrong then: the processes that
+    make clips may have been asked, too."""
+
+    def told_of(*counts: int) -> None:
+        report(*counts)
+        if interrupted():
+            raise KeyboardInterrupt
+
+    try:
+        yield told_of
+    except DataError as error:
+        if interrupted():
+            raise KeyboardInterrupt from error
+        raise

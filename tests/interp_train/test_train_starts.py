@@ -172,3 +172,24 @@ def test_weights_that_do_not_fit_are_refused_before_anything_is_there(tmp_path: 
     with pytest.raises(UsageError, match="holds the weights of another network, rrin_events_guided"):
         trained(tmp_path / "run", ["network.bins=3", *FEW], {WHOLE: shipped})
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("asked_at", [1, 2, 3, None])
+def test_who_is_asked_to_end_while_the_first_clips_are_made_does_so(
+    asked_at: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the next clip, or where processes that make clips ended, as they were asked, too; it goes on there."""
+    made, job = 0, Job.of(settings=FEW)
+
+    def broken(job: Job, cache: Path, step: int, workers: int, jobs: int, report: Any, *_: Any) -> Any:
+        nonlocal made
+        for made in (1, 2):
+            report(made, 3)
+        made = 3
+        raise DataError("a process that did part of the work was ended")
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt if asked_at else DataError):
+        patch.setattr(runs, "feed_of", broken)
+        run(job, tmp_path, machines=ALONE, quiet=True, interrupted=lambda: made == asked_at)
+    assert made == (asked_at or 3)
+    assert run(job, tmp_path, resume=True, machines=ALONE, quiet=True).finished
