@@ -10,6 +10,7 @@ import cv2
 import pytest
 import torch
 from small_run import NETWORK, STEPS_OF_RUN, clips, kept, session
+from tqdm import tqdm
 
 from interp import weights
 from interp.methods import METHODS
@@ -42,11 +43,11 @@ def test_the_loss_that_is_shown_is_of_steps_that_count(
 ) -> None:
     said = list[str]()
 
-    class Shown(progress.tqdm):  # type: ignore[type-arg]
+    class Shown(tqdm):  # type: ignore[type-arg]
         def set_postfix_str(self, s: str = "", refresh: bool = True) -> None:
             said.append(s)
 
-    monkeypatch.setattr(progress, "tqdm", Shown)
+    monkeypatch.setattr(progress, "bar_of", lambda _, bar_format, **look: Shown(disable=True, **look))
     done = session(tmp_path / "run", spoilt=spoilt)
     assert done.skipped == 1 and len(said) == STEPS_OF_RUN
     unknown = [k for k, text in enumerate(said) if text.startswith("loss nan")]

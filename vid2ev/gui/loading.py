@@ -35,8 +35,8 @@ def loaded(setup: Setup, text: str, name: str) -> Setup:
         except Vid2evError as error:  # (where it is kept is nobody's concern)
             why = str(error).replace(str(path), name)
             if folder in why or "no such file" in why:
-                why = f"{why.replace(f'{folder}{os.sep}', '').rstrip('.')}; a browser sends no other files along: give"
-                why = f"{why} the path of {name} instead"
+                why = why.replace(f"{folder}{os.sep}", "").replace(f" in {folder}", "").rstrip(".")
+                why = f"{why}; a browser sends no other files along: give the path of {name} instead"
             raise type(error)(why) from error
 
 
