@@ -19,6 +19,15 @@ ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if h
 RETURNING = "_numba_unpickle"
 
 
+def deaf_once(_: object = None) -> None:
+    """Let SIGTERM end this process the second time only: then it is from who began it, and not for all of a group."""
+
+    def end_next_time(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    signal.signal(signal.SIGTERM, end_next_time)
+
+
 def is_lost(at: FrameType | None) -> bool:
     """Whether an exception that a signal raises there is lost."""
     return at is not None and at.f_code.co_name == RETURNING

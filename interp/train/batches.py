@@ -15,8 +15,8 @@ from lightning.pytorch import LightningDataModule
 from torch.utils.data import DataLoader, Dataset, Sampler
 
 from interp.data.ahead import Ahead
-from interp.train.heard import deaf_once
 from interp.train.machines import check_shares
+from vid2ev.interrupts import deaf_once
 
 Batch = dict[str, torch.Tensor]  # as of `interp.data`, with a dimension more in front
 
@@ -77,7 +77,7 @@ class Feed(LightningDataModule):
             batch_sampler=steps,
             num_workers=self.workers,
             persistent_workers=self.workers > 0,
-            worker_init_fn=deaf_once,
+            worker_init_fn=deaf_once,  # (where all processes are asked to end, a step is still to be made)
             pin_memory=trainer.strategy.root_device.type == "cuda",
         )
 

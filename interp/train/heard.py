@@ -1,8 +1,7 @@
 """Who hears SIGTERM while a network is trained.
 
 Lightning takes it, and has its processes wait for each other at once, in the midst of whatever they do.  Where all of
-them get it, as from a cluster or a service that ends, they wait for ever.  The processes that make samples get it then,
-too, and would end before the step that needs them.
+them get it, as from a cluster or a service that ends, they wait for ever.
 """
 
 from __future__ import annotations
@@ -12,15 +11,6 @@ import threading
 from typing import Any
 
 from lightning.pytorch import Callback
-
-
-def deaf_once(_: object = None) -> None:
-    """Let SIGTERM end this process the second time only: then it is from who began it."""
-
-    def end_next_time(*_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-    signal.signal(signal.SIGTERM, end_next_time)
 
 
 class HeardAsBefore(Callback):

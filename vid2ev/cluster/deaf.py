@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
-from vid2ev.interrupts import ENDING
+from vid2ev.interrupts import ENDING, deaf_once
 
 
 def dask_setup(_: object) -> None:
-    """Called by Dask when the process begins.  SIGTERM ends it the second time: then it is from who began it."""
+    """Called by Dask when the process begins."""
     for each in ENDING:
         signal.signal(each, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _end_next_time)
+    deaf_once()
     hearing()
 
 
@@ -23,10 +23,6 @@ def hearing() -> None:
     """Said by a process that was born deaf, when it has said what it does of what it hears."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-
-
-def _end_next_time(*_: object) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager
