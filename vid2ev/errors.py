@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 class Vid2evError(Exception):
@@ -77,6 +78,11 @@ def check_names(names: Iterable[str], known: Sequence[str]) -> None:
     for name in names:
         if name not in known:
             raise UsageError(f"option '{name}'{nearest(name, known)}: expected one of {', '.join(sorted({*known}))}")
+
+
+def reason_of(complaint: Mapping[str, Any]) -> str:
+    """What pydantic complains of in a value that somebody gave, as a clause; what lists lack is no field to them."""
+    return "it has too few values" if complaint["type"] == "missing" else clause(complaint["msg"])
 
 
 def clause(message: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from vid2ev.errors import UsageError, clause, nearest
+from vid2ev.errors import UsageError, nearest, reason_of
 
 if TYPE_CHECKING:
     from torch import nn
@@ -85,8 +85,7 @@ def spec_of(name: str, /, size: str = "tiny", **options: Any) -> NetworkSpec:
             hint = nearest(key, model.model_fields)
             raise UsageError(f"{name} has no option '{key}'{hint}; it has {', '.join(model.model_fields)}") from error
         what = f"{key} = {complaint['input']!r}"
-        why = "it has too few values" if complaint["type"] == "missing" else clause(complaint["msg"])
-        raise UsageError(f"{name}: {what} is impossible: {why}") from error
+        raise UsageError(f"{name}: {what} is impossible: {reason_of(complaint)}") from error
 
 
 def _entry(name: str) -> Entry:

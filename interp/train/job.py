@@ -18,7 +18,7 @@ from interp.data.settings import PRESETS, ClipSettings
 from interp.networks import spec_of
 from interp.train.recipe import RECURRENT, Recipe
 from interp.train.starts import WHOLE, check_frozen, digests, network_of
-from vid2ev.errors import UsageError, clause, nearest
+from vid2ev.errors import UsageError, clause, nearest, reason_of
 from vid2ev.requests import setting
 
 EVENT_FED = ("e2vid", "firenet")
@@ -200,5 +200,6 @@ def _valid(model: type[Any], values: dict[str, Any], prefix: str) -> Any:
             raise UsageError(
                 f"setting '{prefix}{key}' is unknown{hint}; expected one of {', '.join(model.model_fields)}"
             ) from error
-        why = "it has too few values" if complaint["type"] == "missing" else clause(complaint["msg"])
-        raise UsageError(f"setting {prefix}{key} = {complaint['input']!r} is impossible: {why}") from error
+        raise UsageError(
+            f"setting {prefix}{key} = {complaint['input']!r} is impossible: {reason_of(complaint)}"
+        ) from error
