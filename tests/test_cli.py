@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import os
@@ -12,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +26,9 @@ from click.testing import CliRunner, Result
 from numba import njit
 
 from vid2ev import UsageError
-from vid2ev.commands import main, progress, tidy
+from vid2ev.commands import main
 from vid2ev.commands.summary import file_facts, of_the_clip, result_facts
+from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
 from vid2ev.recording.manifest import difference
 from vid2ev.seen import instants
@@ -544,8 +547,6 @@ def test_who_asks_it_to_end_finds_nothing_half_made(arguments: list[str], asks: 
 
 @posix
 def test_control_c_counts_even_where_python_loses_the_exception() -> None:
-    from vid2ev.commands.progress import heard
-
     class Callback:
         def __del__(self) -> None:
             os.kill(os.getpid(), signal.SIGINT)
@@ -560,7 +561,7 @@ def test_control_c_counts_even_where_python_loses_the_exception() -> None:
 
 
 @posix
-@pytest.mark.parametrize("within", ["heard", "tidy", "sensor"])
+@pytest.mark.parametrize("within", ["checked", "heard", "sensor"])
 def test_control_c_counts_during_compiled_code(within: str) -> None:
     """That returns an array: Numba makes it by a function of Python's, and does not look whether that raised."""
     place = np.zeros(8)
@@ -572,18 +573,19 @@ def test_control_c_counts_during_compiled_code(within: str) -> None:
             for _ in range(10_000):
                 Tiles(1, 1).each(lambda _: busy(place, 5_000_000))
         else:
-            with progress.heard() if within == "heard" else tidy() as check:
+            with heard() as check:
                 for _ in range(10_000):
                     busy(place, 5_000_000)
-                    if check:
+                    if within == "checked":
                         check()
     asked.join()
 
 
 @posix
-@pytest.mark.parametrize("within", ["heard", "tidy"])
-def test_what_goes_wrong_after_a_control_c_that_is_lost_is_one(within: str) -> None:
-    """As in a callback of who compiles, which then complains that it was not served."""
+@pytest.mark.parametrize("within", [heard, never_lost])
+@pytest.mark.parametrize("then", ["complains", "goes on"])
+def test_a_control_c_that_is_lost_counts(within: Callable[[], AbstractContextManager[object]], then: str) -> None:
+    """As in a callback of who compiles, which then may complain that it was not served."""
 
     @ctypes.CFUNCTYPE(None)
     def serve() -> None:
@@ -592,13 +594,30 @@ def test_what_goes_wrong_after_a_control_c_that_is_lost_is_one(within: str) -> N
         served.append(True)
 
     served: list[bool] = []
-    with pytest.raises(KeyboardInterrupt), progress.heard() if within == "heard" else tidy():
+    with pytest.raises(KeyboardInterrupt), within():
         serve()
-        if not served:
+        if then == "complains":
             raise RuntimeError("no compiled object yet")
+        while True:
+            time.sleep(0.01)
     assert not served
-    with pytest.raises(RuntimeError), progress.heard() if within == "heard" else tidy():
+    with pytest.raises(RuntimeError), within():
         raise RuntimeError("of something else")
+
+
+def test_what_is_left_in_its_midst_may_complain_to_nobody(capfd: pytest.CaptureFixture[str]) -> None:
+    class Half:
+        def __init__(self) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+            self.whole = True
+
+        def __del__(self) -> None:
+            assert self.whole
+
+    with contextlib.suppress(KeyboardInterrupt), heard():
+        Half()
+    assert capfd.readouterr().err == ""
 
 
 @njit(nogil=True)

@@ -420,6 +420,28 @@ def test_a_split_that_cannot_be_is_refused(options: list[str], sentence: str) ->
     assert result.exit_code == 2 and sentence in result.stderr
 
 
+@pytest.mark.parametrize(("where", "kept"), [("_parts", False), ("convert", True)])
+def test_who_interrupts_the_command_is_told_what_is_kept(
+    clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, kept: bool
+) -> None:
+    """While it looks for cuts, and while the parts are put together."""
+
+    def asked(*_: Any, **__: Any) -> Any:
+        raise KeyboardInterrupt
+
+    def alone(tasks: Sequence[Task], *_: Any) -> list[SimpleNamespace]:
+        for folder in (Path("made.parts") / f"{number}-of-{len(tasks)}" for number in range(len(tasks))):
+            folder.mkdir()
+        return []
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(f"vid2ev.making.split.{where}", asked)
+    monkeypatch.setattr("vid2ev.commands.live.shared_out", alone)
+    result = CliRunner().invoke(main, ["convert", clip, "--fps", "50", "-o", "made", "--jobs", "2", "--split", "tiles"])
+    assert (result.exit_code, "--resume" in result.stderr, "nothing is left" in result.stderr) == (130, kept, not kept)
+    assert Path("made.parts").exists() == kept
+
+
 @pytest.mark.slow
 def test_the_command_splits_among_its_workers(clip: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

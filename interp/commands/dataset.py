@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -105,16 +104,15 @@ def dataset(
 @contextmanager
 def _kept(directory: Path) -> Iterator[None]:
     """What asks it to end within says so if it can be resumed."""
-    from vid2ev.commands import INTERRUPTED, tidy
+    from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
+    from vid2ev.interrupts import heard
 
     try:
-        with tidy():
+        with heard():
             yield
     except KeyboardInterrupt:
         begun = (directory.with_name(f"{directory.name}.partial") / "job.json").exists()
-        remedy = "what is done is kept, the same command with --resume goes on" if begun else "nothing is left behind"
-        click.echo(f"interrupted; {remedy}", err=True)
-        sys.exit(INTERRUPTED)
+        say_interrupted(KEPT if begun else NOT_KEPT)
 
 
 def _said(outcome: Outcome) -> Said:

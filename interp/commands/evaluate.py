@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -102,8 +101,9 @@ def evaluate(
     from interp.evaluate.simulated import Simulated
     from interp.methods import METHODS
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import given, heard
+    from vid2ev.commands.progress import given
     from vid2ev.commands.worker_options import workers_of
+    from vid2ev.interrupts import heard
     from vid2ev.sources import OPTIONS
     from vid2ev.terminal import counted, counting
 
@@ -143,13 +143,12 @@ def evaluate(
 @contextmanager
 def kept(folder: Path) -> Iterator[None]:
     """Ctrl-C within says that the evaluation can be resumed."""
-    from vid2ev.commands import INTERRUPTED
+    from vid2ev.commands import KEPT, say_interrupted
 
     try:
         yield
     except KeyboardInterrupt:
-        click.echo(f"interrupted; what is done is kept in {folder}, the same command with --resume goes on", err=True)
-        sys.exit(INTERRUPTED)
+        say_interrupted(f"{folder}: {KEPT}")
 
 
 def _name(dataset: str) -> str:

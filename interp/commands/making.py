@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
@@ -11,9 +10,10 @@ from typing import Any
 
 import click
 
-from vid2ev.commands import INTERRUPTED, tidy
+from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
 from vid2ev.commands.options import Finite, adding
 from vid2ev.errors import DataError, UsageError
+from vid2ev.interrupts import heard
 from vid2ev.requests import number_of
 from vid2ev.terminal import bar_of
 
@@ -84,19 +84,14 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
 @contextmanager
 def kept(path: Path) -> Iterator[None]:
     """What goes wrong within, or asks to end, says so if it can be resumed."""
-
-    def remedy() -> str:
-        done = path.with_name(f"{path.name}.partial") / "done.jsonl"
-        return "; what is done is kept, the same command with --resume goes on" if done.exists() else ""
-
+    done = path.with_name(f"{path.name}.partial") / "done.jsonl"
     try:
-        with tidy():
+        with heard():
             yield
     except DataError as error:
-        raise DataError(f"{error}{remedy()}") from error
+        raise DataError(f"{error}{f'; {KEPT}' * done.exists()}") from error
     except KeyboardInterrupt:
-        click.echo(f"interrupted{remedy() or '; nothing is left behind'}", err=True)
-        sys.exit(INTERRUPTED)
+        say_interrupted(KEPT if done.exists() else NOT_KEPT)
 
 
 @contextmanager

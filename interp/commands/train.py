@@ -143,8 +143,8 @@ def _run(
 ) -> Outcome:
     """A session; the first Ctrl-C ends it after the step, with a checkpoint, or before the first one at once."""
     from interp.train.runs import run
-    from vid2ev.commands import INTERRUPTED
-    from vid2ev.commands.progress import heard
+    from vid2ev.commands import INTERRUPTED, KEPT, say_interrupted
+    from vid2ev.interrupts import heard
 
     try:
         with heard(gently=True) as check:
@@ -152,8 +152,7 @@ def _run(
     except KeyboardInterrupt:
         if machines.first:
             begun = (path / "run.json").exists()
-            remedy = f"; what is done is kept in {path}, the same command with --resume goes on" * begun
-            click.echo(f"interrupted{remedy}", err=True)
+            say_interrupted(f"{path}: {KEPT}" if begun else "")
         sys.exit(INTERRUPTED)
 
 

@@ -112,7 +112,7 @@ def _die() -> None:
 
 def _program() -> None:
     from interp.train.learner import Learner
-    from vid2ev.commands.progress import heard
+    from vid2ev.interrupts import heard
 
     options = {name: json.loads(value) for name, value in (text.split("=") for text in sys.argv[2:])}
     last_step, last_write, last_validation = (

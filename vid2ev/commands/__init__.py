@@ -9,46 +9,28 @@ from __future__ import annotations
 import difflib
 import errno
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.metadata import entry_points
 from itertools import pairwise
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.interrupts import ENDING, never_lost
+from vid2ev.interrupts import never_lost
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 INTERRUPTED = 130  # the exit code of a program ended by Ctrl-C
+KEPT = "what is done is kept, the same command with --resume goes on"
+NOT_KEPT = "nothing is left behind"
 GPU_FULL = "the GPU's memory is full; take smaller frames, tiles or batches, or the CPU"
 MEMORY_FULL = "the memory is full; take smaller frames, tiles or batches, or fewer workers"
 
 
-def asks_to_end() -> list[signal.Signals]:
-    """The signals, beside Ctrl-C's, that ask this program to end and that nobody else has taken: SIGTERM, SIGHUP."""
-    if threading.current_thread() is not threading.main_thread():
-        return []
-    return [each for each in ENDING if each != signal.SIGINT and signal.getsignal(each) is signal.SIG_DFL]
-
-
-@contextmanager
-def tidy() -> Iterator[None]:
-    """Within it, what asks a program to end does so as Ctrl-C does: what is half made is removed, or said to be
-    kept."""
-    heard = asks_to_end()
-    for each in heard:
-        signal.signal(each, signal.default_int_handler)
-    try:
-        with never_lost():
-            yield
-    finally:
-        for each in heard:
-            signal.signal(each, signal.SIG_DFL)
+def say_interrupted(remedy: str = "") -> NoReturn:
+    """The end of a command that was asked to, and what there is to do then."""
+    click.echo("; ".join(filter(None, ("interrupted", remedy))), err=True)
+    sys.exit(INTERRUPTED)
 
 
 class Commands(click.Group):
@@ -97,8 +79,7 @@ class Commands(click.Group):
             click.echo(f"error: {full}", err=True)
             sys.exit(DataError.exit_code)
         except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
-            sys.exit(INTERRUPTED)
+            say_interrupted()
 
 
 def _printing_fails() -> bool:

@@ -21,7 +21,8 @@ def convert_one(
     """Convert a video; returns the manifest, of a dry run what it would begin with."""
     from vid2ev.commands import summary
     from vid2ev.commands.dry_run import planned
-    from vid2ev.commands.progress import bar, given, heard, kept
+    from vid2ev.commands.progress import bar, given, kept
+    from vid2ev.interrupts import heard
     from vid2ev.making import conversion
     from vid2ev.terminal import lines
 

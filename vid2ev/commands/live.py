@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from vid2ev.commands import INTERRUPTED, tidy
+from vid2ev.commands import KEPT, say_interrupted
+from vid2ev.interrupts import heard
 from vid2ev.terminal import COMPILING, bar_of
 
 if TYPE_CHECKING:
@@ -127,15 +127,14 @@ def shared_out(
 
     live = None if quiet else Live(len(tasks), noun, quiet)
     try:
-        with tidy():
+        with heard():
             for outcome in outcomes(tasks, workers, live.watch if live else None):
                 if live:
                     text, events, failed = said(outcome)
                     live.end(outcome.name, failed, events, text)
                 yield outcome
     except KeyboardInterrupt:
-        click.echo("interrupted; what is done is kept, the same command with --resume goes on", err=True)
-        sys.exit(INTERRUPTED)
+        say_interrupted(KEPT)
     finally:
         if live:
             live.close()

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import signal
-import sys
-import threading
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
-from vid2ev.commands import INTERRUPTED, asks_to_end
+from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
 from vid2ev.commands.summary import of_the_clip
 from vid2ev.errors import DataError, SavedError
-from vid2ev.interrupts import is_lost
 from vid2ev.terminal import COMPILING, bar_of, counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
-    from types import FrameType
 
     from tqdm import tqdm
 
@@ -46,54 +41,9 @@ def kept(directory: Path, again: bool = True) -> Iterator[None]:
     except (DataError, KeyboardInterrupt) as error:
         resumable = again and not isinstance(error, SavedError)
         kept = resumable and (partial_of(directory) / "checkpoint.npz").exists()
-        remedy = (
-            "; what is done is kept, the same command with --resume goes on" if kept else "; nothing is left behind"
-        )
         if isinstance(error, DataError):
-            raise DataError(f"{error}{remedy * kept}") from error
-        click.echo(f"interrupted{remedy}", err=True)
-        sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def heard(gently: bool = False) -> Iterator[Callable[[], bool]]:
-    """Ctrl-C, and all else that asks to end, counts even where Python loses it, as in a callback of compiled code: what
-    this yields raises it anew.
-
-    `gently` lets it return True the first time instead: a camera has no other end.
-    """
-    asked = 0
-
-    def note(_number: int, at: FrameType | None) -> None:
-        nonlocal asked
-        asked += 1
-        if asked > gently and not is_lost(at):
-            raise KeyboardInterrupt
-
-    def check() -> bool:
-        if asked > gently:
-            raise KeyboardInterrupt
-        return asked > 0
-
-    def tell(lost: Any) -> None:
-        if lost.exc_type is not KeyboardInterrupt:  # that one is not lost
-            tell_before(lost)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield check
-        return
-    before = {each: signal.signal(each, note) for each in (signal.SIGINT, *asks_to_end())}
-    sys.unraisablehook, tell_before = tell, sys.unraisablehook
-    try:
-        yield check
-    except Exception as error:
-        if asked > gently:  # (what was interrupted in its midst may complain of anything)
-            raise KeyboardInterrupt from error
-        raise
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
-        sys.unraisablehook = tell_before
+            raise DataError(f"{error}{f'; {KEPT}' * kept}") from error
+        say_interrupted(KEPT if kept else NOT_KEPT)
 
 
 @contextmanager

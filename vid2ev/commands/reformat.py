@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from vid2ev.commands import tidy
 from vid2ev.commands.options import SECONDS
+from vid2ev.interrupts import heard
 
 
 @click.command(short_help="Turn an event file into one of another format.")
@@ -21,7 +21,7 @@ from vid2ev.commands.options import SECONDS
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-@tidy()
+@heard()
 def reformat(source: str, target: Path, as_json: bool, quiet: bool, **options: Any) -> None:
     """Turn the event file IN, of any format, into OUT: every event at its own microsecond.
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from vid2ev.commands import tidy
 from vid2ev.commands.options import SECONDS, FiniteRange
+from vid2ev.interrupts import heard
 
 
 @click.command(short_help="Make a film or a picture of any event file.")
@@ -66,7 +66,7 @@ from vid2ev.commands.options import SECONDS, FiniteRange
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-@tidy()
+@heard()
 def render(events: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
     """Make a film (.mp4), a picture (.png) or a folder of pictures of EVENTS: an event file, or a recording's folder.
 

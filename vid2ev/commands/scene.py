@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vid2ev.commands import tidy
 from vid2ev.commands.options import FiniteRange, Rate
+from vid2ev.interrupts import heard
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,7 +67,7 @@ FRAMES = "{desc}: {percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt
 @click.option("--dry-run", is_flag=True, help="Print the scene with every number settled, and do nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-@tidy()
+@heard()
 def scene(name: str, dry_run: bool, as_json: bool, quiet: bool, **options: Any) -> None:
     """`vid2ev scene list` says which scenes there are; `vid2ev scene NAME` renders one of them, or a scene file.
 

@@ -49,9 +49,11 @@ def split_among(
     workers: Workers, video: str, directory: Path, split: Split, quiet: bool, options: dict[str, Any]
 ) -> dict[str, Any]:
     """Convert a video in parts; returns the manifest."""
+    from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
     from vid2ev.commands.live import shared_out
-    from vid2ev.commands.progress import bar, heard
-    from vid2ev.making.split import convert_split
+    from vid2ev.commands.progress import bar
+    from vid2ev.interrupts import heard
+    from vid2ev.making.split import begun_parts, convert_split, parts_of
     from vid2ev.terminal import counting
 
     def share_out(tasks: Sequence[Task]) -> None:
@@ -60,11 +62,14 @@ def split_among(
         if errors:
             raise errors[0]
 
-    with heard() as check, ExitStack() as looking, bar(quiet, check) as report:
-        look = looking.enter_context(counting(quiet, LOOKS))
-        return convert_split(
-            video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
-        )
+    try:
+        with heard() as check, ExitStack() as looking, bar(quiet, check) as report:
+            look = looking.enter_context(counting(quiet, LOOKS))
+            return convert_split(
+                video, directory, split.kind, int(split.number), share_out, look=look, report=report, **options
+            )
+    except KeyboardInterrupt:
+        say_interrupted(KEPT if begun_parts(parts_of(directory)) else NOT_KEPT)
 
 
 def checked_for(workers: Workers, video: str, directory: Path, split: Split | None, options: dict[str, Any]) -> None:

@@ -64,7 +64,7 @@ def convert_split(
     Raises UsageError for what cannot be split, and as `convert` does.
     """
     check_parts_free(directory, overwrite, resume)
-    if resume and directory.exists() and not _begun(parts_of(directory)):
+    if resume and directory.exists() and not begun_parts(parts_of(directory)):
         return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
     parts, notes = _parts(video, kind, count, options | {"seed": options.get("seed") or 0}, look)
     with _held(directory) as beside:
@@ -99,7 +99,7 @@ def check_parts_free(directory: Path, overwrite: bool = False, resume: bool = Fa
             raise UsageError(
                 f"{beside} is needed to work in, and holds {path.name}, which is no part; choose another folder with -o"
             )
-    if _begun(beside) and not (overwrite or resume):
+    if begun_parts(beside) and not (overwrite or resume):
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, --overwrite starts again")
 
 
@@ -119,14 +119,14 @@ def _held(directory: Path) -> Iterator[Path]:
             beside.rmdir()
 
 
-def _begun(beside: Path) -> list[Path]:
+def begun_parts(beside: Path) -> list[Path]:
     """The parts that are there, in whole or in part."""
     return sorted(path for path in beside.iterdir() if PART.fullmatch(path.name)) if beside.is_dir() else []
 
 
 def _remove_parts(beside: Path) -> None:
     """Remove parts, and nothing else.  Raises UsageError for one that a worker left over is still making."""
-    for part in _begun(beside):
+    for part in begun_parts(beside):
         with writing(part), Held(part) if part.suffix == ".partial" else nullcontext():
             shutil.rmtree(part, ignore_errors=True)
 
