@@ -205,11 +205,17 @@ def test_8k_frame():
     assert report["bytes_per_pixel"] < 64
 
 
-@pytest.mark.parametrize("hardly", [{"leak_rate_hz": 1e-9}, {"refractory_us": 1e-3, "refractory": "track"}])
+@pytest.mark.parametrize(
+    "hardly",
+    [{"leak_rate_hz": 1e-9}, {"refractory_us": 1e-3, "refractory": "track"}, {"crossing_noise": 1e-9}],
+)
 def test_each_stretch_of_an_interval_has_its_own_most_crossings(hardly):
-    """A signal that goes on rising after its light is gone, and then falls: as many as it may, both ways."""
+    """A signal that goes on rising after its light is gone, and then falls: as many as it may, both ways, whatever
+    goes on in the pixel beside it."""
     few = {"threshold_on": 0.05, "threshold_off": 0.05, "max_crossings": 3}
     t_ns = [0, 300_000, 300_001, 3_000_000]
-    light = np.array([0.1, 2, 0.1, 0.1], np.float32).reshape(4, 1, 1)
+    light = np.array([[0.1, 2, 0.1, 0.1], [0.1, 0.1, 0.1, 1e4]], np.float32).T.reshape(4, 1, 2)
     sent = play(clean(photoreceptor_tau_us=300, follower_tau_us=100, **few, **hardly), t_ns, light)
+    assert np.count_nonzero(sent.x == 1) == 4
+    sent = sent.select(sent.x == 0)
     assert (np.count_nonzero(sent.p == 1), np.count_nonzero(sent.p == 0)) == (8, 4)

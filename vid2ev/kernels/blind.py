@@ -137,6 +137,5 @@ def with_more(work, left, b, flags, num):
             kept += np.int64(lanes[BLIND + j] <= 1.0)
         elif lanes[S1 + j] < 1.0:
             next_piece(lanes, j, work.knots, b, flags, num)
-            lanes[RUNGS + j] = 0.0
             kept += 1
     return kept

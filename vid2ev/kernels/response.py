@@ -182,9 +182,9 @@ def next_pieces(work, count, b, flags, num):
 
 @inner
 def move_on(lanes, j, b, flags, num):
-    """Let lane j be on its next piece, as if that were the last."""
+    """Let lane j be on its next piece, as if that were the last and no crossing had been before."""
     enter(lanes, j, lanes[S1 + j], lanes[F1 + j], lanes[NEXT + j], b)
-    lanes[NEXT + j], lanes[END + j] = 1.0, end_in_nats(lanes, j, flags, num)
+    lanes[NEXT + j], lanes[END + j], lanes[RUNGS + j] = 1.0, end_in_nats(lanes, j, flags, num), 0.0
 
 
 @inner
