@@ -50,6 +50,22 @@ def test_ordered_by_time_row_column(groups, last_us, mean, crowded, seed, worth)
         assert np.array_equal(events.label, keys & 3)
 
 
+@pytest.mark.timeout(100)
+@pytest.mark.parametrize("last_us", [1, 70_000])
+def test_however_far_out_of_order_pixels_are_it_does_not_take_long(last_us):
+    """Crossings of many pixels, round after round, all in the last microsecond or two; in a square of their number this
+    would take minutes."""
+    pixels, rounds = 1000, 2000
+    time = last_us - np.repeat([1, 0], pixels * rounds // 2)
+    pixel, p = np.tile(np.arange(pixels)[::-1], rounds), np.repeat(np.arange(rounds) % 2, pixels)
+    keys = (time << 28 | pixel << 3 | p << 2).astype(np.uint64)
+    sent = Sent([Keys(keys, np.array([[len(keys)]]))], np.zeros(1, np.int64), np.array([last_us]), WIDTH, labels=False)
+    (events,) = sent.ordered(in_turn(1))
+    want = np.lexsort((pixel, time))  # (stable: of a pixel the rounds stay in order)
+    assert np.array_equal(events.t, time[want]) and np.array_equal(events.p, p[want])
+    assert np.array_equal(events.y * np.int64(WIDTH) + events.x, pixel[want])
+
+
 def keys_of(group, last_us, mean, crowded, rng):
     """Keys of one frame of a group: ascending pixels, each with its events in order of time."""
     size = rng.poisson(mean)

@@ -2,9 +2,12 @@
 
 A stable counting sort of the keys on their microsecond, in passes of 16 bits (one pass for intervals up to 65 ms), then
 an insertion sort on the pixel within each microsecond: keys come part by part, block by block and each pixel's in order
-of time, so it finds them nearly sorted.  A place is counted for each microsecond and row; parts that are put at the
-same time have a row each, as what is of the first goes before what is of the second, and else one row does for all.
-Keys that are few beside the microseconds are taken as they come, and put in order in passes of 8 bits.
+of time, so it finds them nearly sorted.  Where many are of one microsecond it may not, as crossings that are drawn anew
+come in rounds of many pixels: then pixels are counted, too.
+
+A place is counted for each microsecond and row; parts that are put at the same time have a row each, as what is of the
+first goes before what is of the second, and else one row does for all.  Keys that are few beside the microseconds are
+taken as they come, and put in order in passes of 8 bits.
 """
 
 from __future__ import annotations
@@ -12,10 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import compiled, inner
+from vid2ev.kernels.layout import PIXEL_LIMIT
 
 _TIME, _PIXEL = np.uint64(28), np.uint64(3)
 _PASS, _SHORT_PASS = np.uint64(16), np.uint64(8)
 LAST_OF_PASS = 0xFFFF  # the last microsecond that one pass can tell from all others
+_FAR = 64  # places that keys are moved by on average, with which to count takes less time
 
 
 @compiled
@@ -116,8 +121,9 @@ def order_digits(keys, shift, bits, most):
 
 
 @inner
-def order_pixels(keys):
-    """Insertion sort on the pixel within each microsecond."""
+def order_pixels(keys, last_us):
+    """Keys in order of microseconds, up to last_us, to that of the pixels within each; stable."""
+    left = _FAR * keys.size
     for i in range(1, keys.size):
         key = keys[i]
         rank = key >> _PIXEL
@@ -126,6 +132,10 @@ def order_pixels(keys):
             keys[j] = keys[j - 1]
             j -= 1
         keys[j] = key
+        left -= i - j
+        if left < 0:
+            order_digits(keys, _PIXEL, _PASS, (last_us + 1) * PIXEL_LIMIT - 1)
+            return
 
 
 @compiled
@@ -144,7 +154,7 @@ def unpack(keys, taken, stops, first_us, last_us, share, shares, width, t, x, y,
             order_digits(frame, _TIME + _PASS, _PASS, last_us[k] >> np.int64(_PASS))
         i, j = cut_of(frame, share, shares), cut_of(frame, share + 1, shares)
         mine, first, last = frame[i:j], begin + i, begin + j
-        order_pixels(mine)
+        order_pixels(mine, last_us[k])
         unpack_keys(mine, width, first_us[k], t[first:last], x[first:last], y[first:last], p[first:last])
         for i in range(min(mine.size, label.size)):
             label[first + i] = np.uint8(mine[i] & np.uint64(3))
