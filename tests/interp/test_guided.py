@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from pairs import counts
 from torch.nn import functional as F
 
@@ -21,6 +22,7 @@ from interp.candidates.guided import (
     GAMMA,
     SHARP,
     agreement,
+    averaged,
     carried_off_by,
     flows_to,
     guided,
@@ -159,28 +161,39 @@ def test_light_of_coarse_pixels_is_in_doubt_by_what_it_does_not_show() -> None:
     assert float(even.max()) < 0.1
 
 
-def over_squares(maps: np.ndarray, before: int, after: int, beyond: Any) -> np.ndarray:
-    """Means over the squares from so many pixels before each of a map to so many after it; `beyond` as numpy pads."""
-    padded = np.pad(maps.astype(np.float64), (before, after), **beyond)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (before + after + 1,) * 2)
+def over_squares(maps: np.ndarray, reach: int) -> np.ndarray:
+    """Means over the squares of so many pixels on each side of each of a map; at edges over what there is."""
+    padded = np.pad(maps.astype(np.float64), reach, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
     return np.nanmean(windows, axis=(2, 3))
 
 
-@pytest.mark.parametrize("k", [1, 2, 3])
+@given(k=st.integers(1, 9), side=st.tuples(st.integers(1, 12), st.integers(1, 12)))
+def test_means_of_coarse_pixels_are_around_each_and_lean_to_no_side(k: int, side: tuple[int, int]) -> None:
+    values = torch.rand(2, 1, *side, generator=torch.Generator().manual_seed(k))
+    torch.testing.assert_close(averaged(values.flip(-1, -2), k), averaged(values, k).flip(-1, -2))
+    torch.testing.assert_close(averaged(values.mT, k), averaged(values, k).mT)
+    slope = torch.arange(40.0).expand(1, 3, 40)
+    torch.testing.assert_close(averaged(slope, k)[..., k:-k], slope[..., k:-k])
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
 def test_what_is_off_and_what_is_believed_is_as_the_docstring_has_it(k: int) -> None:
     """Where a pixel of the event camera is k pixels of the frames wide; of grey codes, some of them black."""
     draw = np.random.default_rng(k)
     picture = np.where(draw.random((40, 50)) < 0.2, 0, draw.random((40, 50)))
     carried = picture + draw.normal(0, [[[0.02]], [[0.06]]], (2, 40, 50)).clip(0)
     doubt = draw.normal(0, 0.3, (40, 50))
-    edge, none = {"mode": "edge"}, {"constant_values": np.nan}
 
-    def alike(maps: np.ndarray) -> np.ndarray:
-        return over_squares(maps, (k - 1) // 2, k // 2, edge)
+    def alike(maps: np.ndarray) -> np.ndarray:  # (k pixels from the middle of each on: those at the ends may be halves)
+        share = np.ones(k) if k % 2 else np.r_[0.5, np.ones(k - 1), 0.5]
+        padded = np.pad(maps, len(share) // 2, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, (len(share),) * 2)
+        return (windows * np.outer(share, share)).sum((2, 3)) / k**2
 
     def around(maps: np.ndarray, across_px: int) -> np.ndarray:  # (an odd number of pixels, about k times as many)
         reach = across_px * k // 2
-        return over_squares(maps, reach, reach, none)
+        return over_squares(maps, reach)
 
     logits = [-SHARP / k**0.5 * around(np.abs(alike(each - picture)), AROUND_PX) for each in carried]
     per_nat = (np.maximum(picture, DARKEST) / GAMMA) ** 2  # code ~ light ** (1 / GAMMA), as light is seen

@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from interp.candidates.calibrated import calibrated
 from interp.candidates.registered import registered, unexplained
 from interp.light import luminance, to_light
-from interp.representation.carried import Look, over
+from interp.representation.carried import Look, over, places_over
 from interp.representation.event_counts import EventCounts
 
 SIZE = 96, 128  # height, width
@@ -57,6 +57,20 @@ def test_what_is_beside_comes_to_its_place(shift: tuple[int, int], coarser: int)
     first, last = (each[..., : size[0], : size[1]] for each in (first, last))
     here = over(seen(1, (0, 0), coarser)[2], size)
     assert apart(brought(first, last, beside), here) < 0.35 * apart(over(beside, size), here)
+
+
+@pytest.mark.parametrize("coarser", [1, 2, 3, 4])
+def test_places_are_found_to_a_tenth_of_a_pixel_whatever_the_size_of_those_of_the_sensor(coarser: int) -> None:
+    for seed, shift in enumerate([(7, 0), (-7, 0), (0, 6), (-6, -6)]):
+        first, last, beside = seen(seed, shift, coarser)
+        size = (SIZE[0] // coarser * coarser, SIZE[1] // coarser * coarser)
+        first, last = (each[..., : size[0], : size[1]] for each in (first, last))
+        places = registered(first, last, beside).places
+        assert places is not None
+        found = coarser * (places.where[0] - places_over(beside, size))[20:-20, 20:-20]
+        moved = found[found.abs().amax(-1) > 1]
+        assert len(moved) > found.shape[0] * found.shape[1] / 2
+        np.testing.assert_allclose(moved.median(0).values, shift, atol=0.1)
 
 
 @settings(max_examples=15)

@@ -229,8 +229,11 @@ def test_hdr_in_tiles_is_that_of_the_whole_also_when_it_remembers(tmp_path: Path
         ("rrin_events_light", {"colours": 1}),
     ],
 )
-def test_motion_is_that_of_the_whole(name: str, options: dict[str, Any], event_size: tuple[int, int]) -> None:
+def test_motion_is_that_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch, name: str, options: dict[str, Any], event_size: tuple[int, int]
+) -> None:
     """Fresh networks are closed forms: what is left to differ is motion, colours, and how bright light may be."""
+    monkeypatch.setattr(closed_forms, "ROUNDS", 1)  # (two of coarse events: below)
     network = None if name in METHODS else make(name, **options).eval()
     method = open_method(name) if network is None else OfFrames(name, network, needs_events=name != "rrin_events_light")
     whole = gap(event_size)
@@ -239,11 +242,15 @@ def test_motion_is_that_of_the_whole(name: str, options: dict[str, Any], event_s
     assert len(tiling) > 1
     made, at_once = method.between(whole, TIMES, tiling), method.between(whole, TIMES)
     assert float((at_once - whole.frame_0).abs().mean()) > 0.01
-    off = (made - at_once).abs()
-    if name == "guided" and event_size != SIZE:  # (motion to 8 bits of images that differ by 1e-6 is sought once more)
-        assert float((off > 1 / 255).float().mean()) < 1e-3
-    else:
-        assert float(off.max()) < 2e-4
+    assert float((made - at_once).abs().max()) < 2e-4
+
+
+def test_motion_that_is_sought_twice_is_that_of_the_whole_but_where_nobody_knows_it() -> None:
+    """The second time to 8 bits of images that differ by 1e-6, of which flow that is not sure makes another one."""
+    method, whole = open_method("guided"), gap((136, 104))
+    whole = replace(whole, frame_1=2 * whole.frame_0.roll((2, 5), (1, 2)))
+    off = (method.between(whole, TIMES, parse_tiling("128x128", SIZE, 2)) - method.between(whole, TIMES)).abs()
+    assert float((off > 1 / 255).float().mean()) < 1e-3
 
 
 @pytest.mark.parametrize(
