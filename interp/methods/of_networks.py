@@ -66,7 +66,9 @@ class OfFrames(Together):
             seen = part(gap, tile)
             with self.running.on(gap.frame_0.device):
                 pair = self._prepared(seen, replace(around, corner=(tile.top, tile.left)))
-            made = torch.cat([self._at(pair, group) for group in times.split(_at_once(seen))])
+            # (motion to targets is of all of them; a GPU may have less free memory by now)
+            some = len(times) if self.network.spec.guided else _at_once(seen)
+            made = torch.cat([self._at(pair, group) for group in times.split(some)])
             whole[(..., *tile.within)] += made * tiling.weights(tile).to(made)
         return whole
 

@@ -253,6 +253,18 @@ def test_motion_that_is_sought_twice_is_that_of_the_whole_but_where_nobody_knows
     assert float((off > 1 / 255).float().mean()) < 1e-3
 
 
+@pytest.mark.parametrize("name", ["rrin_events_guided", "rrin_events_light"])
+def test_images_in_tiles_are_the_same_where_a_gpu_has_less_memory_for_each_tile(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    network, whole = make(name).eval(), gap()
+    method, tiling = OfFrames(name, network, needs_events=True), parse_tiling("128x128", SIZE, network.multiple)
+    enough = method.between(whole, TIMES, tiling)
+    fewer = iter(range(3, 0, -1))
+    monkeypatch.setattr(of_networks, "_at_once", lambda _: next(fewer, 1))
+    torch.testing.assert_close(method.between(whole, TIMES, tiling), enough, atol=1e-5, rtol=0)
+
+
 @pytest.mark.parametrize(
     ("name", "options"), [("rrin_light", {"depths": (3, 3, 3, 3)}), ("rrin_slomo_events", {"flow": "dis"})]
 )
