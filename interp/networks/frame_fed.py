@@ -167,7 +167,7 @@ class FrameFed(nn.Module):
         seen, colours = events is not None, self.spec.colours
         if events is None:
             events = EventCounts.none(batch, (height, width)).to(frame_0.device)
-        whole = [F.pad(frame, (0, right, 0, below), mode="replicate") for frame in (frame_0, frame_1)]
+        whole = [F.pad(frame.float(), (0, right, 0, below), mode="replicate") for frame in (frame_0, frame_1)]
         coloured = tuple(whole) if channels > colours else ()
         first, second = (
             grey(frame, self.transfer) if coloured else frame.expand(-1, colours, -1, -1) for frame in whole

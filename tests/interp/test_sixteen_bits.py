@@ -53,6 +53,17 @@ def test_networks_of_frames_have_finite_gradients(name: str, case: str, kind: to
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", FRAME_FED)
+@pytest.mark.parametrize("colours", [1, 3])
+def test_frames_in_16_bits_are_the_same_frames_in_32(name: str, colours: int, kind: torch.dtype) -> None:
+    network, (first, second, events) = make(name, colours=colours), given("one event")
+    first, second = first.to(kind), second.to(kind)
+    with torch.no_grad():
+        made, expected = (network(*pair, [0.5], events) for pair in ((first, second), (first.float(), second.float())))
+    assert made.images.dtype == torch.float32 and torch.equal(made.images, expected.images)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("name", ["e2vid", "firenet"])
 def test_networks_of_events_have_finite_gradients(name: str, number: int, kind: torch.dtype) -> None:
