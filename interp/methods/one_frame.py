@@ -14,13 +14,15 @@ event-based double integral).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 from typing import Literal, Self
 
 import torch
 
-from interp.candidates.bridge import BRIGHTEST, DARK, DARKEST, coloured, ratios_of
+from interp.candidates.bridge import DARK, DARKEST, coloured, highest_of, ratios_of
 from interp.light import luminance, to_codes, to_light
 from interp.methods.gap import Gap, Together
 from interp.methods.tiling import Tiling
@@ -51,7 +53,7 @@ class OneFrame(Together):
         height, width = gap.frame_0.shape[-2:]
         light, events = to_light(gap.frame_0, "srgb"), over(gap.events, (height, width))
         logs = _beginning(light, events, self.name == "deblur")
-        highest = max(BRIGHTEST, float(logs.max()))
+        highest = float(highest_of(gap.frame_0[None], gap.frame_0[None]))
         return (_integrated(light, logs, events, time[None], highest)[None] for time in times)
 
 
@@ -62,8 +64,9 @@ def _beginning(light: torch.Tensor, events: EventCounts, blurred: bool) -> torch
     if not blurred:
         return logs - _risen(events, light.new_full((1,), 0.5))
     middles = (torch.arange(events.steps, device=light.device) + 0.5) / events.steps
-    start = sum(torch.exp(_risen(events, u[None])) for u in middles) / events.steps
-    return logs - torch.log(torch.as_tensor(start))
+    # (a pixel that is stuck rises by more than float32 has powers for)
+    risen = reduce(torch.logaddexp, (_risen(events, u[None]) for u in middles))
+    return logs - risen + math.log(events.steps)
 
 
 @in_full_precision

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from interp.interpolate.event_cursor import EventCursor
 from interp.interpolate.fill import FEWEST, MOST, steps_for
 from interp.interpolate.take import Options, open_take
 from interp.interpolate.whole import frames, interpolate
+from interp.light import luminance, to_codes, to_light
 from interp.methods.gap import Gap
 from interp.methods.of_networks import OfEvents
 from interp.methods.one_frame import OneFrame
@@ -445,7 +446,6 @@ def still_and_events() -> tuple[np.ndarray, Events, np.ndarray]:
 
 def test_a_blurred_frame_and_its_events_give_back_the_light_of_each_instant() -> None:
     light, events, mean = still_and_events()
-    from interp.light import to_codes, to_light
     from interp.representation.event_counts import count_events
 
     frame = to_codes(torch.from_numpy(mean[None].astype(np.float32)), "srgb")
@@ -462,6 +462,32 @@ def test_a_blurred_frame_and_its_events_give_back_the_light_of_each_instant() ->
     for name in ("deblur", "integration"):
         same_frame = OneFrame(name).between(Gap(frame, frame, none, 32_000), times)
         torch.testing.assert_close(same_frame, frame.expand(3, -1, -1, -1), atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("name", ["deblur", "integration"])
+@pytest.mark.parametrize("most", [1, 20])
+def test_a_single_frame_is_the_same_whichever_way_time_goes(name: Literal["deblur", "integration"], most: int) -> None:
+    """Pixels that are stuck are as bright as light may be, or black, and change nothing of the others."""
+    off_on = torch.zeros(1, 2, 32, 8, 8)
+    off_on[..., 1:, 1:] = torch.poisson(torch.full((1, 2, 32, 7, 7), 0.1))
+    stuck = off_on.clone()
+    stuck[:, 1, :, 0, 0] = stuck[:, 0, :, 0, 1] = stuck[:, 1, :16, 0, 2] = stuck[:, 0, 16:, 0, 2] = most
+    frame, contrast = 0.3 + 0.7 * torch.rand(3, 8, 8), torch.tensor([[0.15, 0.3]])
+    times = torch.tensor([0.0, 0.25, 0.5, 1.0])
+    events, with_stuck = EventCounts(off_on, contrast), EventCounts(stuck, contrast)
+    back = EventCounts(stuck.flip(1, 2), contrast.flip(1))
+    gaps = [Gap(frame, frame, each, 32_000) for each in (with_stuck, back, events)]
+    forth, reverse, plain = (
+        OneFrame(name).between(gap, when) for gap, when in zip(gaps, (times, 1 - times, times), strict=True)
+    )
+    torch.testing.assert_close(forth, reverse, atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(forth[..., 1:, 1:], plain[..., 1:, 1:], atol=1e-6, rtol=0)
+    light = luminance(to_light(forth, "srgb"))[:, 0]
+    assert float(light.max()) < 1.2
+    if most == 20:
+        brightest = 1.1 if name == "deblur" else float(luminance(to_light(frame, "srgb"))[0, 0, 2])
+        assert float(light[2, 0, 2]) == pytest.approx(brightest, abs=0.01)
+        assert float(light[3, 0, 0]) == pytest.approx(1.1, abs=0.01) and float(light[0, 0, 0]) < 0.01
 
 
 @pytest.mark.parametrize("kind", ["mat", "mat-beside", "npz"])
