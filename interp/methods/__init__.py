@@ -18,6 +18,7 @@ line in `METHODS`.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -59,7 +60,7 @@ def open_method(name: str, device: torch.device | str = "cpu", running: Running 
         if running != PLAIN:
             raise UsageError(f"method '{name}' is no network: leave out --precision and --compile, which are of these")
         return METHODS[name]()
-    if Path(name).suffix == ".safetensors" or Path(name).exists():
+    if Path(name).suffix == ".safetensors" or os.path.exists(name):  # (Path.exists raises for names that are too long)
         return of_weights(Path(name), device, running=running)
     known = ", ".join(METHODS)
     raise UsageError(f"method '{name}'{near(name, METHODS)}: expected one of {known}, or a file of weights")

@@ -14,6 +14,7 @@ Frames of up to `WHOLE_PX` pixels are not divided unless asked for, larger ones 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -135,12 +136,9 @@ def parse_tiling(text: str, size: tuple[int, int], multiple: int) -> Tiling:
     """
     if text == "none" or (text == "auto" and size[0] * size[1] <= WHOLE_PX):
         return undivided(*size)
-    width, times, height = str(text).partition("x")
-    if text == "auto":
-        sides = SIDE, SIDE
-    elif times and width.isdecimal() and height.isdecimal() and min(int(width), int(height)) >= LEAST:
-        sides = int(width), int(height)
-    else:
+    asked = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(text))
+    sides = (SIDE, SIDE) if text == "auto" else tuple(map(int, asked.groups())) if asked else (0, 0)
+    if min(sides) < LEAST:
         raise UsageError(f"tile '{text}': expected none, auto, or WIDTHxHEIGHT of at least {LEAST}, such as 512x512")
     across, down = (_parts(length, side, multiple) for length, side in zip(size, sides, strict=True))
     return Tiling(across, down)

@@ -6,6 +6,7 @@ What is used where nothing is asked for stands first.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError, nearest
@@ -24,9 +25,9 @@ def path_of(weights: str | Path) -> Path:
     Raises UsageError where there is no such file.
     """
     path = Path(str(weights))
-    if path.is_dir():
+    if os.path.isdir(path):  # (Path.is_dir and Path.exists raise OSError for a name that is too long)
         path = path / OF_RUN
-    if path.exists():
+    if os.path.exists(path):
         return path
     here = {file.stem: file for file in sorted(HERE.glob("*.safetensors"))}
     asked = str(weights).replace("-", "_")

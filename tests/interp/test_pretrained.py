@@ -98,3 +98,5 @@ def test_weights_are_a_file_or_a_run_or_come_by_their_name(tmp_path: Path) -> No
         pretrained.path_of(COME[0].stem[:-1])
     with pytest.raises(UsageError, match="no such file"):
         pretrained.path_of(tmp_path / "other" / pretrained.OF_RUN)
+    with pytest.raises(UsageError, match="no such file"):
+        pretrained.path_of("longer than files can be called " * 999)

@@ -136,6 +136,8 @@ def test_a_network_of_events_remembers_until_it_begins_again(tmp_path: Path) -> 
 def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="did you mean bridge"):
         open_method("brige")
+    with pytest.raises(UsageError, match="expected one of nearest, linear"):
+        open_method("longer than files can be called " * 999)
     path = tmp_path / "hdr.safetensors"
     save(path, "hdr", make("hdr", "tiny"))
     with pytest.raises(UsageError, match="rebuilds no frames"):

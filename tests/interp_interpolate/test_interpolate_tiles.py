@@ -71,8 +71,9 @@ def test_small_frames_are_not_divided_and_large_ones_into_tiles_that_fit() -> No
         tiling = parse_tiling("auto", size, 32)
         assert len(tiling) > 1
         assert max((each.right - each.left) * (each.bottom - each.top) for each in tiling) <= 1024 * 1024
-    with pytest.raises(UsageError, match=f"at least {LEAST}"):
-        parse_tiling("32x32", (100, 100), 2)
+    for tile in ("32x32", "512", "512x", "-512x512", "512x512x512", "512x" + "9" * 5000):
+        with pytest.raises(UsageError, match=f"at least {LEAST}"):
+            parse_tiling(tile, (100, 100), 2)
 
 
 @pytest.mark.parametrize("event_size", [SIZE, (136, 104), (90, 70), (544, 416)])
