@@ -120,10 +120,16 @@ class OfEvents(Together):
 def of_weights(
     path: Path, device: torch.device | str = "cpu", name: str | None = None, running: Running = PLAIN
 ) -> OfFrames | OfEvents:
-    """The network of a file as a method; it is called as `interp.pretrained.name_of` says unless told otherwise."""
+    """The network of a file as a method; it is called as `interp.pretrained.name_of` says unless told otherwise.
+
+    Raises UsageError for a network that rebuilds no frames, or takes no sRGB codes; DataError for a file that holds
+    none.
+    """
     network: Any = running.ready(load(path).to(device))
     name = name or name_of(path)
     if isinstance(network, FrameFed):
+        if network.transfer != "srgb":
+            raise UsageError(f"{path} holds a network for linear light, and frames are sRGB codes; give others")
         return OfFrames(name, network, network.spec.takes_events, running)
     if isinstance(network, EventFed):
         return OfEvents(name, network, running)

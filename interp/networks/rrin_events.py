@@ -96,7 +96,9 @@ class RrinEventsSpec(FrameFedSpec):
         description="no residue where no event is near, of networks that take events; costs one mean of counts",
     )
     transfer: Transfer = Field(
-        default="srgb", description="how the frames are coded: srgb or linear; for the candidate and the flow of DIS"
+        default="srgb",
+        description="how the frames are coded: srgb, as all commands have them, or linear, for Python; for the"
+        " candidate and the flow of DIS",
     )
 
     @property

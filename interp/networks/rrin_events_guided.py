@@ -47,7 +47,10 @@ class RrinEventsGuidedSpec(FrameFedSpec):
         le=64,
         description="of events from the target to each frame: 576 parameters and 0.144 kMAC/px a bin in U2, and in U3",
     )
-    transfer: Transfer = Field(default="srgb", description="how the frames are coded: srgb or linear; free")
+    transfer: Transfer = Field(
+        default="srgb",
+        description="how the frames are coded: srgb, as all commands have them, or linear, for Python; free",
+    )
 
     @property
     def guided(self) -> bool:

@@ -70,7 +70,11 @@ class RrinSlomoEventsSpec(EventInputSpec):
         description="a picture from events alone per bin, first, last and target as input: firenet 38 k parameters and"
         " 38 kMAC/px, e2vid 10.7 M and 454, times the number of bins, once per pair",
     )
-    transfer: Transfer = Field(default="srgb", description="how the frames are coded, for flow dis and guided; free")
+    transfer: Transfer = Field(
+        default="srgb",
+        description="how the frames are coded, for flow dis and guided: srgb, as all commands have them, or linear, for"
+        " Python; free",
+    )
     reconstruct_weights: Weights = Field(default="own", description="pretrained: weights of that network, frozen")
 
     @property

@@ -110,7 +110,9 @@ class Job(BaseModel):
             raise UsageError(f"setting network.size = {said!r}: it is none of a network's settings; give --size")
         network, size = network_and_size(network, size, starts)
         options = (network_of(starts[WHOLE])[2] if WHOLE in starts else {}) | asked["network"]
-        spec_of(network, size, **options)  # (raises for what cannot be)
+        coded = getattr(spec_of(network, size, **options), "transfer", "srgb")  # (raises for what cannot be)
+        if coded != "srgb":
+            raise UsageError(f"network.transfer = '{coded}': frames to learn from are sRGB codes; leave it out")
         check_frozen(network, size, options, starts)
         clips = _clip_defaults(network, videos, recordings) | asked["clips"]
         recipe = (RECURRENT if network in SEQUENTIAL else {}) | asked["recipe"]

@@ -142,6 +142,9 @@ def test_what_is_no_method_is_refused(tmp_path: Path) -> None:
     save(path, "hdr", make("hdr", "tiny"))
     with pytest.raises(UsageError, match="rebuilds no frames"):
         open_method(str(path))
+    save(path, "rrin_events_guided", make("rrin_events_guided", transfer="linear"))
+    with pytest.raises(UsageError, match="holds a network for linear light, and frames are sRGB codes"):
+        open_method(str(path))
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,7 @@ def test_settings_reach_what_they_are_of() -> None:
         ("rrin", ["clips.motion=[[true, 1, 2]]"], r"true and false are no numbers"),
         ("rrin", ["clips.sensors={exposed=true}"], r"true and false are no numbers"),
         ("rrin", ["network.bins=true"], r"bins = True is impossible"),
+        ("rrin_events_guided", ["network.transfer=linear"], r"transfer = 'linear': frames to learn from are sRGB"),
         ("rrin", ["clips.motion=[[nan, 1, 2]]"], r"nan is impossible: it must be a finite number"),
         ("rrin", ["clips.motion=[[2, 1, 2], [-1, 3, 4]]"], r"clips.motion.1.0 = -1 is impossible"),
         ("rrin", ["clips.slowdown=1e-300"], r"clips.slowdown = 1e-300 is impossible: it must be greater than or equal"),
