@@ -25,6 +25,7 @@ from interp.blocks.recurrent import State
 from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_codes, to_light
+from interp.methods.running import finite
 from interp.methods.tiling import Tile, parse_tiling, strips
 from interp.networks.hdr import AROUND, MULTIPLE, Hdr, HdrState
 from interp.pretrained import name_of
@@ -48,13 +49,12 @@ class After:
         network = load(path).to(device)
         if not isinstance(network, Hdr):
             raise UsageError(f"{path} holds another network than hdr; give weights of `vid2ev train --network hdr`")
-        self.network, self.device, self.tile, self.bright = network, device, tile, bright
+        self.name, self.network, self.device, self.tile, self.bright = name_of(path), network, device, tile, bright
         self.about = {"weights": str(path), "sha256": sha256(path)}
         self.needs_events = network.spec.second == "events"
         if self.needs_events and not events:
             raise UsageError(
-                f"HDR by {name_of(path)} needs events, with which it was trained; give some with --events, or leave it"
-                " out"
+                f"HDR by {self.name} needs events, with which it was trained; give some with --events, or leave it out"
             )
         self._state: HdrState | None = None
         self._rest: torch.Tensor | None = None  # events since the key frame that the state is of
@@ -62,7 +62,7 @@ class After:
 
     @torch.inference_mode()
     def frames(self, work: Work) -> Iterator[Filled]:
-        """The frames of a stretch, processed."""
+        """The frames of a stretch, processed.  Raises DataError where the network makes no numbers."""
         if work.shot != self._shot:
             self._shot, self._state, self._rest = work.shot, None, None
         first, state = None, None
@@ -102,6 +102,7 @@ class After:
         window = light.new_zeros(1, self.network.spec.bins, *light.shape[1:]) if since is None else since
         second = window.expand(len(frames), -1, -1, -1) if self.needs_events else frames
         made, after = self.network(frames, second, state, residue=self.residue)
+        made = finite(made, self.name)
         if self.bright:
             made = torch.where(frames > 1, torch.maximum(made, frames), made)
         found = to_codes(made.clamp(min=0), "srgb").flatten(0, 1)

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 
 from interp.methods.around_tiles import around_tiles
 from interp.methods.gap import Gap, Together
-from interp.methods.running import PLAIN, Running
+from interp.methods.running import PLAIN, Running, finite
 from interp.methods.tiling import Tiling, part
 from interp.networks.around import Around
 from interp.networks.event_fed import EventFed, States
@@ -21,7 +21,7 @@ from interp.pretrained import name_of
 from interp.representation.carried import over
 from interp.representation.event_counts import EventCounts
 from interp.weights import load
-from vid2ev.errors import DataError, UsageError
+from vid2ev.errors import UsageError
 
 AT_ONCE_PX = 1 << 21  # pixels of images that a network makes at a time: some 200 bytes each of the smallest networks
 HELD = 1 << 27  # values of images that are put together of tiles at a time, 4 bytes each
@@ -78,7 +78,7 @@ class OfFrames(Together):
     @torch.inference_mode()
     def _at(self, pair: Pair, times: torch.Tensor) -> torch.Tensor:
         with self.running.on(pair.frame_0.device):
-            return _finite(self, self.network.at(pair, times).images[0].float())
+            return finite(self.network.at(pair, times).images[0].float(), self.name, self.running)
 
 
 @dataclass(slots=True)
@@ -114,7 +114,7 @@ class OfEvents(Together):
         with self.running.on(voxels.device):
             image, self.states = self.network(voxels[:, 0], self.states)
         laid = F.interpolate(image.float(), gap.frame_0.shape[-2:], mode="bilinear", align_corners=False)
-        return _finite(self, laid.expand(-1, len(gap.frame_0), -1, -1))
+        return finite(laid, self.name, self.running).expand(-1, len(gap.frame_0), -1, -1)
 
 
 def of_weights(
@@ -147,13 +147,6 @@ def _at_once(gap: Gap) -> int:
 def _evenly(times: torch.Tensor, some: int) -> tuple[torch.Tensor, ...]:
     """Groups of at most so many, about as large as each other."""
     return times.tensor_split(-(-len(times) // some))
-
-
-def _finite(method: OfFrames | OfEvents, images: torch.Tensor) -> torch.Tensor:
-    """The images of a network.  Raises DataError where they are no numbers, which weights can lead to."""
-    if not bool(torch.isfinite(images).all()):
-        raise DataError(f"network '{method.name}' made values that are no numbers; take other weights")
-    return images
 
 
 def _check(method: OfFrames | OfEvents, gap: Gap) -> None:

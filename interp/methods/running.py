@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 
 PRECISIONS = {"float32": None, "bfloat16": torch.bfloat16, "float16": torch.float16}
 
@@ -65,6 +65,15 @@ class Running:
 
 
 PLAIN = Running()
+
+
+def finite(images: torch.Tensor, name: str, running: Running = PLAIN) -> torch.Tensor:
+    """The images of a network of that name.  Raises DataError where they are no numbers, which weights can lead to, and
+    few bits."""
+    if not bool(torch.isfinite(images).all()):
+        more_bits = "" if running.precision == PLAIN.precision else f" or --precision {PLAIN.precision}"
+        raise DataError(f"network '{name}' made values that are no numbers; take other weights{more_bits}")
+    return images
 
 
 def laid_out(network: Any) -> Any:

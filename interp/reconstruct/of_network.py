@@ -10,6 +10,7 @@ import torch
 
 from interp.interpolate.memory import as_arrays, nested
 from interp.light import to_light
+from interp.methods.running import finite
 from interp.methods.tiling import Tile, parse_tiling
 from interp.networks.event_fed import EventFed, States
 from interp.pretrained import name_of
@@ -51,10 +52,10 @@ class OfNetwork:
 
     @torch.inference_mode()
     def picture(self, stop_us: int) -> np.ndarray:
-        """Light [H, W] float32 at the end of the slice."""
+        """Light [H, W] float32 at the end of the slice.  Raises DataError where the network makes no numbers."""
         nats = (torch.from_numpy(self._voxel.take(stop_us)) * self._worth).sum(0)
         image, self._states = self.network(as_voxels(nats)[None].to(self.device), self._states, self.step)
-        return to_light(image[0, 0].float().clamp(0, 1), "srgb").cpu().numpy()
+        return to_light(finite(image, self.name)[0, 0].float().clamp(0, 1), "srgb").cpu().numpy()
 
     def step(self, voxels: torch.Tensor, states: States) -> tuple[torch.Tensor, States]:
         """`EventFed.step`, large pictures part by part."""

@@ -12,7 +12,8 @@ from torch.nn import functional as F
 
 from interp.light import to_codes, to_light
 from interp.methods import METHODS, Gap, open_method
-from interp.methods.of_networks import of_weights
+from interp.methods.of_networks import OfFrames, of_weights
+from interp.methods.running import PRECISIONS, Running
 from interp.methods.tiling import parse_tiling
 from interp.networks import make, spec_of
 from interp.representation.event_counts import EventCounts
@@ -171,3 +172,18 @@ def test_weights_that_make_no_numbers_are_said(tmp_path: Path) -> None:
     frame = torch.rand(3, 32, 32)
     with pytest.raises(DataError, match="'broken' made values that are no numbers"):
         of_weights(tmp_path / "broken.safetensors").between(Gap(frame, frame, None, 1000), torch.tensor([0.5]))
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_where_few_bits_make_no_numbers_more_are_advised(precision: str) -> None:
+    network, frame = make("rrin", zero_heads=False).eval(), torch.rand(3, 32, 32)
+    with torch.no_grad():
+        for layer, factor in (("flow.down.0.0", 3e5), ("flow.down.1.0", 1 / 3e5)):
+            network.get_submodule(layer).weight.mul_(factor)  # type: ignore[union-attr, operator]
+    method = OfFrames("loud", network, False, Running(precision))  # type: ignore[arg-type]
+    gap = Gap(frame, frame.flip(2), None, 1000)
+    if precision == "float16":
+        with pytest.raises(DataError, match=r"take other weights or --precision float32$"):
+            method.between(gap, torch.tensor([0.5]))
+    else:
+        assert method.between(gap, torch.tensor([0.5])).isfinite().all()

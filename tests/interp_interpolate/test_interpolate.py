@@ -375,6 +375,16 @@ def test_a_lamp_of_infinite_light_is_as_bright_as_one_of_the_most_that_half_floa
     assert min(float(frame[14, 14].min()) for frame in made[0]) > 50
 
 
+def test_hdr_that_makes_no_numbers_is_said(tmp_path: Path) -> None:
+    network = make("hdr", second="frames")
+    torch.nn.init.constant_(network.out.bias, torch.nan)  # type: ignore[arg-type, union-attr]
+    save(tmp_path / "broken.safetensors", "hdr", network)
+    source = images(tmp_path / "in", moving(3))
+    with pytest.raises(DataError, match=r"'broken' made values that are no numbers; take other weights$"):
+        interpolate(source, tmp_path / "out", method="linear", hdr=tmp_path / "broken.safetensors")
+    assert not (tmp_path / "out").exists()
+
+
 def test_hdr_makes_no_light_above_white_darker(tmp_path: Path) -> None:
     pytest.importorskip("OpenEXR")
     from vid2ev.scenes.picture_writing import writer_of

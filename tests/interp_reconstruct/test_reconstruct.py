@@ -309,6 +309,7 @@ def test_a_film_has_all_pictures(tmp_path: Path) -> None:
         (["a.npz", "--start", "5"], 2, "no events from 5 s on"),
         (["a.npz", "--stop", "-1"], 2, "no events from 0 s to -1 s"),
         (["empty.csv"], 1, "empty.csv holds no events"),
+        (["a.npz", "--network", "broken.safetensors"], 1, "'broken' made values that are no numbers; take other"),
         (["a.npz", "--start", "0.5", "--stop", "0.2"], 2, "not after"),
     ],
 )
@@ -320,6 +321,9 @@ def test_what_is_wrong_is_said_in_one_sentence(
     (tmp_path / "text.txt").write_text("nothing here\n")
     (tmp_path / "empty.csv").write_text("t,x,y,p\n")
     save(tmp_path / "rrin.safetensors", "rrin", make("rrin"))
+    broken = make("firenet")
+    torch.nn.init.constant_(broken.out.bias, torch.nan)  # type: ignore[arg-type, union-attr]
+    save(tmp_path / "broken.safetensors", "firenet", broken)
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(command, arguments)
     assert isinstance(result.exception, (UsageError, DataError)), result.output
