@@ -75,9 +75,14 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
     """Nats of an OFF and an ON event as people write them.  Raises UsageError."""
     if text is None:
         return None
+    from interp.representation.event_counts import MOST_NATS
+
     values = [number_of(word.strip()) for word in text.split(",")]
-    if len(values) not in (1, 2) or not all(0 < value < 10 for value in values):
-        raise UsageError(f"--contrast {text}: expected nats, such as 0.2, or of OFF and ON events, such as 0.2,0.25")
+    if len(values) not in (1, 2) or not all(0 < value <= MOST_NATS for value in values):
+        raise UsageError(
+            f"--contrast {text}: expected nats, above 0 and at most {MOST_NATS:g}, such as 0.2, or of OFF and ON"
+            " events, such as 0.2,0.25"
+        )
     return values[0], values[-1]
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from interp.representation.dead_time import DeadTime
+from interp.representation.event_counts import MOST_NATS
 from vid2ev import Events
 from vid2ev.errors import UsageError
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AS_IT_IS", "Key", "Options", "Take", "check_contrast", "check_second", "open_take", "refuse_edits"]
 
-LATEST_S, MOST_NATS = 1e9, 10.0
+LATEST_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +117,11 @@ def refuse_edits(path: Path, options: Options) -> None:
 
 def check_contrast(contrast: tuple[float, float] | None) -> None:
     """Raise UsageError for what no OFF and ON event stands for."""
-    if contrast is not None and not (np.shape(contrast) == (2,) and all(0 < nats < MOST_NATS for nats in contrast)):
-        raise UsageError(f"contrast {contrast}: expected nats of an OFF and an ON event, such as (0.2, 0.25)")
+    if contrast is not None and not (np.shape(contrast) == (2,) and all(0 < nats <= MOST_NATS for nats in contrast)):
+        raise UsageError(
+            f"contrast {contrast}: expected nats of an OFF and an ON event, above 0 and at most {MOST_NATS:g}, such as"
+            " (0.2, 0.25)"
+        )
 
 
 @dataclass(frozen=True, slots=True)

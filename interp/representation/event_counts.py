@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 USUAL_NATS = 0.15  # the paper's threshold
 PER_VOXEL_NATS = 3 * USUAL_NATS
-MOST_NATS = 100.0  # that no threshold reaches
+MOST_NATS = 100.0  # that a threshold may be (`vid2ev.physics.comparator`)
 LARGEST = 10.0
 WHOLE16 = 2048  # the largest up to which float16 has all whole numbers
 
@@ -132,7 +132,7 @@ def contrast_of(parameters: Mapping[str, Any]) -> tuple[float, float]:
     Raises KeyError, TypeError, ValueError for what no sensor has.
     """
     off, on = (float(parameters[name]) for name in ("threshold_off", "threshold_on"))
-    if not (0 < off < MOST_NATS and 0 < on < MOST_NATS):
+    if not (0 < off <= MOST_NATS and 0 < on <= MOST_NATS):
         raise ValueError(f"thresholds {(off, on)}")
     return off, on
 

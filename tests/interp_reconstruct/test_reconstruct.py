@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from exact_voxels import exact_voxels
 
 from interp import pretrained
+from interp.commands.making import contrast_of
 from interp.commands.reconstruct import reconstruct as command
 from interp.interpolate.shelf import PIECE
 from interp.interpolate.take import Options
@@ -27,10 +28,11 @@ from interp.reconstruct.high_pass import GREY, HighPass
 from interp.reconstruct.of_network import OfNetwork
 from interp.reconstruct.whole import AT_ONCE, reconstruct
 from interp.weights import save
-from vid2ev import Events, open_source
+from vid2ev import DvsSpec, Events, open_source
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import format_named
 from vid2ev.formats.event_file import Recording
+from vid2ev.physics.comparator import LEAST_NATS
 from vid2ev.recording.exposures import read_codes
 
 SIZE = (40, 24)
@@ -348,7 +350,19 @@ def test_thresholds_of_a_manifest_that_no_sensor_has_are_said_to_be_damage(tmp_p
         reconstruct(source, tmp_path / "out", cutoff_hz=1)
 
 
-@pytest.mark.parametrize("contrast", [(0, 0.2), (math.nan, 0.2), (0.2, math.inf), (0.2,), 0.2])
+@pytest.mark.parametrize("nats", [LEAST_NATS, 100.0])
+def test_all_thresholds_that_a_sensor_may_have_are_those_of_its_events(tmp_path: Path, nats: float) -> None:
+    numbers = DvsSpec(threshold_on=nats).model_dump(mode="json")
+    source = written(tmp_path / "events.npz", drawn(10))
+    (tmp_path / "manifest.json").write_text(
+        json.dumps({"versions": {"vid2ev": "0"}, "sensor": {"parameters": numbers}})
+    )
+    told = reconstruct(source, tmp_path / "said", cutoff_hz=1)
+    asked = reconstruct(source, tmp_path / "asked", cutoff_hz=1, contrast=contrast_of(f"0.15,{nats!r}"))
+    assert told["source"]["contrast"] == asked["source"]["contrast"] == [0.15, nats]
+
+
+@pytest.mark.parametrize("contrast", [(0, 0.2), (math.nan, 0.2), (0.2, math.inf), (0.2,), 0.2, (0.2, 100.1)])
 def test_contrasts_of_no_event_are_refused(tmp_path: Path, contrast: Any) -> None:
     with pytest.raises(UsageError, match="expected nats"):
         reconstruct(written(tmp_path / "a.npz", drawn(10)), tmp_path / "a", contrast=contrast)
