@@ -18,8 +18,9 @@ from interp.evaluate.report import MARKDOWN, PAGE, About, WorstFrame, write_repo
 from interp.evaluate.report.blocks import Cell
 from interp.evaluate.report.content import FROM_TRUTH, document
 from interp.evaluate.report.coverage import fullest, uneven
+from interp.evaluate.report.frame_plots import over_time_plot
 from interp.evaluate.report.markdown import escaped, markdown
-from interp.evaluate.report.mean_plots import condition_plot
+from interp.evaluate.report.mean_plots import condition_plot, position_plot
 from interp.evaluate.report.overview import (
     best_method,
     full_scale_table,
@@ -151,6 +152,19 @@ def test_names_mean_themselves(tmp_path: Path, name: str) -> None:
     for line, following in zip(text.splitlines(), text.splitlines()[1:], strict=False):
         if line.startswith("|") and following.startswith("|"):
             assert len(re.findall(r"(?<!\\)\|", line)) == len(re.findall(r"(?<!\\)\|", following))
+
+
+def test_a_plot_names_each_method_that_it_has_lines_of() -> None:
+    names = ["_first", "__init__", "bridge", "_"]
+    rows = [
+        row(method=name, position=p, psnr=30.0 + p, ssim=0.9, t_us=p, motion_px=40.0 * p)
+        for name in names
+        for p in (1, 2, 3)
+    ]
+    ((condition, edges),) = varying(rows)
+    against = condition_plot(rows, condition, edges)
+    for drawing in (over_time_plot(rows), position_plot(rows), against and against.svg):
+        assert drawing and [text for text in ElementTree.fromstring(drawing).itertext() if text in names] == names
 
 
 def test_nothing_scored(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -81,11 +81,12 @@ def styles(methods: list[str], best: str | None) -> dict[str, dict[str, Any]]:
     return {method: found[method] for method in methods}
 
 
-def legend(made: Any, axes: Any) -> None:
-    """The names of lines above all panels."""
-    handles, names = axes.get_legend_handles_labels()
-    short = [shortened(name, 32) for name in names]
-    made.legend(handles, short, loc="outside upper left", ncols=3, fontsize=8, handlelength=3)
+def legend(made: Any, axes: Any, names: Sequence[str]) -> None:
+    """The names of the first lines of a panel above all panels."""
+    lines = axes.get_lines()[: len(names)]
+    drawn = made.legend(lines, ["-"] * len(lines), loc="outside upper left", ncols=3, fontsize=8, handlelength=3)
+    for text, name in zip(drawn.get_texts(), names, strict=True):  # (matplotlib leaves out labels that begin with _)
+        text.set_text(shortened(name, 32))
 
 
 def shortened(name: str, letters: int) -> str:

@@ -63,11 +63,11 @@ def over_time_plot(rows: Sequence[Row]) -> str | None:
             for method, style in styles(list(by_method(rows)), best).items():
                 part = sorted(own.get(method, []), key=lambda row: row.t_us)
                 line = style | {"marker": "", "linewidth": 1.4 if method == best else 0.7}
-                axes.plot(values(part, "t_us") / 1e6, values(part, "psnr"), label=method, **line)
+                axes.plot(values(part, "t_us") / 1e6, values(part, "psnr"), **line)
             axes.set_title(shortened(name, 80))
             axes.set_ylabel(SCORES["psnr"])
         panels[-1].set_xlabel("time [s]")
-        legend(made, panels[0])
+        legend(made, panels[0], list(by_method(rows)))
         return svg_of(made, f"time-{rows[0].multiple}", "PSNR of each frame over time")
 
 

@@ -28,10 +28,10 @@ def position_plot(rows: Sequence[Row]) -> str | None:
         for field, axes in panels.items():
             for method, part in parts.items():
                 found = by_position(part, field)
-                axes.plot(list(found), [mean.mean for mean in found.values()], label=method, **drawn[method])
+                axes.plot(list(found), [mean.mean for mean in found.values()], **drawn[method])
             axes.set_xlabel(f"place in the gap, of {multiple}")
             axes.xaxis.get_major_locator().set_params(integer=True)
-        legend(made, panels["psnr"])
+        legend(made, panels["psnr"], list(parts))
         return svg_of(made, f"position-{multiple}", "Scores at each place in the gap")
 
 
@@ -51,11 +51,11 @@ def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[fl
         for field, axes in panels.items():
             for method, style in styles(list(parts), best_method(rows)).items():
                 bins = found[field][method]
-                axes.plot([one.at for one in bins], [one.score.mean for one in bins], label=method, **style)
+                axes.plot([one.at for one in bins], [one.score.mean for one in bins], **style)
             _scale(axes, edges, condition)
             limited |= _draw_limit(axes, condition)
             _count(axes, max(found[field].values(), key=len))
-        legend(made, panels["psnr"])
+        legend(made, panels["psnr"], list(parts))
         svg = svg_of(made, f"{condition.field}-{multiple}", f"Scores against {condition.title}")
     where = f" The line at {condition.limit:g} is where the paper's network ends." if limited else ""
     return Plot(svg, f"{caption}{where}")
