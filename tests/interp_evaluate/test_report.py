@@ -23,6 +23,7 @@ from interp.evaluate.report.markdown import escaped, markdown
 from interp.evaluate.report.mean_plots import condition_plot, position_plot
 from interp.evaluate.report.overview import (
     best_method,
+    condition_table,
     full_scale_table,
     position_table,
     protocol_table,
@@ -202,6 +203,19 @@ def test_a_line_is_spoken_of_where_there_is_one(most_px: float) -> None:
     ((condition, edges),) = varying(rows)
     plot = condition_plot(rows, condition, edges)
     assert plot and ("paper: 100" in plot.svg) == ("The line at 100 is" in plot.caption) == (most_px > 100)
+
+
+def test_a_plot_says_how_many_frames_there_are_as_the_table_does() -> None:
+    many = {10.0: 137, 20.0: 251, 30.0: 163}
+    rows = [row(method="few", group=k, psnr=30.0, ssim=0.9, motion_px=motion) for motion in many for k in range(3)]
+    rows += [
+        row(group=k, psnr=30.0, ssim=0.9, motion_px=motion) for motion, count in many.items() for k in range(count)
+    ]
+    ((condition, edges),) = varying(rows)
+    plot = condition_plot(rows, condition, edges)
+    counts = [line.cells[0].text for line in condition_table(rows, condition, edges, "psnr", "").lines]
+    assert plot and counts == [str(count) for count in many.values()]
+    assert [text for text in ElementTree.fromstring(plot.svg).itertext() if text in counts] == counts * 2
 
 
 def test_where_methods_break_down_is_said() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from typing import Any
 
 from interp.evaluate.conditions import Condition
@@ -54,7 +55,7 @@ def condition_plot(rows: Sequence[Row], condition: Condition, edges: Sequence[fl
                 axes.plot([one.at for one in bins], [one.score.mean for one in bins], **style)
             _scale(axes, edges, condition)
             limited |= _draw_limit(axes, condition)
-            _count(axes, max(found[field].values(), key=len))
+            _count(axes, _fullest(found[field].values()))
         legend(made, panels["psnr"], list(parts))
         svg = svg_of(made, f"{condition.field}-{multiple}", f"Scores against {condition.title}")
     where = f" The line at {condition.limit:g} is where the paper's network ends." if limited else ""
@@ -90,6 +91,15 @@ def _draw_limit(axes: Any, condition: Condition) -> bool:
             textcoords="offset points", fontsize=7, ha="center", va="bottom", color=SOFT,
         )  # fmt: skip
     return reached
+
+
+def _fullest(of_methods: Iterable[Sequence[Bin]]) -> list[Bin]:
+    """Of each bin, that of the method with the most frames there, as many as the table says."""
+    found: dict[float, Bin] = {}
+    for one in chain.from_iterable(of_methods):
+        if one.low not in found or one.score.count > found[one.low].score.count:
+            found[one.low] = one
+    return list(found.values())
 
 
 def _count(axes: Any, bins: Sequence[Bin]) -> None:
