@@ -205,6 +205,23 @@ def test_a_line_is_spoken_of_where_there_is_one(most_px: float) -> None:
     assert plot and ("paper: 100" in plot.svg) == ("The line at 100 is" in plot.caption) == (most_px > 100)
 
 
+@pytest.mark.parametrize(
+    ("late_us", "marks"),
+    [
+        ([0, 200, 700, 7000, 23000], ["0", "500", "1000", "5000", "10000"]),
+        ([0.3, 0.7, 20], ["0", "0.5", "1", "5", "10"]),
+        ([0, *range(2, 60)], ["0", "1", "5", "10", "50", "100"]),
+    ],
+)
+def test_an_axis_over_decades_has_round_marks_whatever_the_values(late_us: list[float], marks: list[str]) -> None:
+    rows = [row(group=k, psnr=30.25, ssim=0.925, offset_us=late) for k, late in enumerate(late_us)]
+    ((condition, edges),) = varying(rows)
+    plot = condition_plot(rows, condition, edges)
+    svg = ElementTree.fromstring(plot.svg if plot else "")
+    axes = [each for each in svg.iter() if (each.get("id") or "").startswith(f"offset_us-{rows[0].multiple}-xtick_")]
+    assert [text for each in axes for text in "".join(each.itertext()).split()] == marks * 2
+
+
 def test_a_plot_says_how_many_frames_there_are_as_the_table_does() -> None:
     many = {10.0: 137, 20.0: 251, 30.0: 163}
     rows = [row(method="few", group=k, psnr=30.0, ssim=0.9, motion_px=motion) for motion in many for k in range(3)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any
@@ -76,7 +77,9 @@ def _scale(axes: Any, edges: Sequence[float], condition: Condition) -> None:
     if min(edges) >= 0 and positive and max(edges) / positive[0] >= WIDE:
         axes.set_xscale("symlog", linthresh=positive[0], linscale=0.5)
         axes.set_xlim(left=0)
-        marks = [edge for edge in edges if f"{edge:e}"[0] in "015"]
+        powers = range(math.floor(math.log10(positive[0])), math.ceil(math.log10(max(edges))) + 1)
+        round_ones = (step * 10.0**power for power in powers for step in (1, 5))
+        marks = [0.0, *(mark for mark in round_ones if positive[0] <= mark <= max(edges))]
         axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
 
 
