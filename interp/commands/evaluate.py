@@ -40,7 +40,8 @@ GROUPS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} gaps, {elapsed} gone, {re
 )
 @click.option(
     "--times", type=click.Choice(["frames", "even"]), default="frames", show_default=True,
-    help="Rebuild frames at their own times, or evenly between key frames as the field's scripts do.",
+    help="Rebuild frames at their own times, or evenly between key frames as the field's scripts do; evenly where not"
+    " as many are rebuilt as were skipped.",
 )  # fmt: skip
 @click.option(
     "--rounding", type=click.Choice(["round", "truncate"]), default="round", show_default=True,

@@ -81,10 +81,15 @@ class Protocol:
         """Which of the rebuilt frames are those at `positions`."""
         return [k * (self.insert + 1) // self.multiple - 1 for k in self.positions]
 
+    @property
+    def own_times(self) -> bool:
+        """Whether frames are rebuilt at the times of those that were skipped."""
+        return self.times == "frames" and self.insert == self.skip
+
     def targets(self, times_us: np.ndarray) -> np.ndarray:
         """Times [insert] of the frames to rebuild, 0 ... 1 of the gap, of the times [skip + 2] of its frames, key
         frames included."""
-        if self.times == "frames" and self.insert == self.skip:
+        if self.own_times:
             return (times_us[1:-1] - times_us[0]) / (times_us[-1] - times_us[0])
         return np.linspace(0, 1, self.insert + 2)[1:-1]
 

@@ -275,6 +275,17 @@ def test_the_report_says_how_films_were_read(tmp_path: Path) -> None:
     assert "| how films are read | slowdown 8, size 16x12 |" in (tmp_path / "out" / "report.md").read_text()
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [([], "of the frames"), (["--times", "even"], "even"), (["--insert", 1], "even"), (["--insert", 7], "even")],
+)
+def test_the_report_says_at_which_times_frames_were_rebuilt(tmp_path: Path, options: list[Any], said: str) -> None:
+    write_hsergb(tmp_path / "seq", pictures(5))
+    options = [*options, "--skip", 3, "--baseline", "nearest", "-o", tmp_path / "out", "-q"]
+    assert run(tmp_path / "seq", *options).exit_code == 0
+    assert f"| times of these | {said} |" in (tmp_path / "out" / "report.md").read_text()
+
+
 def test_the_command_takes_a_film_and_a_sensor(tmp_path: Path) -> None:
     write_film(tmp_path / "film.npz", pictures(9))
     done = run(tmp_path / "film.npz", "-o", tmp_path / "out", "--sensor", "clean", "--set", "threshold_on=0.4",

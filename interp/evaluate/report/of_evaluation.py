@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from interp.evaluate.protocol import Protocol
 from interp.evaluate.remarks import left_out, remarks
 from interp.evaluate.report import About, WorstFrame, write_report
 from interp.evaluate.report.worst import MOST
@@ -61,12 +62,12 @@ def _worst(folder: Path, row: Row) -> WorstFrame:
 
 
 def _settings(summary: Mapping[str, Any]) -> dict[str, object]:
-    protocol, sensor = summary["protocol"], summary["sensor"]
+    protocol, sensor = Protocol(**summary["protocol"]), summary["sensor"]
     settings = {
-        "frames skipped between key frames": protocol["skip"],
-        "frames rebuilt between them": protocol["insert"],
-        "times of these": {"frames": "of the frames", "even": "even"}[protocol["times"]],
-        "codes of 8 bits": {"round": "rounded", "truncate": "truncated"}[protocol["rounding"]],
+        "frames skipped between key frames": protocol.skip,
+        "frames rebuilt between them": protocol.insert,
+        "times of these": "of the frames" if protocol.own_times else "even",
+        "codes of 8 bits": {"round": "rounded", "truncate": "truncated"}[protocol.rounding],
         "gaps of each sequence": summary["limit"] or "all",
     }
     weights = {name: of["weights_sha256"] for name, of in summary["identities"].items() if "weights_sha256" in of}
