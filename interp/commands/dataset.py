@@ -106,12 +106,13 @@ def _kept(directory: Path) -> Iterator[None]:
     """What asks it to end within says so if it can be resumed."""
     from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
     from vid2ev.interrupts import heard
+    from vid2ev.recording.destination import partial_of
 
     try:
         with heard():
             yield
     except KeyboardInterrupt:
-        begun = (directory.with_name(f"{directory.name}.partial") / "job.json").exists()
+        begun = (partial_of(directory) / "job.json").exists()
         say_interrupted(KEPT if begun else NOT_KEPT)
 
 

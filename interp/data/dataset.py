@@ -29,6 +29,7 @@ from vid2ev.cluster.work import Share, WorkerLost, outcomes
 from vid2ev.cluster.workers import Workers, has_dask
 from vid2ev.errors import DiskError
 from vid2ev.making.conversion import telling
+from vid2ev.recording.destination import check_destination, partial_of
 from vid2ev.recording.disk import sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import difference, read_manifest, versions
@@ -64,11 +65,12 @@ def write_dataset(
     Raises UsageError where `directory` is taken or begun with something else, DataError where it cannot be written, no
     scene can be made, or the workers of one died.
     """
-    made_in = directory.with_name(f"{directory.name}.partial")
+    made_in = partial_of(directory)
     inputs = {"inputs": digests_of(spec.videos, [directory, made_in])} if spec.videos else {}
     job = json.loads(json.dumps({"versions": versions(), "spec": spec.model_dump(mode="json")} | inputs))
     if directory.exists():
         return _finished(directory, job, resume)
+    check_destination(directory)
     if (made_in / "job.json").exists() and not resume:
         raise UsageError(f"{directory} was begun and not finished; --resume continues it, or remove {made_in}")
     scenes, unusable = scenes_of(spec)

@@ -336,6 +336,19 @@ def test_what_is_there_is_left_alone(made: Path) -> None:
         write_dataset(made, DatasetSpec(**(QUICK | {"seed": 5})), resume=True)
 
 
+@pytest.mark.parametrize("name", [".", "..", "/", "link"])
+def test_where_no_folder_can_be_put_is_said_before_any_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "within").mkdir()
+    (tmp_path / "within" / "link").symlink_to("nowhere")
+    monkeypatch.chdir(tmp_path / "within")
+    result = run(name, "--count", 1)
+    assert isinstance(result.exception, UsageError)
+    assert str(result.exception).startswith(f"{name} {'is a link' if name == 'link' else 'exists'}")
+    assert [path.name for path in tmp_path.rglob("*")] == ["within", "link"]
+
+
 def test_scenes_that_cannot_be_made_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from interp.data import dataset as module
 

@@ -271,6 +271,15 @@ def test_what_is_wrong_is_said_in_one_sentence(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.parametrize("output", [".", "..", "/"])
+def test_where_no_folder_can_be_put_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    images(tmp_path / "in", moving(2))
+    refused = CliRunner().invoke(command, ["in", "-o", output, "--method", "nearest"]).exception
+    assert isinstance(refused, UsageError) and f"{output} cannot be renamed into place" in str(refused)
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
 def test_a_file_of_somebody_else_is_not_replaced_by_the_manifest_of_a_film(tmp_path: Path) -> None:
     source, beside = images(tmp_path / "in", moving(2)), tmp_path / "clip.json"
     for text in ('{"mine": 1}', "no JSON", "[]"):

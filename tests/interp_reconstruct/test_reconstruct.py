@@ -410,6 +410,15 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     assert json.loads(again.output)["events"] == 5000
 
 
+@pytest.mark.parametrize("output", [".", "..", "/"])
+def test_where_no_folder_can_be_put_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "a.npz", drawn())
+    refused = CliRunner().invoke(command, ["a.npz", "-o", output]).exception
+    assert isinstance(refused, UsageError) and f"{output} cannot be renamed into place" in str(refused)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]
+
+
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is another")
 def test_memory_of_pictures_is_taken_again() -> None:
     """Pages that were cleared once are not cleared again; in processes of their own, as this one goes on as it was."""
