@@ -52,10 +52,16 @@ def pictures_in(folder: Path) -> list[Path]:
     return [path for path in _all_pictures(folder) if path.suffix.lower() == SUFFIX]
 
 
+def folders_in(folder: Path) -> list[Path]:
+    """The folders in a folder but for those of the truth and hidden ones."""
+    found = [each for each in folder.iterdir() if each.is_dir()] if folder.is_dir() else []
+    return sorted(each for each in found if each.name.lower() != TRUTH and not each.name.startswith("."))
+
+
 def passed_over(folder: Path, footage: Sequence[Footage]) -> str:
     """What is in a folder of predictions and not scored; nothing if there is nothing."""
     known = _known(folder, footage)
-    loose = [each for each in _others(folder, {*known}) if any(map(_all_pictures, [each, *_folders(each)]))]
+    loose = [each for each in _others(folder, {*known}) if any(map(_all_pictures, [each, *folders_in(each)]))]
     unknown = several(each.relative_to(folder).as_posix() for each in loose)
     said = [f"folders of no sequence that is scored: {unknown}"] if loose else []
     return "; ".join([*said, *other_pictures(folder, known)])
@@ -63,7 +69,7 @@ def passed_over(folder: Path, footage: Sequence[Footage]) -> str:
 
 def other_pictures(folder: Path, sequences: Sequence[Path]) -> Iterator[str]:
     """That there are pictures in the folders of sequences, and of methods in these, that are no PNG."""
-    places = [place for each in sequences for place in (each, *_folders(each))]
+    places = [place for each in sequences for place in (each, *folders_in(each))]
     found: Mapping[Path, list[Path]] = {
         place: [path for path in _all_pictures(place) if path.suffix.lower() != SUFFIX] for place in places
     }
@@ -81,19 +87,13 @@ def _known(folder: Path, footage: Sequence[Footage]) -> list[Path]:
 
 def _others(folder: Path, known: set[Path]) -> Iterator[Path]:
     """Folders that are none of the known ones, and hold none of them."""
-    for each in _folders(folder):
+    for each in folders_in(folder):
         if each in known:
             continue
         if any(each in path.parents for path in known):
             yield from _others(each, known)
         else:
             yield each
-
-
-def _folders(folder: Path) -> list[Path]:
-    """The folders in a folder but for those of the truth and hidden ones."""
-    found = [each for each in folder.iterdir() if each.is_dir()] if folder.is_dir() else []
-    return sorted(each for each in found if each.name.lower() != TRUTH and not each.name.startswith("."))
 
 
 def _all_pictures(folder: Path) -> list[Path]:

@@ -19,7 +19,7 @@ from interp.data.picture_codes import codes_in
 from interp.evaluate.group import Footage, Group
 from interp.evaluate.naming import plain
 from interp.evaluate.pairing import paired
-from interp.evaluate.prediction_folders import SUFFIX, TRUTH, other_pictures, pictures_in, sequence_folders
+from interp.evaluate.prediction_folders import SUFFIX, folders_in, other_pictures, pictures_in, sequence_folders
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 
@@ -78,9 +78,9 @@ def predictions_in(
     made of them.  Raises UsageError where there are none."""
     folder = Path(folder)
     sequences = sequence_folders(folder, footage)
-    inner = sorted({each.name for of in sequences for each in of.iterdir() if each.is_dir() and pictures_in(each)})
+    inner = sorted({each.name for of in sequences for each in folders_in(of) if pictures_in(each)})
     known = identity(folder, copies=True, deep=True, besides=besides) if sequences else {}
-    found = [Predictions(plain(name), folder, name, known) for name in inner if name.lower() != TRUTH]
+    found = [Predictions(plain(name), folder, name, known) for name in inner]
     if any(map(pictures_in, sequences)):
         found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known))
     if not found:

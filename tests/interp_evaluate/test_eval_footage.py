@@ -399,12 +399,13 @@ def test_truth_of_16_bits_is_read_as_predictions_are(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.stack(ours.begin(recording).frames(group)), group.truth)
 
 
-def test_hidden_files_are_no_predictions(tmp_path: Path) -> None:
+def test_hidden_files_and_folders_are_no_predictions(tmp_path: Path) -> None:
     # (macOS puts them beside those that it writes to disks of others)
     truth = pictures(13)
     write_hsergb(tmp_path / "seq", truth)
     write_predictions(tmp_path / "results" / "seq" / "ours", truth)
     (tmp_path / "results" / "seq" / "ours" / "._frame0.png").write_bytes(b"\0\5\x16\7")
+    write_predictions(tmp_path / "results" / "seq" / ".thumbnails", truth[:1])
     (ours,) = predictions_in(tmp_path / "results")
     recording = Recording(open_sequence(tmp_path / "seq"), Protocol(3, 3), "seq")
     for group in recording.groups():
