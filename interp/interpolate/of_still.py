@@ -25,7 +25,8 @@ from interp.representation.event_counts import USUAL_NATS
 from vid2ev import Events, read_events
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.matlab import is_mat
-from vid2ev.light.picture_files import bits_in, read_picture, remarks_on_tags
+from vid2ev.light.netpbm import white_in
+from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
 from vid2ev.recording.exposures import LATEST_US
 from vid2ev.recording.manifest import identity
@@ -56,7 +57,7 @@ class OfStill:
         self.size = pixels.shape[1], pixels.shape[0]
         self.channels, self.bits = (1 if pixels.ndim == 2 else 3), (8 if pixels.dtype == np.uint8 else 16)
         transfer = tagged or "srgb" if options.transfer == "auto" else options.transfer
-        self._transfer, reader = transfer, PictureReader(transfer, "rgb", bits_in(picture))
+        self._transfer, reader = transfer, PictureReader(transfer, "rgb", white_in(picture))
         said = reader.remarks_on(pixels)
         light = torch.from_numpy(reader.light(pixels, primaries))[..., : self.channels]
         self._codes = to_codes(light, "srgb").numpy()

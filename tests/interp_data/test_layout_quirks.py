@@ -17,6 +17,7 @@ from interp.data.layouts import open_sequence, opened_in, sequences_in, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.sequence import Placed
 from interp.data.layouts.writing import write_sequence
+from interp.data.picture_codes import codes_in
 from interp.data.recorded import clip_of, left_out, recorded
 from interp.data.samples import check_fits
 from interp.data.settings import ClipSettings
@@ -218,6 +219,17 @@ def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
     write_codes(tmp_path / "seq" / "images_corrected" / "000002.png", np.zeros((8, 12, 3), np.uint8))
     with pytest.raises(DataError, match=r"000002\.png: 12x8 pixels, expected 40x24"):
         clip_of(open_sequence(tmp_path / "seq"), 1, 4)
+
+
+@pytest.mark.parametrize("white", [100, 255, 1000, 1023, 65535])
+def test_white_of_a_picture_is_what_its_header_says(tmp_path: Path, white: int) -> None:
+    """In codes of 8 bits, 255."""
+    kind = ">u2" if white > 255 else "u1"
+    values = np.array([0, white // 2, white])
+    (tmp_path / "0.pgm").write_bytes(b"P5\n3 1\n%d\n" % white + values.astype(kind).tobytes())
+    found = codes_in(tmp_path / "0.pgm")
+    assert found is not None
+    np.testing.assert_array_equal(found[0], np.repeat(np.rint(values * 255.0 / white)[:, None], 3, axis=1))
 
 
 def test_lines_that_are_no_times_are_counted(tmp_path: Path) -> None:

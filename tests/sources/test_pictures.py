@@ -55,26 +55,59 @@ def test_exif_turns_a_picture_as_viewers_do(tmp_path: Path, orientation: int, su
 
 
 def pnm(kind: str, most: int, values: np.ndarray) -> bytes:
-    """A PNM of values [H, W] or [H, W, 3] of which `most` is white."""
+    """A PNM or PAM of values [H, W] or [H, W, C] of which `most` is white."""
+    if kind == "P7":
+        depth = values[0, 0].size
+        name = ("GRAYSCALE", "GRAYSCALE_ALPHA", "RGB", "RGB_ALPHA")[depth - 1]
+        said = {"WIDTH": values.shape[1], "HEIGHT": values.shape[0], "DEPTH": depth, "MAXVAL": most, "TUPLTYPE": name}
+        head = "".join(f"{key} {value}\n" for key, value in said.items())
+        return f"P7\n# of a test\n{head}ENDHDR\n".encode() + values.astype(">u2" if most > 255 else "u1").tobytes()
     head = f"{kind}\n# of a test\n{values.shape[1]} {values.shape[0]}\n{most}\n".encode()
     if kind in ("P2", "P3"):
         return head + " ".join(map(str, values.ravel().tolist())).encode() + b"\n"
     return head + values.astype(">u2" if most > 255 else "u1").tobytes()
 
 
-@pytest.mark.parametrize("most", [1, 15, 127, 255, 511, 1023, 4095, 65535])
-@pytest.mark.parametrize("kind", ["P2", "P3", "P5", "P6"])
-def test_white_of_a_pnm_is_what_its_header_says(tmp_path: Path, kind: str, most: int) -> None:
-    """FFmpeg writes 10 bits into 16, and that 1023 is white."""
-    values = np.linspace(0, most, 24).astype(int).reshape((2, 4, 3) if kind in ("P3", "P6") else (4, 6))
+@pytest.mark.parametrize("most", [1, 15, 100, 127, 255, 256, 300, 511, 1000, 1023, 4095, 65534, 65535])
+@pytest.mark.parametrize(("kind", "channels"), [
+    ("P2", 1), ("P3", 3), ("P5", 1), ("P6", 3), ("P7", 1), ("P7", 2), ("P7", 3), ("P7", 4),
+])  # fmt: skip
+def test_white_of_a_pnm_is_what_its_header_says(tmp_path: Path, kind: str, channels: int, most: int) -> None:
+    """FFmpeg writes 10 bits into 16, and that 1023 is white; others write what they like."""
+    values = np.linspace(0, most, 24 * channels).astype(int).reshape((4, 6, channels))
     for k in range(2):
-        (tmp_path / f"{k}.{'ppm' if values.ndim == 3 else 'pgm'}").write_bytes(pnm(kind, most, values))
-    for transfer in ("linear", f"linear:{most.bit_length()}bit") if kind in ("P5", "P6") or most > 255 else ("linear",):
+        (tmp_path / f"{k}.{'ppm' if channels > 2 else 'pgm'}").write_bytes(pnm(kind, most, values))
+    values = values[..., :3] if channels > 2 else values[..., 0]
+    bits = most.bit_length()
+    said = most == 2**bits - 1 and (kind not in ("P2", "P3") or most > 255)
+    for transfer in ("linear", f"linear:{bits}bit") if said else ("linear",):
         source = open_source(tmp_path, fps=1, colour="rgb", transfer=transfer)
         first, _ = source.frames()
         expected = values / most if values.ndim == 3 else np.repeat(values[..., None] / most, 3, axis=2)
         np.testing.assert_allclose(first.light, expected, atol=2 / 255 if kind in ("P2", "P3") and most < 256 else 1e-6)
         assert source.warnings == []
+
+
+def test_pictures_of_another_white_than_the_first_are_refused(tmp_path: Path) -> None:
+    for k, most in enumerate((1000, 1000, 500)):
+        (tmp_path / f"{k}.pgm").write_bytes(pnm("P5", most, np.full((4, 6), 400)))
+    source = open_source(tmp_path, fps=1, transfer="linear")
+    assert (source.describe()["bits"], source.describe()["white"]) == (10, 1000)
+    coming = source.frames()
+    assert next(coming).light == pytest.approx(0.4) and next(coming).light == pytest.approx(0.4)
+    with pytest.raises(DataError, match=r"2\.pgm: white is code 500 by its header, expected 1000 as in the first"):
+        next(coming)
+    (frame, *_) = open_source(tmp_path, fps=1, transfer="linear:9bit").frames()  # somebody says it of all of them
+    assert frame.light == pytest.approx(400 / 511)
+
+
+@pytest.mark.parametrize("name", ["DEPTH", "MAXVAL", "HEIGHT", "ENDHDR"])
+def test_a_damaged_pam_is_no_picture(tmp_path: Path, name: str) -> None:
+    content = pnm("P7", 300, np.full((4, 6, 3), 7))
+    for damaged in (content.replace(name.encode(), b"X"), content[:-1], content.replace(b"DEPTH 3", b"DEPTH 9" * 99)):
+        (tmp_path / "0.ppm").write_bytes(damaged)
+        with pytest.raises(DataError, match=r"0\.ppm: not an image that can be read"):
+            read_picture(tmp_path / "0.ppm")
 
 
 @pytest.mark.parametrize("mode", ["L", "LA", "P", "1", "RGB", "RGBA"])

@@ -1,16 +1,15 @@
 """Files of pictures: pixels, and which colours red, green and blue are in them.
 
-OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says;
-the package OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`).  Transparency is left out.  Of an EXR
-with several parts or layers the first with colour counts: R, G, B or else Y.  Its data window is set into its display
-window, black around, and its chromaticities hold.
+OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says; a PAM
+it is given as a PNM (`netpbm`).  The package OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`).
+Transparency is left out.  Of an EXR with several parts or layers the first with colour counts: R, G, B or else Y.  Its
+data window is set into its display window, black around, and its chromaticities hold.
 
-Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112; netpbm, "PNM".
+Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.light.icc import profile_name, remarks_on_profile
+from vid2ev.light.netpbm import PAM, pnm_of_pam
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
@@ -27,8 +27,6 @@ from vid2ev.light.recognise import EXR, PNG, TIFF, head_of
 from vid2ev.untrusted import LARGEST, check_exr, check_png, first_line, openexr, plain_name
 
 AHEAD = 1 << 25  # bytes of pages that are read at once
-PNM_OF_BYTES = (b"P5", b"P6")
-PNM = (b"P2", b"P3", *PNM_OF_BYTES)
 
 
 class Picture(NamedTuple):
@@ -65,17 +63,6 @@ def remarks_on_tags(path: Path, pixels: np.ndarray) -> list[str]:
     if pixels.dtype.kind == "f":
         return []
     return remarks_on_png(path) if head_of(path).startswith(PNG) else remarks_on_profile(path, profile_name(path))
-
-
-def bits_in(path: Path) -> int | None:
-    """Of how many bits the codes of a PNM are, by its header, where they do not fill those that hold them: of 10 in
-    16, as FFmpeg writes them.  None for all others, and where OpenCV has scaled them."""
-    head = head_of(path)
-    words = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
-    most = int(words[3]) if head.startswith(PNM) and len(words) > 3 and words[3].isdigit() else 0
-    bits, held = most.bit_length(), 16 if most > 255 else 8
-    as_stored = held == 16 or head.startswith(PNM_OF_BYTES)
-    return bits if 0 < bits < held and most == 2**bits - 1 and as_stored else None
 
 
 class PageReader:
@@ -116,9 +103,10 @@ def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.nd
         with _silent_decoders(), plain_name(path) as name:
             if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
                 return list(cv2.imreadmulti(name, page, count, flags=flags)[1])
-            one = cv2.imread(name, flags)
+            pam = head.startswith(PAM)
+            one = cv2.imdecode(np.frombuffer(pnm_of_pam(path), np.uint8), flags) if pam else cv2.imread(name, flags)
             return [] if one is None else [one]
-    except cv2.error as error:
+    except (cv2.error, ValueError, KeyError) as error:
         if "MAX_IMAGE" not in str(error):
             return []
         raise DataError(

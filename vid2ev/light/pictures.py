@@ -29,13 +29,13 @@ class PictureReader:
     counts them.
 
     transfer  a name of `parse_transfer`, with the bits of codes that do not fill 16 behind it: `linear:10bit`
-    bits      the same, where `transfer` does not say it; None for codes that do
+    white     the code that is white, where `transfer` does not say it; None for the largest that 8 or 16 bits hold
     Raises UsageError for either that cannot be meant.
     """
 
-    def __init__(self, transfer: str, colour: Colour = "luminance", bits: int | None = None):
-        self.transfer, said = with_bits(transfer)
-        self.bits, self.colour = said or bits, colour
+    def __init__(self, transfer: str, colour: Colour = "luminance", white: int | None = None):
+        self.transfer, bits = with_bits(transfer)
+        self.white, self.colour = white_of(bits) if bits else white, colour
         self._curve = parse_transfer(self.transfer, f"auto, {OF_CODES}")
         self._tables: dict[int, np.ndarray] = {}
 
@@ -55,17 +55,22 @@ class PictureReader:
         return luminance_of_rgb(channels, (width, height), table, weights)
 
     def about(self) -> dict[str, Any]:
-        """The curve, and of how many bits codes are that do not fill theirs, for JSON."""
-        return {"transfer": self.transfer} | ({"bits": self.bits} if self.bits else {})
+        """The curve, and of how many bits codes are that do not fill theirs, and which is white, if that is not their
+        largest, for JSON."""
+        if not self.white:
+            return {"transfer": self.transfer}
+        bits = self.white.bit_length()
+        white = {"white": self.white} if self.white < white_of(bits) else {}
+        return {"transfer": self.transfer, "bits": bits, **white}
 
     def remarks_on(self, first: np.ndarray) -> list[str]:
         """That 16-bit codes look like those of a sensor of fewer bits, where nobody has said that they are.
 
         Raises UsageError for pixels that are not of so many bits as somebody has said."""
-        kind = first.dtype
-        if self.bits and (kind.kind == "f" or self.bits > 8 * kind.itemsize):
-            raise UsageError(f"{self.bits} bits of {kind} pixels: expected uint16; leave ':{self.bits}{UNIT}' out")
-        most = 0 if self.bits or kind.kind == "f" else int(first.max(initial=0))
+        kind, bits = first.dtype, (self.white or 0).bit_length()
+        if bits and (kind.kind == "f" or bits > 8 * kind.itemsize):
+            raise UsageError(f"{bits} bits of {kind} pixels: expected uint16; leave ':{bits}{UNIT}' out")
+        most = 0 if bits or kind.kind == "f" else int(first.max(initial=0))
         if not 2**8 <= most < 2**SENSORS:
             return []
         return [
@@ -76,7 +81,7 @@ class PictureReader:
     def _table(self, held: int) -> np.ndarray:
         """Light [float32] of each code that so many bits hold; those above the full one go on as the curve does."""
         if held not in self._tables:
-            full = 2 ** (self.bits or held) - 1
+            full = self.white or white_of(held)
             self._tables[held] = self._curve.to_light(np.arange(2**held) / full).astype(np.float32)
         return self._tables[held]
 
@@ -109,6 +114,11 @@ def with_bits(transfer: str) -> tuple[str, int | None]:
         return name, bits_of(int(number) if number.isdecimal() else number)
     except ValueError:
         raise UsageError(f"transfer '{transfer}': expected 1 to {MOST} bits, such as linear:10{UNIT}") from None
+
+
+def white_of(bits: int) -> int:
+    """The largest code of so many bits."""
+    return int(2**bits) - 1
 
 
 def bits_of(number: object) -> int:

@@ -86,12 +86,13 @@ def photograph_file(name: str) -> Path:
 
 @lru_cache(maxsize=64)
 def _photograph(path: Path, written: Stamp) -> np.ndarray:
-    from vid2ev.light.picture_files import bits_in, read_picture
+    from vid2ev.light.netpbm import white_in
+    from vid2ev.light.picture_files import read_picture
     from vid2ev.light.pictures import PictureReader
 
     pixels, primaries, tagged = read_picture(path)
     transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
-    return np.maximum(PictureReader(transfer, "rgb", bits_in(path)).light(pixels, primaries), 0)
+    return np.maximum(PictureReader(transfer, "rgb", white_in(path)).light(pixels, primaries), 0)
 
 
 def _computed(pattern: Pattern) -> np.ndarray:

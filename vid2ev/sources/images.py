@@ -1,12 +1,12 @@
 """Images as a clip: a folder of them in natural order (2 before 10), or the pages of a TIFF.
 
-8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
+8- or 16-bit PNG, TIFF, JPEG, BMP, PNM, PAM, WebP or JPEG 2000, grey or colour; floating-point TIFF and PFM; OpenEXR and
 Radiance HDR.  The content decides, not the name.  Times come from `timestamps.txt` in the folder (`times.py` has the
 rule for its unit; HS-ERGB and BS-ERGB call it `timestamp.txt`), for `stack.tif` from `stack_timestamps.npy` or `.txt`
 beside it, or from fps: one after the other then, whatever their numbers, with a remark where numbers are missing.
 Codes are sRGB, 16-bit ones too, unless a transfer is given, or `frames.json`, the manifest of the frame camera whose
 folder it is, or the first PNG says one; that manifest also says of how many bits codes are that do not fill theirs,
-and so does the first PNM.
+and PNM and PAM say which code is white.
 Floating point is linear light, 1.0 white as it stands.  Transparency is ignored.
 """
 
@@ -23,8 +23,9 @@ import numpy as np
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import recognise
-from vid2ev.light.picture_files import PageReader, Picture, bits_in, pages_of, read_picture, remarks_on_tags
-from vid2ev.light.pictures import PictureReader, bits_of
+from vid2ev.light.netpbm import white_in
+from vid2ev.light.picture_files import PageReader, Picture, pages_of, read_picture, remarks_on_tags
+from vid2ev.light.pictures import PictureReader, bits_of, white_of
 from vid2ev.light.recognise import PICTURE_SUFFIXES, pictures_in
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.recording.exposures import KINDS
@@ -87,13 +88,14 @@ class Images:
         self.size = (first.shape[1], first.shape[0])
         self.frames_expected: int | None = len(self._places)
         self.duration_expected_s = expected_duration_s(self._stamps, self._fps, len(self._places))
-        curve, bits = (None, None) if first.dtype.kind == "f" else _said(self.path.absolute())
+        curve, white = (None, None) if first.dtype.kind == "f" else _said(self.path.absolute())
         self._tagged = transfer == "auto" and curve is None, tagged
         if transfer == "auto":
             self.warnings += [] if curve else remarks_on_tags(self._places[0][0], first)
             transfer = "linear" if first.dtype.kind == "f" else curve or tagged or "srgb"
         self.taken_by = lens_in(self.path, self.size) if self.path.is_dir() else None
-        self._reader = PictureReader(transfer, colour, bits or bits_in(self._places[0][0]))
+        self._white = white_in(self._places[0][0])
+        self._reader = PictureReader(transfer, colour, white or self._white)
         self.warnings += self._reader.remarks_on(first)
         self._dtype = first.dtype
 
@@ -139,6 +141,11 @@ class Images:
                 f"{file}: codes of {tagged or 'srgb'} by its tags, expected {first or 'srgb'} like those of the first"
                 " image; bring them to one curve, or say with --transfer which one it is"
             )
+        if self._reader.white == self._white != (white := white_in(file)):
+            raise DataError(
+                f"{file}: white is code {white or np.iinfo(pixels.dtype).max} by its header, expected"
+                f" {self._white or 'the largest'} as in the first image; bring them to one, as in PNG"
+            )
         return self._reader.light(pixels, primaries)
 
     def _read_stamps(self) -> tuple[list[Fraction], str]:
@@ -162,12 +169,13 @@ def _times_in(folder: Path) -> Path:
 
 
 def _said(folder: Path) -> tuple[str | None, int | None]:
-    """The transfer curve that pictures of a folder are said to be coded by, and the bits of codes that do not fill
-    theirs: by whoever made them, or by the manifest of the frame camera that sent them; None where nothing is said."""
+    """The transfer curve that pictures of a folder are said to be coded by, and which code is white where that is not
+    the largest: by whoever made them, or by the manifest of the frame camera that sent them; None where nobody says so.
+    """
     for path, said_of in ((folder / FRAMES, _of_frames), (folder.parent / "manifest.json", _of_camera)):
         try:
-            curve, bits = said_of(json_of(read_text(path)), folder.name)
-            return parse_transfer(str(curve)).name, bits
+            curve, white = said_of(json_of(read_text(path)), folder.name)
+            return parse_transfer(str(curve)).name, white
         except (OSError, ValueError, LookupError, TypeError):  # (there is none, or it is none of ours)
             continue
     return None, None
@@ -181,7 +189,7 @@ def _of_camera(said: Any, folder: str) -> tuple[str, int | None]:
     """Of a frame camera's codes, which are linear, or of its pictures.  Raises LookupError, TypeError, ValueError."""
     gamma, bits = (said["sensor"]["parameters"][key] for key in ("gamma", "bits"))
     curve = gamma if gamma == "srgb" else f"gamma:{gamma}"
-    return {KINDS["raw"]: ("linear", bits_of(bits)), KINDS["png"]: (curve, None)}[folder]
+    return {KINDS["raw"]: ("linear", white_of(bits_of(bits))), KINDS["png"]: (curve, None)}[folder]
 
 
 def _instead(folder: Path) -> str:

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from vid2ev.errors import UsageError
-from vid2ev.light.picture_files import bits_in, read_picture, remarks_on_tags
+from vid2ev.light.netpbm import white_in
+from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.spline import seen
@@ -68,7 +69,7 @@ class Photograph:
         if transfer == "auto":
             self.warnings += remarks_on_tags(self.path, pixels)
             transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
-        self._reader, self._crop = PictureReader(transfer, colour, bits_in(self.path)), crop
+        self._reader, self._crop = PictureReader(transfer, colour, white_in(self.path)), crop
         self.warnings += self._reader.remarks_on(pixels)
         self._light = self._reader.light(pixels, primaries)
         if crop is not None:
