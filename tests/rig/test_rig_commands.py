@@ -12,7 +12,7 @@ from drawn_rigs import differences, pair
 from vid2ev.commands import Commands
 from vid2ev.commands.calibration import NAMES, calibration
 from vid2ev.commands.init import init
-from vid2ev.errors import DataError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.rig.calibration import FORMATS, UNITS_M, read_calibration, write_calibration
 from vid2ev.rig.rig_file import EXAMPLE, read_rig, write_rig
 
@@ -77,6 +77,23 @@ def test_what_is_left_out_is_named() -> None:
     assert "rig to dv" in shown.output
     assert "note: dv does not hold clock_offset_us; kind" in shown.output
     assert "note" not in vid2ev("calibration", "rig.toml", "camchain.yaml", "--as", "kalibr").output
+
+
+def test_sensors_that_a_rig_may_not_take_from_where_they_are_are_named() -> None:
+    for folder in ("in", "out"):
+        Path(folder).mkdir()
+    left, *others = pair().cameras
+    Path("in/mine.toml").write_text("[dvs]\nthreshold_on = 0.3\n")
+    cameras = tuple(camera.model_copy(update={"sensor": "in/mine.toml"}) for camera in (left, *others))
+    write_rig("in/rig.toml", pair().model_copy(update={"cameras": cameras}))
+    for command, rig in (("calibration", "out/rig.toml"), ("init", "out/other.toml")):
+        shown = vid2ev(command, *(["in/rig.toml", rig] if command == "calibration" else [rig, "--from", "in/rig.toml"]))
+        notes = [line.removeprefix("note: ") for line in shown.output.splitlines() if line.startswith("note: ")]
+        with pytest.raises(UsageError) as refused:
+            read_rig(rig)
+        assert notes == [str(refused.value)] and "names ../in/mine.toml" in notes[0]
+    assert "note" not in vid2ev("calibration", "in/rig.toml", "whole.toml").output
+    assert read_rig("whole.toml").cameras[0].sensor == "in/mine.toml"
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ def calibration(source: str, target: Path, name: str | None, unit: str | None, o
     """
     from vid2ev.errors import UsageError
     from vid2ev.rig.calibration import left_out, read_calibration, write_calibration
+    from vid2ev.rig.rig_file import out_of_reach
 
     name = name or SUFFIXES.get(target.suffix)
     if name is None:
@@ -33,4 +34,5 @@ def calibration(source: str, target: Path, name: str | None, unit: str | None, o
     names = ", ".join(camera.name for camera in read.rig.cameras)
     lost = left_out(read.rig, name)
     notes = [*read.notes, *([f"{name} does not hold {'; '.join(lost)}"] if lost else [])]
+    notes += out_of_reach(target, read.rig) if name == "rig" else []
     click.echo("\n".join([f"{target}: {names}, {read.format} to {name}", *(f"note: {note}" for note in notes)]))

@@ -19,7 +19,7 @@ def init(rig: Path, calibration: str | None, unit: str | None, overwrite: bool) 
     calibration file of OpenCV, Kalibr, DSEC or dv-processing.
     """
     from vid2ev.rig.calibration import read_calibration
-    from vid2ev.rig.rig_file import EXAMPLE, rig_text, write_text
+    from vid2ev.rig.rig_file import EXAMPLE, out_of_reach, rig_text, write_text
 
     if calibration is None:
         write_text(rig, EXAMPLE.read_text(encoding="utf-8"), overwrite)
@@ -29,5 +29,5 @@ def init(rig: Path, calibration: str | None, unit: str | None, overwrite: bool) 
     says = f"# The cameras of a calibration file ({read.format}); `vid2ev init` without --from explains every key."
     write_text(rig, f"{says}\n\n{rig_text(read.rig, rig.parent)}", overwrite)
     names = ", ".join(camera.name for camera in read.rig.cameras)
-    lines = [f"{rig}: {names}, of {calibration} ({read.format})", *(f"note: {note}" for note in read.notes)]
-    click.echo("\n".join(lines))
+    notes = (f"note: {note}" for note in [*read.notes, *out_of_reach(rig, read.rig)])
+    click.echo("\n".join([f"{rig}: {names}, of {calibration} ({read.format})", *notes]))

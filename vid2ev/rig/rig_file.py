@@ -72,10 +72,27 @@ def rig_text(rig: Rig, folder: Path = Path()) -> str:
     """The text of a rig file; `sensor` files are named as seen from `folder`."""
     tables = [] if rig.source == Source() else ["[source]\n" + _keys(rig.source)]
     for camera in rig.cameras:
-        if camera.sensor is not None and is_file(camera.sensor) and not os.path.isabs(camera.sensor):
-            camera = camera.model_copy(update={"sensor": os.path.relpath(camera.sensor, folder)})
+        if camera.sensor is not None and is_file(camera.sensor):
+            camera = camera.model_copy(update={"sensor": _seen_from(folder, camera.sensor)})
         tables.append("[[camera]]\n" + _keys(camera))
     return "\n".join(tables)
+
+
+def out_of_reach(path: Path, rig: Rig) -> list[str]:
+    """Why whoever reads a rig that is written to a file may not take its sensors from where they are, one clause for
+    each of their files."""
+    found: dict[str, None] = {}
+    for sensor in (camera.sensor for camera in rig.cameras):
+        try:
+            if sensor is not None and is_file(sensor):
+                beside(path, _seen_from(path.parent, sensor))
+        except UsageError as error:
+            found[str(error)] = None
+    return [*found]
+
+
+def _seen_from(folder: Path, sensor: str) -> str:
+    return sensor if os.path.isabs(sensor) else os.path.relpath(sensor, folder)
 
 
 def write_text(path: Path, text: str, overwrite: bool = False) -> None:
