@@ -155,7 +155,7 @@ class Fit:
 
     def _measure(self, trainer: Trainer, step: int) -> None:
         """The scores of what needs no training, once, and of the network before it has learnt anything."""
-        if self.folder.first and not self.folder.baselines():
+        if self.folder.first and not self._baselines():
             found = [
                 (group, name, self.learner.scored(clip, images))
                 for group, clip in self.feed.validation
@@ -181,10 +181,13 @@ class Fit:
             trainer.validate(self.learner, self.feed, verbose=False)
         best, kept = self.learner.best
         found: dict[str, dict[str, Scores]] = {group: {"network": one} for group, one in kept.items()}
-        for name, table in self.folder.baselines().items():
-            for group, values in table.items():
-                found[group][name] = Scores(**values)
+        for name, table in self._baselines().items():
+            for group, one in table.items():
+                found[group][name] = one
         return Outcome(step, steps, skipped, best, found)
+
+    def _baselines(self) -> dict[str, dict[str, Scores]]:
+        return self.folder.baselines([group for group, _ in self.feed.validation])
 
 
 @contextmanager

@@ -23,7 +23,7 @@ import math
 import operator
 import re
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
@@ -31,6 +31,7 @@ from typing import Any
 
 from interp.pretrained import OF_RUN
 from interp.train.schedule import Steps
+from interp.train.scores import Scores
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.held import Held
@@ -152,17 +153,29 @@ class RunFolder:
         if self.first:
             self._keep("steps.json", asdict(steps))
 
-    def baselines(self) -> dict[str, dict[str, dict[str, float]]]:
-        """Scores of methods without training: method, group of clips, score; empty until they are measured."""
+    def baselines(self, groups: Collection[str]) -> dict[str, dict[str, Scores]]:
+        """Scores of methods without training on groups of clips; empty until they are measured.
+
+        Raises DataError for those of other groups, as another run has them, and for what is no scores."""
         file = self.path / "baselines.json"
         if not file.exists():
             return {}
         found = read_json(file)
         with as_stated(file):
-            return {
-                method: {group: {score: _number(value) for score, value in of.items()} for group, of in table.items()}
+            tables = {
+                method: {
+                    group: Scores(**{name: _number(value) for name, value in of.items()}) for group, of in table.items()
+                }
                 for method, table in found.items()
             }
+        for table in tables.values():
+            if set(table) != set(groups):
+                said, expected = (", ".join(dict.fromkeys(names))[:80] or "nothing" for names in (table, groups))
+                raise DataError(
+                    f"{file} has scores of {said}, expected {expected}: it is of another run; remove it, and --resume"
+                    " makes it again"
+                )
+        return tables
 
     def write_baselines(self, tables: Mapping[str, Any]) -> None:
         """Keep them; null is no number, as of pixels that move where none does."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 
 from interp.train.run_folder import RunFolder
 from interp.train.schedule import Steps
+from interp.train.scores import Scores
 from vid2ev.errors import DataError
 
 
@@ -50,6 +53,32 @@ def test_what_is_no_plan_is_one_sentence(folder: RunFolder, said: Any) -> None:
     with pytest.raises(DataError, match=r"steps\.json ") as error:
         folder.steps()
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"linear": {"scenes": {"psnr": 30.0}}},
+        {"linear": {"scenes": {"psnr": 30.0, "ssim": 1, "moving": None, "static": 30.0, "epe": 1}}},
+        {"linear": {"scenes": {"psnr": "x", "ssim": 1, "moving": None, "static": 30.0}}},
+        {"linear": {"videos": {"psnr": 30.0, "ssim": 1, "moving": None, "static": 30.0}}},
+        {"linear": {"scenes": 3}},
+        {"linear": {}},
+    ],
+)
+def test_what_is_no_scores_of_these_clips_is_one_sentence(folder: RunFolder, said: Any) -> None:
+    (folder.path / "baselines.json").write_text(json.dumps(said))
+    with pytest.raises(DataError, match=r"baselines\.json ") as error:
+        folder.baselines(["scenes", "scenes"])
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("moving", [30.0, math.nan])
+def test_scores_are_kept(folder: RunFolder, moving: float) -> None:
+    assert folder.baselines(["scenes"]) == {}
+    kept = {"linear": {"scenes": Scores(30.0, 0.5, moving, 31.0), "videos": Scores(1.0, 0.0, 2.0, moving)}}
+    folder.write_baselines({name: {group: asdict(one) for group, one in of.items()} for name, of in kept.items()})
+    assert repr(folder.baselines(["scenes", "videos"])) == repr(kept)
 
 
 @pytest.mark.parametrize(
