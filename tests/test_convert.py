@@ -119,6 +119,25 @@ def test_an_option_that_is_misspelt_is_named_before_anything_is_opened(tmp_path:
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"bayer": ""}, {"bayer": 3}, {"bayer": False}, {"labels": "no"}, {"labels": None}, {"cis": ""}, {"crop": ""},
+        {"subframes": 1.5}, {"subframes": "x"}, {"subframes": True}, {"max_subframes": 2.5}, {"max_subframes": "9"},
+        {"probe": [(1.5, 2)]}, {"probe": [(1, 2, 3)]},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_values_that_cannot_be_meant_are_refused_before_the_first_frame(
+    tmp_path: Path, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vid2ev.sources.synthetic.SyntheticClip.frames", None)
+    (name,) = asked
+    with pytest.raises(UsageError, match=rf"^({name} |Sensor '' is not a preset)"):
+        convert(CLIP, tmp_path / "out", **asked)
+    assert not any(tmp_path.iterdir())
+
+
 def test_an_option_of_outputs_is_none_of_events(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="option 'preview': expected one of bayer, "):
         next(events_of(CLIP, preview=False))

@@ -102,18 +102,18 @@ class Recipe:
         """
         check_names(rest, cls.options())
         check_seed(seed := rest.get("seed", 0))
-        if rest.get("bayer"):
-            rest["bayer"] = check_pattern(rest["bayer"].upper())
+        if (pattern := rest.get("bayer")) is not None:
+            rest["bayer"] = check_pattern(str(pattern).upper())
         refuse_recordings(Path(video), rest.get("transfer", "auto"))
         rig = _rig_of_scene(str(video)) if rig is None else rig
         asked = read_rig(rig) if isinstance(rig, str | Path) else rig or default_rig(frames=cis is not None)
         asked = asked.with_frames() if frame_camera else asked
         alone = rig is None and len(asked.cameras) == 1
-        chosen = Sensors(sensor, cis or "paper", overrides)
+        chosen = Sensors(sensor, "paper" if cis is None else cis, overrides)
         chosen.check_changes(asked.cameras)
         of = partial(chosen.of_file, file=rig) if isinstance(rig, str | Path) else chosen.of
         sensors = [of(camera) for camera in asked.cameras]
-        coloured = bool(rest.get("bayer")) or any(each.colour for each in sensors)
+        coloured = pattern is not None or any(each.colour for each in sensors)
         maps = None if depth is None or plane_of(depth) is not None else partial(_with_depth, str(depth), asked)
         options = {key: rest.pop(key) for key in OF_SOURCE if key in rest} | {"seen_through": maps}
         source = open_source(video, colour="rgb" if coloured else "luminance", **options)
@@ -145,6 +145,8 @@ class Recipe:
             raise UsageError(f"subframes {self.subframes} with {none}: nothing is made between frames; leave it out")
         if self.cuts not in CUTS:
             raise UsageError(f"cuts '{self.cuts}': expected one of {', '.join(CUTS)}")
+        if not isinstance(self.labels, bool):
+            raise UsageError(f"labels {self.labels!r}: expected True or False")
         kinds = {*self.truth.kinds} if self.truth else set()
         if "map" in kinds and len(self.mounts) == 1:
             raise UsageError("truth 'map' is of pixels in other cameras, and there is one; leave it out, or add --rig")

@@ -138,7 +138,7 @@ def framing_of(source: Source) -> Framing | None:
 
 def _part(whole: tuple[int, int], crop: str | None, size: str | Sequence[int] | None) -> tuple[Box, tuple[int, int]]:
     """The part that is taken of pictures, and the size that it is brought to [px]."""
-    box = crop_box(crop, whole) if crop else Box(Fraction(0), Fraction(0), *map(Fraction, whole))
+    box = crop_box(crop, whole) if crop is not None else Box(Fraction(0), Fraction(0), *map(Fraction, whole))
     own = int(box.width), int(box.height)
     if size is None:
         return box, own

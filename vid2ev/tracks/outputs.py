@@ -154,10 +154,9 @@ class Outputs:
             write_frames(path, recording, self.frames_as, self.frames_by, kind=self.frames)
 
 
-def pixel_of(text: str | tuple[int, int]) -> tuple[int, int]:
-    """The pixel of a text "x,y"; raises UsageError."""
-    if not isinstance(text, str):
-        return text
+def pixel_of(pixel: str | tuple[int, int]) -> tuple[int, int]:
+    """The pixel (x, y), or of a text "x,y"; raises UsageError."""
+    text = pixel if isinstance(pixel, str) else ",".join(map(str, pixel))
     found = re.fullmatch(r"\s*(\d{1,9})\s*,\s*(\d{1,9})\s*", text)
     if not found:
         raise UsageError(f"probe '{text}': expected column and row of a pixel, such as 160,120")

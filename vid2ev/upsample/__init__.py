@@ -71,11 +71,12 @@ def make_upsampler(
     found = None if method in METHODS else other(method)
     if method not in METHODS and found is None:
         raise UsageError(f"upsampling '{method}': expected one of {', '.join([*METHODS, *others()])}")
-    if subframes != "auto" and not 1 <= subframes <= MOST:
+    if subframes != "auto" and not (_is_whole(subframes) and 1 <= subframes <= MOST):
         raise UsageError(f"subframes {subframes}: expected a whole number from 1 to {MOST}, or auto")
-    if not 1 <= max_subframes <= MOST or not threshold > 0:
+    if not (_is_whole(max_subframes) and 1 <= max_subframes <= MOST) or not threshold > 0:
         raise UsageError(
-            f"max_subframes {max_subframes}, threshold {threshold}: expected from 1 to {MOST}, and more than 0"
+            f"max_subframes {max_subframes}, threshold {threshold}: expected a whole number from 1 to {MOST}, and more"
+            " than 0"
         )
     if found is not None:
         make, rest = found
@@ -91,3 +92,7 @@ def make_upsampler(
     from vid2ev.upsample.flow import FlowUpsampling
 
     return FlowUpsampling(subframes, max_subframes, threshold, upload)
+
+
+def _is_whole(number: object) -> bool:
+    return isinstance(number, int) and not isinstance(number, bool)
