@@ -56,6 +56,15 @@ def test_a_picture_beside_videos_is_none_of_them() -> None:
     assert many.sources_in("clips") == ["clips"]  # (more pictures than videos: frames, with a preview of them)
 
 
+def test_recordings_beside_their_videos_are_none_of_them() -> None:
+    """Pictures in them are of probed pixels."""
+    for options in ((), ("--resume",), ("--overwrite",)):
+        result = vid2ev("clips", "-o", "clips", "--probe", "1,2", *options)
+        assert "3 of 4 done, 1 failed" in result.output
+    assert {path.name for path in Path("clips/a9_events").iterdir()} >= {"manifest.json", "probe.png"}
+    assert many.sources_in("clips/a9_events") == ["clips/a9_events"]  # (which is refused in words)
+
+
 def test_no_name_does_not_stand_for_the_folder_one_is_in() -> None:
     np.save("here.npy", np.ones((2, 6, 8), np.float32))
     result = vid2ev("", "-o", "out/")

@@ -21,26 +21,32 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and i
 
 def sources_in(video: str) -> list[str]:
     """The sources that an argument stands for: itself, what a folder holds that is not of pictures (videos, arrays and
-    folders of pictures, in natural order), or what the lines of a list NAME.txt stand for, as on the command line.
+    folders of pictures, in natural order, but no recordings), or what the lines of a list NAME.txt stand for, as on the
+    command line.
 
     Raises UsageError for a list without any, DataError for a list that cannot be read.
     """
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not folder.is_dir() or (folder / "manifest.json").exists():
+    if video == "-" or not folder.is_dir() or _is_recording(folder):
         return [video]
     clips = [path for path in folder.iterdir() if _is_clip(path)]
     films = sum(path.suffix.lower() not in ARRAYS for path in clips)
     if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
         return [video]
-    folders = [path for path in folder.iterdir() if path.is_dir() and holds_pictures(path)]
+    folders = [path for path in folder.iterdir() if path.is_dir() and holds_pictures(path) and not _is_recording(path)]
     found = sorted(clips + folders, key=lambda path: natural(path.name))
     return [str(path) for path in found] or [video]
 
 
 def _is_clip(path: Path) -> bool:
     return path.suffix.lower() in CLIPS and path.is_file() and not path.stem.endswith("_timestamps")
+
+
+def _is_recording(folder: Path) -> bool:
+    """Whether it was made before, perhaps into the folder of its video; there may be pictures in it, of its pixels."""
+    return (folder / "manifest.json").exists()
 
 
 def holds_pictures(folder: Path) -> bool:
