@@ -116,7 +116,7 @@ def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, qu
         refractory_us=options.pop("refractory_us"),
         events=options.pop("events"),
     )
-    found = [each for source in sources for each in sources_in(source)]
+    found = [each for source in sources for each in sources_in(source, output or Path())]
     single = found == [*sources] and len(found) == 1
     if single and workers.scheduler is None:
         made = _one(found[0], output or _default(found[0], options), quiet, taken, options)

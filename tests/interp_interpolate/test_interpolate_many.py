@@ -32,9 +32,24 @@ def run(*arguments: str) -> Result:
 
 def test_folders_and_lists_stand_for_what_is_in_them() -> None:
     recordings, films = [f"recordings/r{k}" for k in range(3)], [f"films/f{k}" for k in range(2)]
-    assert sources_in("recordings") == recordings and sources_in("films") == films
-    assert sources_in("list.txt") == recordings + films
-    assert sources_in("recordings/r0") == ["recordings/r0"] and sources_in("films/f1") == ["films/f1"]
+    for argument, found in (
+        ("recordings", recordings), ("films", films), ("list.txt", recordings + films),
+        ("recordings/r0", ["recordings/r0"]), ("films/f1", ["films/f1"]),
+    ):  # fmt: skip
+        assert sources_in(argument, Path()) == found
+
+
+@pytest.mark.parametrize("kind", ["png", "mp4"])
+def test_what_was_made_into_the_folder_of_the_films_is_none_of_them(kind: str) -> None:
+    here = ["-x", "2", "--method", "linear", "--format", kind, "-o", "films"]
+    for options in ((), ("--resume",), ("--overwrite",)):
+        assert CliRunner().invoke(interpolate, ["films", *here, "-q", *options]).exit_code == 0
+    suffix = ".mp4" if kind == "mp4" else ""
+    made = [f"films/f{k}_x2{suffix}" for k in range(2)]
+    held = {str(path) for path in Path("films").iterdir() if path.suffix != ".json"}
+    assert held == {*made, "films/f0", "films/f1"}
+    assert sorted(sources_in("films", Path("other"))) == sorted(held)
+    assert sources_in(made[0], Path("films")) == [made[0]]
 
 
 def test_many_are_made_in_turn_or_shared_out_to_the_same_bytes() -> None:
