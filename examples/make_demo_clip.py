@@ -39,7 +39,7 @@ class Print(NamedTuple):
 @click.argument("output", type=click.Path(dir_okay=False, path_type=Path), default=Path(__file__).with_name("demo.mp4"))
 def main(output: Path) -> None:
     prints = scene()
-    with av.open(str(output), "w", options={"movflags": "+faststart"}) as container:
+    with av.open(f"file:{output}", "w", options={"movflags": "+faststart"}) as container:
         stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "slow", "threads": "1"})
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         context = stream.codec_context
