@@ -55,6 +55,26 @@ def test_it_is_another_with_another_photograph_under_the_same_name(tmp_path: Pat
     assert with_light(40) == first != with_light(220)
 
 
+MESH = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl m\nf 1/1 2/2 3/3\n"
+
+
+@pytest.mark.parametrize("changed", ["m.mtl", "skin.png", "mesh.obj"])
+def test_it_is_another_where_what_a_mesh_names_is_another(tmp_path: Path, changed: str) -> None:
+    (tmp_path / "mesh.obj").write_text(MESH)
+    (tmp_path / "m.mtl").write_text("newmtl m\nmap_Kd skin.png\n")
+    cv2.imwrite(str(tmp_path / "skin.png"), np.full((4, 4, 3), 40, np.uint8))
+    scene = f"scene:room,size=16x12,duration_s=0.01,objects.crate.kind=mesh,objects.crate.file={tmp_path / 'mesh.obj'}"
+
+    def known_by() -> Any:
+        return json.dumps(open_source(scene).describe()["files"])
+
+    first = known_by()
+    assert known_by() == first
+    with open(tmp_path / changed, "ab") as file:
+        file.write(b"\n")
+    assert known_by() != first
+
+
 @pytest.mark.parametrize("fps", [None, 200])
 def test_frames_from_an_index_on_are_those_of_the_whole(fps: float | None) -> None:
     source = open_source(TEXT, fps=fps)

@@ -66,6 +66,13 @@ def named_by(path: Path) -> dict[str, Path]:
     return found
 
 
+def opened_by(path: Path) -> list[Path]:
+    """The files that a mesh file names and that are there.  Raises as `load_mesh` does."""
+    opened: list[tuple[str, Path]] = []
+    _geometries(path, opened)
+    return sorted({file for _, file in opened})
+
+
 def _geometries(path: Path, opened: list[tuple[str, Path]] | None = None) -> list[trimesh.Trimesh]:
     """What in the file has triangles, each where it stands; the files that it names go into `opened`."""
     try:

@@ -20,6 +20,7 @@ import numpy as np
 from vid2ev.errors import UsageError
 from vid2ev.recording.manifest import identity
 from vid2ev.scenes.instants import Eye, Instants, others, rate_of
+from vid2ev.scenes.mesh_files import opened_by
 from vid2ev.scenes.reel import Reel
 from vid2ev.scenes.scene_file import files_named, plain_size, read_scene
 from vid2ev.scenes.world import World
@@ -98,8 +99,8 @@ class SceneSource:
         return 1e-9 * self.instants[len(self.instants) - 1]
 
     def describe(self) -> dict[str, Any]:
-        """What the scene is, every number settled, and by what its photographs and meshes are known again, for the
-        manifest."""
+        """What the scene is, every number settled, and by what its photographs and meshes, with all that these name,
+        are known again, for the manifest."""
         return {
             "kind": "scene",
             "path": self.name,
@@ -113,9 +114,11 @@ class SceneSource:
 
     @cached_property
     def _files(self) -> dict[str, Any]:
-        """What tells its photographs and meshes from others of their names; its rig is settled."""
-        named = [Path(table[key]) for table, key, _ in files_named(self.world.scene.tables()) if key != "rig"]
-        return {str(file): identity(file) for file in named if file.is_absolute()}
+        """What tells its photographs and meshes, and what these name, from others of these names; a rig is settled."""
+        named = {Path(table[key]): key for table, key, _ in files_named(self.world.scene.tables()) if key != "rig"}
+        files = [file for file in named if file.is_absolute()]
+        files += [beside for file in files if named[file] == "file" for beside in opened_by(file)]
+        return {str(file): identity(file) for file in files}
 
     def frames(self, start: int = 0) -> Iterator[Frame]:
         """The frames from index `start` on; earlier ones are not rendered."""
