@@ -46,6 +46,20 @@ def test_no_pixel_that_has_an_event_is_left_out(spec):
     short, contrast = np.arange(100) >= 60, np.repeat([0.25, 1.0], [60, 40])  # (short: noise is resolved)
     t_ns = np.cumsum(np.where(short, 1e4, 10 ** rng.uniform(3.5, 6.5, 100))).astype(np.int64)
     light = np.exp(-1.5 + contrast[:, None, None] * rng.normal(size=(100, 30, 60))).astype(np.float32)
+    assert as_many(spec, t_ns, light) > 1_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("filter_at", ["before", "after"])
+def test_noise_makes_a_signal_turn_that_goes_one_way_without(filter_at):
+    """Of light that goes up or down while its noise goes the other way."""
+    spec = clean(photoreceptor_tau_us=100, follower_tau_us=1000, filter=filter_at, photoreceptor_noise=0.05)
+    light = np.exp(np.random.default_rng(4).normal(-1.5, 1.0, (60, 30, 60))).astype(np.float32)
+    assert as_many(spec, np.arange(60) * 125_000, light) > 10_000
+
+
+def as_many(spec: DvsSpec, t_ns: np.ndarray, light: np.ndarray) -> int:
+    """How many events a sensor sends, which are those of one that is made to solve every pixel."""
     scans, solves = (start(spec, light, seed=2, skip=False) for _ in range(2))
     sent = 0
     for frame, t in zip(light, t_ns.tolist(), strict=True):
@@ -54,7 +68,7 @@ def test_no_pixel_that_has_an_event_is_left_out(spec):
             assert np.array_equal(getattr(ours, name), getattr(theirs, name)), (name, t)
         solve_all(solves)
         sent += len(ours)
-    assert sent > 1_000
+    return sent
 
 
 @pytest.mark.parametrize(

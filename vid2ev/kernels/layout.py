@@ -136,6 +136,12 @@ def last_light(flags):
 
 
 @compiled
+def last_seen(flags):
+    """Start of the plane of a block that has the comparator's input at the last frame without photoreceptor noise."""
+    return (LAG1 + len(flags.poles) + 2) * PITCH
+
+
+@compiled
 def place_of(pixel, stride):
     """Where a pixel stands in the first plane of `fast`."""
     return (pixel >> BLOCK_BITS) * stride + (pixel & (BLOCK - 1))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
-from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, PITCH, last_light
+from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LAG2, LOW, PITCH, last_light, last_seen
 from vid2ev.kernels.scratch import CLOCK, LIGHT, NEW, NEW1, NEW2, NOISE0, NOISE1, SEEN
 from vid2ev.kernels.steep import gets_steep, refine, was_steep
 from vid2ev.physics.elementary import exp64, expm1_32
@@ -98,18 +98,29 @@ def reaches(block, scratch, i, gain0, flags, num, iv):
             y = y + scratch[NOISE1 + i]
     elif len(flags.leak):
         y = y * iv.gain + iv.shift
-    flag = (y >= block[HIGH * PITCH + i]) | (y <= block[LOW * PITCH + i])
+    if (len(flags.leak) + len(flags.noise) > 0) & (len(flags.straight) == 0):
+        start = start_of(block, i, flags, num, iv)
+        # (between its ends, and yet leak or noise may make it turn: it goes on rising before the light begins to fall)
+        flag = hull_reaches(max(start, end), min(start, end), block, scratch, i, gain0, flags, num, iv)
+    else:
+        flag = (y >= block[HIGH * PITCH + i]) | (y <= block[LOW * PITCH + i])
     if (poles > 0) & (len(flags.straight) == 0):
         flag = flag | turns_at(block, scratch, i, flags) & may_reach(block, scratch, i, gain0, flags, num, iv)
-    if (len(flags.leak) > 0) & (len(flags.straight) == 0):
-        start = block[INPUT * PITCH + i]
-        if poles > 0:
-            start = start - block[(LAG1 if poles == 1 else LAG2) * PITCH + i]
-        if len(flags.log_compare) and not len(flags.log_input):
-            start = log_level_32(max(start, F(0.0)), num.curve)
-        # (between its ends, and yet the leak may make it turn: it goes on rising before the light has begun to fall)
-        flag = flag | hull_reaches(max(start, end), min(start, end), block, scratch, i, gain0, flags, num, iv)
     return flag
+
+
+@inner
+def start_of(block, i, flags, num, iv):
+    """What the scan compares of pixel i, before the interval, without leak and noise."""
+    if len(flags.noise):
+        seen = block[last_seen(flags) + i]
+        return seen - F(iv.leak0) if len(flags.leak) else seen
+    start, poles = block[INPUT * PITCH + i], len(flags.poles)
+    if poles > 0:
+        start = start - block[(LAG1 if poles == 1 else LAG2) * PITCH + i]
+    if len(flags.log_compare) and not len(flags.log_input):
+        start = log_level_32(max(start, F(0.0)), num.curve)
+    return start
 
 
 @inner
@@ -148,8 +159,8 @@ def hull_reaches(top, bottom, block, scratch, i, gain0, flags, num, iv):
     if len(flags.log_compare):
         top, bottom = top + F(iv.leak1), bottom + F(iv.leak0)
         if len(flags.noise):
-            swing = max(abs(scratch[NOISE0 + i]), abs(scratch[NOISE1 + i]))
-            top, bottom = top + swing, bottom - swing
+            first, last = scratch[NOISE0 + i], scratch[NOISE1 + i]
+            top, bottom = top + max(first, last), bottom + min(first, last)
     elif len(flags.leak):
         top, bottom = top * iv.gain + iv.shift, (bottom + F(num.curve.dark)) * gain0
     return (top >= block[HIGH * PITCH + i]) | (bottom <= block[LOW * PITCH + i])
@@ -166,7 +177,7 @@ def commit(block, scratch, n, flags):
         if poles > 1:
             block[LAG2 * PITCH + i] = scratch[NEW2 + i]
         if len(flags.noise):
-            block[(LAG1 + poles + 2) * PITCH + i] = scratch[SEEN + i]
+            block[last_seen(flags) + i] = scratch[SEEN + i]
         if len(flags.light_bandwidth):
             block[before + i] = scratch[LIGHT + i]
 
@@ -175,24 +186,22 @@ def commit(block, scratch, n, flags):
 def advance_noise(block, scratch, p0, n, poles, num, iv):
     """One step of the photoreceptor noise; the noise seen by the comparator before and after goes to scratch."""
     first, second = (LAG1 + poles) * PITCH, (LAG1 + poles + 1) * PITCH
-    for i in range(n):
-        scratch[NOISE0 + i] = block[second + i]
     if iv.noise_resolved:
         for i in range(n):
+            scratch[NOISE0 + i] = block[second + i]
+        for i in range(n):
             block[first + i], block[second + i] = noise_draw(block[first + i], block[second + i], p0 + i, num, iv)
+        for i in range(n):
+            scratch[NOISE1 + i] = block[second + i]
     else:
         for i in range(n):
-            block[first + i] = F(0.0)
-            block[second + i] = F(0.0)
-            scratch[NOISE0 + i] = F(0.0)
-    for i in range(n):
-        scratch[NOISE1 + i] = block[second + i]
+            block[first + i] = block[second + i] = scratch[NOISE0 + i] = scratch[NOISE1 + i] = F(0.0)
 
 
 @inner
 def flag_rice(block, scratch, flagged, p0, n, flags, num, iv):
     """Flag the pixels in which unresolved photoreceptor noise may reach a level in this interval."""
-    before, drift = (LAG1 + len(flags.poles) + 2) * PITCH, F(iv.leak1 - iv.leak0)
+    before, drift = last_seen(flags), F(iv.leak1 - iv.leak0)
     for i in range(n):
         was, seen = block[before + i], scratch[SEEN + i]
         top, bottom = max(was + drift, seen), min(was, seen - drift)  # (between its ends the leak may make it turn)

@@ -6,7 +6,7 @@ import numpy as np
 
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import AT, LEVEL_ON, WHEN, fresh_thresholds, leave_levels, load_thresholds
-from vid2ev.kernels.layout import HIGH, INPUT, LAG1, LOW, PITCH, last_light, place_of, stride_of
+from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH, last_light, last_seen, place_of, stride_of
 from vid2ev.physics.comparator import initial_phase
 from vid2ev.physics.log_curve import log_level, log_level_32
 
@@ -54,17 +54,17 @@ def see_signals(own, inputs, light, lanes, count, flags, num):
             own[last_light(flags) + j] = light[j]
     if len(flags.noise):
         for j in range(count):
-            own[(LAG1 + len(flags.poles) + 2) * PITCH + j] = lanes[AT + j]
+            own[last_seen(flags) + j] = lanes[AT + j]
 
 
 @inner
 def shift_pixel(pixel, by, planes, flags, num, work):
     """Lower the memory of a pixel by `by` nats."""
-    lane, pixels = work.one_lane, work.one_pixel
+    lane, pixels, place = work.one_lane, work.one_pixel, place_of(pixel, stride_of(flags))
     pixels[0] = pixel
     planes.memory[pixel] -= by
-    if (
-        abs(planes.fast[place_of(pixel, stride_of(flags)) + HIGH * PITCH]) < np.inf
-    ):  # a bad or a blind pixel keeps its sign
+    if len(flags.noise):
+        planes.fast[place + last_seen(flags)] -= np.float32(by)
+    if abs(planes.fast[place + HIGH * PITCH]) < np.inf:  # a bad or a blind pixel keeps its sign
         load_thresholds(lane, pixels, 1, planes, flags, num)
         leave_levels(lane, pixels, 1, planes, flags, num)
