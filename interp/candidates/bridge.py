@@ -103,14 +103,12 @@ def bridge(
     times: torch.Tensor,
     transfer: Transfer = "srgb",
     method: Method = "bridge",
-    around: torch.Tensor | None = None,
     highest: torch.Tensor | None = None,
 ) -> torch.Tensor:
     """Frames [B, N, C, H, W] at times [B, N], from codes [B, C, H, W] of the two frames around.
 
     method   bridge; both: weights 1 - t and t; nearest: integration from the nearer frame alone
     highest  `highest_of` of the whole, where these are parts of frames
-    around   codes [B, N, C, H, W] to take the colours from; those of the two frames unless given
     Raises UsageError for a transfer or a method that is none of these.
     """
     for name, value, known in (("transfer", transfer, Transfer), ("method", method, Method)):
@@ -119,11 +117,8 @@ def bridge(
     lights = [to_light(frame, transfer) for frame in (frame_0, frame_1)]
     highest = highest_of(frame_0, frame_1, transfer) if highest is None else highest
     found = integrated(luminance(lights[0]), luminance(lights[1]), events, times, highest)
-    if around is None:
-        first, second = (ratios_of(light)[:, None] for light in lights)
-        ratios = first + found.drift * (second - first)
-    else:
-        ratios = ratios_of(to_light(around, transfer))
+    first, second = (ratios_of(light)[:, None] for light in lights)
+    ratios = first + found.drift * (second - first)
     t = times[..., None, None, None].expand_as(found.drift)
     weights = {"bridge": found.drift, "both": t, "nearest": (t > 0.5).to(t)}
     return to_codes(coloured(replace(found, drift=weights[method]).light(), ratios), transfer)
