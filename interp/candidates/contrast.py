@@ -6,7 +6,9 @@ dL is the difference of the logs of both frames, E the count of ON less OFF even
 pixels of each sign.  That is the geometric mean of the two regressions, of dL on E and of E on dL: the first alone is
 too low, since counts are noisy (0.134 to 0.144 for 0.15 of a clean sensor, against 0.143 to 0.151).  c0 = 0.15 nat
 weighs as much as p pixels with an event. A known threshold is better: for a noisy sensor of 0.235 this gives 0.19 to
-0.22.
+0.22.  Not so where pixels of the event camera are k of the frames' wide: counts between four of them vary less than
+each, and what they stand for is more, 0.20, 0.22 and 0.26 for 0.15 (k = 2, 3, 4), with which `guided` is 0.6 dB better
+in four scenes of two photographs each, and integrals are alike.
 """
 
 from __future__ import annotations
