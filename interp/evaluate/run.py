@@ -91,6 +91,8 @@ def evaluate(
     for several in (datasets, networks, baselines, predictions):
         if isinstance(several, str | Path):
             raise UsageError(f"{several}: expected a list, also of one; give ['{several}']")
+    if not datasets:
+        raise UsageError("no data set: expected folders of recordings, videos or scene:NAME")
     if limit is not None and not is_whole(limit, 1):
         raise UsageError(f"limit {limit!r}: expected a whole number of at least 1; leave it out for all gaps")
     for name, value, kind in (("protocol", protocol, Protocol), ("simulated", simulated, Simulated)):
@@ -159,8 +161,12 @@ def _share_out(
 ) -> None:
     """Have workers score the sequences that are not done, each by itself.  Raises what one of them ends with, when the
     others are done."""
-    names = {method.name for method in methods}
-    left = [each for each in footage if names - set((kept.about(each.name) or {"missing": {}})["missing"])]
+    left = [
+        each
+        for each in footage
+        for about in (kept.about(each.name),)
+        if not all(_is_done(method.name, about, frames, kept.rows(each.name, method.name)) for method in methods)
+    ]
     rows = KeptRows(kept.folder)
     tasks = [Task(each.name, partial(_score_sequence, each, methods, frames, rows)) for each in left]
     errors = [outcome.error for outcome in share(tasks, workers) if outcome.error]
@@ -215,7 +221,7 @@ def _scored_sequence(
 ) -> dict[str, Any]:
     """What is known of a sequence, whose rows are added to those that were `found` before."""
     about = kept.about(footage.name)
-    unfinished = [method for method in methods if about is None or method.name not in about["missing"]]
+    unfinished = [method for method in methods if not _is_done(method.name, about, frames, found[method.name])]
     if about is not None and not unfinished:
         return about
     running = [method.begin(footage) for method in unfinished]
@@ -224,15 +230,24 @@ def _scored_sequence(
         _score_group(footage.name, group, running, found, kept, worst)
     facts = footage.about()
     unfit = {method.name: dict(method.unfit) for method in running}
-    missing = {
-        name: facts["groups"] * frames - sum(map(len, [*found[name].values(), *reasons.values()]))
-        for name, reasons in unfit.items()
-    }
+    missing = {name: _missing(facts["groups"] * frames, found[name], reasons) for name, reasons in unfit.items()}
     said = {method.name: [*method.remarks] for method in running if method.remarks}
     lacking: dict[str, dict[str, Any]] = {"missing": missing, "unfit": unfit, "of_methods": said}
     about = facts | {key: (about or {}).get(key, {}) | of for key, of in lacking.items()}
     kept.finish(footage.name, about)
     return about
+
+
+def _is_done(name: str, about: Mapping[str, Any] | None, frames: int, rows: Mapping[int, Sequence[Row]]) -> bool:
+    """Whether a sequence is done for a method: it is known why each frame has no row, if not; some may be lost."""
+    if about is None or name not in about["missing"]:
+        return False
+    return about["missing"][name] == _missing(about["groups"] * frames, rows, about["unfit"][name])
+
+
+def _missing(frames: int, rows: Mapping[int, Sequence[Row]], unfit: Mapping[str, Sequence[str]]) -> int:
+    """How many frames have neither a row nor a reason why they cannot be scored."""
+    return frames - sum(map(len, [*rows.values(), *unfit.values()]))
 
 
 def _score_group(

@@ -120,6 +120,8 @@ def test_what_is_asked_for_is_a_list_and_a_limit_a_number(tmp_path: Path) -> Non
     for alone in (tmp_path / "seq", str(tmp_path / "seq")):
         with pytest.raises(UsageError, match="seq: expected a list"):
             evaluate(alone, tmp_path / "report")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="no data set"):
+        evaluate([], tmp_path / "report", baselines=["linear"])
     for limit in (0, -1, 1.5, True):
         with pytest.raises(UsageError, match=rf"limit {limit}: expected a whole number"):
             evaluate([tmp_path / "seq"], tmp_path / "report", baselines=["linear"], limit=limit)  # type: ignore[arg-type]

@@ -133,6 +133,19 @@ def test_a_finished_evaluation_is_left_as_it_is(
     assert repr(read_rows(tmp_path / "report" / "rows.csv")) == repr(found.rows)  # (NaN is not equal to itself)
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_rows_that_were_removed_are_made_again(data: Path, whole: dict[str, bytes], tmp_path: Path, jobs: int) -> None:
+    """As whoever finds them damaged is told to have them made."""
+    evaluate(datasets(data), tmp_path / "report", **options(data))
+    (tmp_path / "report" / "kept" / "a" / "bridge.jsonl").unlink()
+    for name in ("a/theirs", "b/firenet"):
+        rows = tmp_path / "report" / "kept" / f"{name}.jsonl"
+        rows.write_bytes(rows.read_bytes()[:-1])
+    more: dict[str, Any] = {"workers": Workers(jobs, retries=0), "share": outcomes} if jobs > 1 else {}
+    evaluate(datasets(data), tmp_path / "report", resume=True, **options(data), **more)
+    assert contents(tmp_path / "report") == whole
+
+
 def test_methods_can_be_added_and_other_settings_are_refused(
     data: Path, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
