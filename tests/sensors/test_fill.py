@@ -5,6 +5,8 @@ To the bit, because each sum has the same terms in the same order: those of a pi
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -186,8 +188,20 @@ def test_what_cannot_be_is_said() -> None:
     for edges_us in ([0, 5, 5], [EVER.max, EVER.min]):
         with pytest.raises(UsageError, match="each after the one before"):
             NetCounts(SIZE, edges_us)
-    with pytest.raises(UsageError, match="expected whole numbers of microseconds"):
-        NetCounts(SIZE, [0.5, 1.5])
+    for times_us in (
+        [0.5, 1.5],
+        [0, math.nan],
+        [-math.inf, 0],
+        [0, 1 << 70],
+        ["0", "1"],
+        ["a", "b"],
+        [0, [1]],
+        [None, 1],
+    ):
+        with pytest.raises(UsageError, match="expected whole numbers of microseconds"):
+            NetCounts(SIZE, times_us)  # type: ignore[arg-type]
+        with pytest.raises(UsageError, match="expected whole numbers of microseconds"):
+            Windows(SIZE, "counts", [times_us])  # type: ignore[list-item]
     with pytest.raises(UsageError, match="expected int8 or int16"):
         NetCounts(SIZE, [0, 5], dtype=np.uint8)
     with pytest.raises(UsageError, match="a start and a later stop"):

@@ -104,7 +104,12 @@ def edges_of(edges_us: Sequence[int] | np.ndarray) -> np.ndarray:
 
 
 def _whole(times_us: Any) -> np.ndarray:
-    times, given = np.asarray(times_us, np.int64), np.asarray(times_us)
+    try:
+        given = np.asarray(times_us)
+        with np.errstate(invalid="ignore"):
+            times = given.astype(np.int64)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise UsageError(f"times {str(times_us)[:80]}: expected whole numbers of microseconds ({error})") from error
     if (times != given).any():
         raise UsageError(f"times {given[times != given][:3].tolist()} ...: expected whole numbers of microseconds")
     return times
