@@ -9,6 +9,7 @@ from interp.cost.measure import Rebuilding, Row
 from vid2ev.compare.plots import save
 from vid2ev.cost.plot import label, stairs
 from vid2ev.cost.table import columns
+from vid2ev.terminal import counted
 
 COLOURS = {
     "closed forms": "#1f77b4",
@@ -30,8 +31,8 @@ def table(found: Rebuilding) -> str:
         times = [f"{row.time(size):.3g}" for size in found.sizes]
         lines.append([mark, row.way.name, _figure(row.psnr, 2), _figure(row.ssim, 4), *times, _asked(row)])
     width, height = found.sizes[0]
-    threads = f"{found.threads} thread{'s' * (found.threads > 1)}"
-    said = f"{found.source}: {found.gaps} gaps, x{found.multiple}, scored at {width}x{height}; ms per frame, {threads}"
+    gaps, threads = counted(found.gaps, "gap"), counted(found.threads, "thread")
+    said = f"{found.source}: {gaps}, x{found.multiple}, scored at {width}x{height}; ms per frame, {threads}"
     took = best.time(found.sizes[0])
     recommended = f"as good as the best, and fastest: {best.way.name} ({best.way.asked}), {took:.3g} ms per frame"
     return "\n".join([said, "", *columns(lines), "", recommended])
@@ -68,7 +69,7 @@ def _frame(axes: Any, found: Rebuilding, rows: list[Row]) -> None:
     axes.set_xlim(0.7 * min(times), 3 * max(times))
     axes.margins(y=0.12)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.set_xlabel(f"ms per frame of {width}x{height} ({found.device}, {found.threads} threads)")
+    axes.set_xlabel(f"ms per frame of {width}x{height} ({found.device}, {counted(found.threads, 'thread')})")
     axes.set_ylabel("PSNR [dB]")
     axes.set_title(f"{Path(found.source).name}, x{found.multiple}", loc="left")
     axes.grid(alpha=0.25, which="major")

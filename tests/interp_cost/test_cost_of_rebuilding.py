@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -56,6 +58,8 @@ def test_the_scores_are_those_of_an_evaluation(quick: None, tmp_path: Path) -> N
         assert row.psnr == pytest.approx(np.mean([each.psnr for each in mine]), abs=1e-9)
         assert row.ssim == pytest.approx(np.mean([each.ssim for each in mine]), abs=1e-9)
     assert {row.way.name for row in found.rows} == QUICK and found.gaps == 2
+    for many, said in ((1, r": 1 gap, .*, 1 thread\n"), (2, r": 2 gaps, .*, 2 threads\n")):
+        assert re.search(said, table(replace(found, gaps=many, threads=many)))
 
 
 def test_times_are_those_of_the_clock_per_frame(quick: None) -> None:
