@@ -184,6 +184,17 @@ def test_a_last_event_at_the_beginning_of_the_clock_is_one() -> None:
     assert np.load("early.npz")["t"].tolist() == [-5, 0]
 
 
+@pytest.mark.parametrize("align", ["clock", "start"])
+@pytest.mark.parametrize("begin_us", [-(2**62) + 1, 2**62 - 10, 2_100_000_000_000_000_000])
+def test_times_of_which_differences_would_be_others_are_refused(begin_us: int, align: str) -> None:
+    """Pairs of events were sought beyond the memory."""
+    for name, shift_us in (("a", 0), ("b", 3)):
+        t = np.array([begin_us + shift_us, 2**62 - 1])
+        np.savez(f"{name}.npz", t=t, x=np.zeros(2, np.uint16), y=np.zeros(2, np.uint16), p=np.ones(2, np.uint8))
+    with pytest.raises(DataError, match=r"a\.npz: times beyond 63,000 years"):
+        compare_recordings("a.npz", "b.npz", align=align)
+
+
 def test_sensors_of_different_sizes_are_refused_but_not_a_file_that_does_not_say() -> None:
     events = busy(100, (10, 10))
     small, large = write(events, "small.h5", (10, 10)), write(events, "large.h5", (12, 10))

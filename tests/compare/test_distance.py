@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vid2ev.compare.by_pixel import by_pixel
-from vid2ev.compare.comparison import BINS, compare
+from vid2ev.compare.comparison import BINS, LATEST_US, compare
 from vid2ev.compare.distance import TAUS_US, normalised, squared_distances
 from vid2ev.stream.events import Events
 
@@ -33,6 +33,20 @@ def term_by_term(a: Events, b: Events, tau_us: float) -> float:
     near = np.exp(-np.abs(both.t[:, None] - both.t[None, :]) / tau_us)
     same = (both.x[:, None] == both.x[None, :]) & (both.y[:, None] == both.y[None, :])
     return 0.5 * float(weight @ (near * same) @ weight)
+
+
+@pytest.mark.parametrize("begin_us", [-LATEST_US, LATEST_US - 200_000])
+def test_it_does_not_matter_when_it_was(begin_us: int) -> None:
+    a, b = busy(60), busy(50, seed=1)
+    late_a, late_b = (events_of(side.t + begin_us, side.x, side.y, side.p) for side in (a, b))
+    at_0, then = compare(a, b, SIZE), compare(late_a, late_b, SIZE)
+    assert then.as_dict() | {"span_us": None} == at_0.as_dict() | {"span_us": None}
+    early = events_of([-LATEST_US], 1)
+    apart = compare(early, events_of([LATEST_US], 1), SIZE)
+    assert (apart.matched, apart.distance) == (0, 1.0)
+    for too_far in (-1 - LATEST_US, 1 + LATEST_US, 2**62, -(2**63), 2**63 - 1):
+        with pytest.raises(ValueError, match="expected times within"):
+            compare(early, events_of([too_far], 1), SIZE)
 
 
 @given(a=streams(), b=streams(), tau_us=st.sampled_from([1.0, 37.5, 1000.0, 1e6]))

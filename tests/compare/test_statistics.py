@@ -64,6 +64,14 @@ def test_blocks_may_be_cut_anywhere(events: Events, cuts: list[int]) -> None:
     assert alike(statistics_of(parts, SIZE), statistics_of([events], SIZE))
 
 
+@pytest.mark.parametrize("begin_us", [-(2**62), -(2**61), -(2**61) + 7, 2**61, 2**62 - 10**6])
+def test_it_does_not_matter_when_it_was(begin_us: int) -> None:
+    events = busy(60, SIZE)
+    at_0, then = (statistics_of([events_of(events.t + t, events.x, events.y, events.p)], SIZE) for t in (0, begin_us))
+    assert then.shortest_us == at_0.shortest_us and then.isolated == at_0.isolated
+    np.testing.assert_array_equal(then.intervals, at_0.intervals)
+
+
 def test_intervals_of_chance_are_exponential_as_far_as_they_fit() -> None:
     rate, seconds, size = 40.0, 0.5, (80, 60)
     found = statistics_of([poisson(rate, seconds, size)], size, (0, 500_000))

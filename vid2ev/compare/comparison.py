@@ -25,6 +25,7 @@ from vid2ev.compare.matching import WINDOW_US, match
 from vid2ev.stream.events import Events
 
 BINS = 100  # parts of the time for which the distance is kept
+LATEST_US = 2 * 10**18  # 63,000 years, nanoseconds since 1970 among them: of differences, twice as much fits in 64 bits
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,11 @@ def compare(
 ) -> Comparison:
     """Compare events with those of a reference, both in order of time, of a sensor of `size` (width, height).
 
-    Raises ValueError for events out of order of time or outside of the sensor.
+    Raises ValueError for events out of order of time, later or earlier than `LATEST_US` or outside of the sensor.
     """
     ends = [t for side in (events, reference) if len(side) for t in (int(side.t[0]), int(side.t[-1]))]
+    if max(map(abs, ends), default=0) > LATEST_US:
+        raise ValueError(f"events from {min(ends)} to {max(ends)} us: expected times within {LATEST_US} us")
     tally = Tally(size, (min(ends, default=0), max(ends, default=0)), taus_us=taus_us, window_us=window_us)
     rows = range(size[1])
     if any(len(side) and int(side.y.max()) >= size[1] for side in (events, reference)):

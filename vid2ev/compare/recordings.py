@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from vid2ev.compare.by_pixel import by_pixel
-from vid2ev.compare.comparison import Comparison, Tally
+from vid2ev.compare.comparison import LATEST_US, Comparison, Tally
 from vid2ev.compare.matching import WINDOW_US
 from vid2ev.compare.statistics import Statistics, statistics_of
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.stream.events import Events
@@ -125,6 +125,9 @@ def compare_recordings(
     if align == "start":
         begins_us, other_us = _beginnings((one, other), files)
         other = replace(other, shift_us=begins_us - other_us)
+    for side in (one, other):
+        if max(map(abs, side.ends_us)) > LATEST_US:
+            raise DataError(f"{side.path}: times beyond 63,000 years, which cannot be compared; the file is damaged")
     span_us = _common(one, other, files, window_us)
     tally = Tally(size, span_us, window_us=window_us)
     sides = one, other

@@ -36,7 +36,6 @@ PER_DECADE = 8
 DECADES = 10  # 10^10 us are 2.8 hours
 EDGES_US = np.unique(np.append(0, np.ceil(10 ** (np.arange(DECADES * PER_DECADE + 1) / PER_DECADE)))).astype(np.int64)
 BESIDE = 4  # what is remembered of the last event of a pixel: 1 OFF, 2 ON, and this if another is beside it
-_NEVER = np.int64(-(1 << 61))
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ class Gathering:
         width, height = size
         self._size, self._neighbour_us = size, neighbour_us
         self._counts = np.zeros((2, height, width), np.int64)
-        self._last_us = np.full((height, width), _NEVER)
+        self._last_us = np.zeros((height, width), np.int64)
         self._last_kind = np.zeros((height, width), np.uint8)
         self._intervals = np.zeros((2, len(EDGES_US) - 1), np.int64)
         self._isolated = np.zeros(2, np.int64)
@@ -210,7 +209,7 @@ def _gather(t, x, y, p, reach_us, edges, counts, last_us, last_kind, intervals, 
         beside = False
         for r in range(row - 1, row + 2):
             for c in range(column - 1, column + 2):
-                if 0 <= r < height and 0 <= c < width and now - last_us[r, c] <= reach_us:
+                if 0 <= r < height and 0 <= c < width and last_kind[r, c] and now - last_us[r, c] <= reach_us:
                     beside = True
                     last_kind[r, c] |= BESIDE
         last_us[row, column] = now
