@@ -71,6 +71,14 @@ def test_no_time_and_no_rate_is_refused() -> None:
         Clock().next(None)
 
 
+@pytest.mark.parametrize("second", [2**33, -(2**33), 2**60])
+def test_times_that_nothing_can_go_on_from_are_refused(second: int) -> None:
+    clock = Clock()
+    assert clock.next(Fraction(-(10**9))) == -(10**18)
+    with pytest.raises(DataError, match=r"frame 1 is at .* s, beyond 146 years; give --fps"):
+        clock.next(Fraction(second))
+
+
 def test_fps_overrules_stamps() -> None:
     clock = Clock(fps=Fraction(3))
     assert [clock.next(stamp) for stamp in (Fraction(9), None, Fraction(1))] == [0, 333333333, 666666667]

@@ -75,8 +75,10 @@ class Clock:
                 raise DataError(f"frame {self.frames} has no presentation time and the file no frame rate; give --fps")
             self.without_stamp += 1
             seconds = Fraction(0) if self._last_ns is None else self._last + 1 / self.rate
-        self.frames += 1
         t_ns = round_ns(seconds)
+        if abs(t_ns) > LONGEST_NS:
+            raise DataError(f"frame {self.frames} is at {float(seconds):.6g} s, beyond 146 years; give --fps")
+        self.frames += 1
         if self._last_ns is not None and t_ns <= self._last_ns:
             self.dropped += 1
             return None
