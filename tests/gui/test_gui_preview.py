@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import re
@@ -33,6 +34,7 @@ from vid2ev.gui.scene_light import coarse_first, grid_hz, ticks_of
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup, setup_of
 from vid2ev.gui.stand_in import LEAK, SLIGHT, Kernels, stand_ins, usual
+from vid2ev.gui.warming import _warm
 from vid2ev.gui.worker import Planner, Refused, Worker, _serve
 from vid2ev.rig.camera import default_rig
 from vid2ev.seen.instants import Instant, events_of
@@ -106,6 +108,17 @@ def test_what_compiles_for_later_ends_with_the_program_even_if_that_is_killed(tm
             return
         time.sleep(0.1)
     raise AssertionError("it is there after a minute")
+
+
+def test_what_compiles_for_later_does_so_where_no_process_can_be_nice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("os.nice")
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    for name, instead in (("_end_with_parent", lambda: None), ("usual", lambda: ["a spec"]), ("see_something", id)):
+        monkeypatch.setattr(f"vid2ev.gui.warming.{name}", instead)
+    monkeypatch.setattr("vid2ev.gui.warming.flags_of", lambda spec, _: spec)
+    ours, theirs = multiprocessing.Pipe()
+    _warm(theirs)
+    assert ours.recv() == "a spec"
 
 
 def test_light_is_made_again_only_where_something_changed_that_decides_it(setup: Setup) -> None:
