@@ -1,8 +1,9 @@
-"""What people ask for, in texts."""
+"""What people ask for, in texts and numbers."""
 
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -18,6 +19,15 @@ def number_of(text: str) -> float:
     text: also of those that Python takes, such as 1_0, inf, or one with blanks around it; and of what is too large."""
     number = float(text) if NUMBER.fullmatch(text) else math.nan
     return number if math.isfinite(number) else math.nan
+
+
+def is_whole(number: Any, least: int, most: int | None = None) -> bool:
+    """Whether a number is whole, and within these limits; true and false are no numbers."""
+    try:
+        whole = operator.index(number)
+    except TypeError:
+        return False
+    return not isinstance(number, bool) and least <= whole and (most is None or whole <= most)
 
 
 def names_in(texts: str | Sequence[str]) -> tuple[str, ...]:

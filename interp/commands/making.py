@@ -14,7 +14,6 @@ from vid2ev.commands import KEPT, NOT_KEPT, say_interrupted
 from vid2ev.commands.options import Finite, adding
 from vid2ev.errors import DataError, UsageError
 from vid2ev.interrupts import heard
-from vid2ev.recording.destination import partial_of
 from vid2ev.requests import number_of
 from vid2ev.terminal import bar_of
 
@@ -90,6 +89,8 @@ def contrast_of(text: str | None) -> tuple[float, float] | None:
 @contextmanager
 def kept(path: Path) -> Iterator[None]:
     """What goes wrong within, or asks to end, says so if it can be resumed."""
+    from vid2ev.recording.destination import partial_of
+
     done = partial_of(path) / "done.jsonl"
     try:
         with heard():

@@ -25,7 +25,7 @@ import numpy as np
 import torch
 
 from vid2ev.errors import UsageError
-from vid2ev.sensors.limits import is_whole
+from vid2ev.requests import is_whole
 
 Times = Literal["frames", "even"]
 Rounding = Literal["round", "truncate"]

@@ -39,7 +39,7 @@ from vid2ev.cluster.workers import Workers
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.recording.manifest import versions
-from vid2ev.sensors.limits import is_whole
+from vid2ev.requests import is_whole
 
 SUMMARY = "summary.json"
 FEWEST = 3  # frames of which one can be rebuilt

@@ -29,7 +29,7 @@ from vid2ev.formats import of_only_camera, open_events
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.pictures.film import SLOWEST_HZ, rate_of_film
 from vid2ev.recording.manifest import identity, machine, sha256, versions
-from vid2ev.sensors.limits import is_whole
+from vid2ev.requests import is_whole
 from vid2ev.views.slices import Count, Duration, Slicing
 from vid2ev.views.window import beginning_us, window
 

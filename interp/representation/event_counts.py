@@ -26,7 +26,7 @@ from interp.representation.bins import bin_weights
 from interp.representation.dead_time import DeadTime, look_back_us
 from interp.rows import by_rows
 from vid2ev.errors import UsageError
-from vid2ev.sensors.limits import is_whole
+from vid2ev.requests import is_whole
 
 if TYPE_CHECKING:
     from vid2ev import Events

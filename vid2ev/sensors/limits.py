@@ -7,6 +7,7 @@ from typing import Any
 
 from vid2ev.errors import UsageError
 from vid2ev.kernels.layout import PIXEL_LIMIT
+from vid2ev.requests import is_whole
 
 LONGEST_SIDE = 65535  # columns and rows of events are uint16
 
@@ -58,12 +59,3 @@ def time_ns(t_ns: Any, name: str = "frame time") -> int:
         return whole
     except (TypeError, ValueError, OverflowError) as error:
         raise UsageError(f"{name} {t_ns!r}: expected a whole number of nanoseconds, below 2**63") from error
-
-
-def is_whole(number: Any, least: int, most: int | None = None) -> bool:
-    """Whether a number is whole, and within these limits; true and false are no numbers."""
-    try:
-        whole = operator.index(number)
-    except TypeError:
-        return False
-    return not isinstance(number, bool) and least <= whole and (most is None or whole <= most)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from vid2ev.errors import UsageError
+from vid2ev.requests import is_whole
 from vid2ev.stream.frames import Frame
 from vid2ev.stream.upload import Upload
 from vid2ev.upsample.registered import other, others
@@ -71,9 +72,9 @@ def make_upsampler(
     found = None if method in METHODS else other(method)
     if method not in METHODS and found is None:
         raise UsageError(f"upsampling '{method}': expected one of {', '.join([*METHODS, *others()])}")
-    if subframes != "auto" and not (_is_whole(subframes) and 1 <= subframes <= MOST):
+    if subframes != "auto" and not is_whole(subframes, 1, MOST):
         raise UsageError(f"subframes {subframes}: expected a whole number from 1 to {MOST}, or auto")
-    if not (_is_whole(max_subframes) and 1 <= max_subframes <= MOST) or not threshold > 0:
+    if not is_whole(max_subframes, 1, MOST) or not threshold > 0:
         raise UsageError(
             f"max_subframes {max_subframes}, threshold {threshold}: expected a whole number from 1 to {MOST}, and more"
             " than 0"
@@ -92,7 +93,3 @@ def make_upsampler(
     from vid2ev.upsample.flow import FlowUpsampling
 
     return FlowUpsampling(subframes, max_subframes, threshold, upload)
-
-
-def _is_whole(number: object) -> bool:
-    return isinstance(number, int) and not isinstance(number, bool)
