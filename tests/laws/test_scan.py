@@ -84,3 +84,14 @@ def test_cold_pixels_send_nothing(spec):
     sent, cold = feed(dvs, t_ns, light), dvs.maps()["cold"]
     assert 0.4 < cold.mean() < 0.6 and len(sent) > 1000
     assert not cold[sent.y, sent.x].any()
+
+
+@pytest.mark.long
+def test_cold_pixels_send_nothing_of_a_leak_that_light_in_float32_has_no_room_for():
+    """Of 79 nats from frame to frame, by 1e6 times the light of white."""
+    spec = clean(leak_rate_hz=1e6, threshold_on=0.2, threshold_off=0.2, cold_probability=0.5)
+    light = np.full((3, 8, 8), 1e6, np.float32)
+    dvs = start(spec, light)
+    sent, cold = feed(dvs, [0, 395_000, 790_000], light), dvs.maps()["cold"]
+    assert np.count_nonzero(~cold) * 2 * 394 <= len(sent) <= np.count_nonzero(~cold) * 2 * 395
+    assert not cold[sent.y, sent.x].any()

@@ -18,7 +18,7 @@ from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.spec import DvsSpec
 
 F = np.float32
-STEEPEST_LEAK_NAT = 80.0  # between two frames, by which light in float32 may be multiplied
+STEEPEST_LEAK_NAT = 5.0  # by which light may be multiplied: the brightest, with the greatest gain, remains a float32
 UNUSED = 2  # (a single entry is never spread out)
 RECORDS: dict[str, tuple[type, tuple[int, ...]]] = {  # the planes that only the slow path touches
     "memory": (np.float64, ()),
@@ -171,7 +171,7 @@ def interval_of(
     weights = step_weights(dt, num.tau1_ns, num.tau2_ns)
     leak0 = num.leak_nat_per_ns * (t0_ns - leak_since_ns)
     leak1 = num.leak_nat_per_ns * (t1_ns - leak_since_ns)
-    # (beyond float32 every light is at the highest level)
+    # (beyond, every light is taken to be at the highest level)
     gain, shift = (math.exp(leak1), num.curve.dark * math.exp(leak1)) if leak1 < STEEPEST_LEAK_NAT else (0.0, HIGHEST)
     resolved = bool(flags.noise) and dt * RESOLVED <= num.tau2_ns
     noise = (0.0,) * 6
