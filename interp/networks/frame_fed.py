@@ -192,11 +192,18 @@ class FrameFed(nn.Module):
 
 
 def run(network: nn.Module, parts: Sequence[torch.Tensor]) -> torch.Tensor:
-    """A network's answer [B, N, c, H, W] float32 to parts [B, N, c_k, H, W], or [B, c_k, H, W] if alike for all N."""
+    """A network's answer [B, N, c, H, W] float32 to parts [B, N, c_k, H, W], or [B, c_k, H, W] if alike for all N.
+
+    Masks that are sure of themselves are beyond what float16 holds: then it is asked once more, in float32.
+    """
     targets = max(part.shape[1] for part in parts if part.ndim == 5)
     wide = [part if part.ndim == 5 else part[:, None].expand(-1, targets, -1, -1, -1) for part in parts]
     joined = torch.cat([part.float() for part in wide], 2)
-    return network(joined.flatten(0, 1)).float().unflatten(0, joined.shape[:2])
+    found = network(joined.flatten(0, 1))
+    if found.dtype == torch.float16 and not bool(torch.isfinite(found).all()):
+        with torch.autocast(joined.device.type, enabled=False):
+            found = network(joined.flatten(0, 1))
+    return found.float().unflatten(0, joined.shape[:2])
 
 
 def warped(pair: Pair, flows_at: torch.Tensor) -> torch.Tensor:

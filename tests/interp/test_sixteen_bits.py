@@ -63,6 +63,19 @@ def test_frames_in_16_bits_are_the_same_frames_in_32(name: str, colours: int, ki
     assert made.images.dtype == torch.float32 and torch.equal(made.images, expected.images)
 
 
+@pytest.mark.parametrize("name", ["rrin_events_guided", "rrin_events", "timelens"])
+def test_masks_that_are_sure_of_themselves_may_be_beyond_float16(name: str) -> None:
+    network, (first, second, events) = make(name, zero_heads=False).eval(), given("one event")
+    masks = network.get_submodule("attention" if name == "timelens" else "masks")
+    with torch.no_grad():
+        for part in (masks.down[0][0], masks.head):  # type: ignore[index, union-attr]
+            part.weight.mul_(1e4)  # type: ignore[union-attr, operator]
+        expected = network(first, second, [0.5], events).images
+        with torch.autocast("cpu", torch.float16):
+            made = network(first, second, [0.5], events).images
+    torch.testing.assert_close(made, expected, rtol=0, atol=0.1)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("name", ["e2vid", "firenet"])
