@@ -298,6 +298,13 @@ def test_gaps_of_two_lengths_have_chapters_of_their_own(tmp_path: Path) -> None:
     assert "## All methods, 3 frames skipped" in text and "## All methods, 7 frames skipped" in text
 
 
+def test_what_is_not_known_of_gaps_of_two_lengths_is_counted_in_both() -> None:
+    rows = [row(multiple=multiple, method=name, position=p) for multiple in (8, 4) for name in "ab" for p in (1, 2)]
+    said = markdown(document(rows, {}))
+    assert "| rebuilt, but without a PSNR | 8 |" in said
+    assert "the motion between the key frames is not known of 4 of 4 frames" in said
+
+
 def test_the_same_rows_make_the_same_bytes(tmp_path: Path, whole: tuple[str, str]) -> None:
     assert written(tmp_path, ROWS, ABOUT) == whole
 

@@ -141,8 +141,7 @@ def _drawn(svg: str | None, caption: str) -> list[Block]:
 
 def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
     left_out = dict(about.get("not_scored", {}))
-    unknown = len({(row.sequence, row.method, row.group, row.position) for row in rows if math.isnan(row.psnr)})
-    if unknown:
+    if unknown := sum(math.isnan(row.psnr) for row in rows):
         left_out["rebuilt, but without a PSNR"] = unknown
     blocks: list[Block] = []
     if left_out:
@@ -164,7 +163,7 @@ def _of_the_evaluation(rows: Sequence[Row], about: About) -> Iterator[Section]:
 
 
 def _unknown_motion(rows: Sequence[Row]) -> Iterator[str]:
-    frames = {(row.sequence, row.group, row.position): row.motion_px for row in rows}
+    frames = {(row.multiple, row.sequence, row.group, row.position): row.motion_px for row in rows}
     if unknown := sum(map(math.isnan, frames.values())):
         yield (
             f"the motion between the key frames is not known of {unknown} of {many(len(frames), 'frame')}, which are"
