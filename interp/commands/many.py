@@ -47,8 +47,8 @@ def places(sources: Sequence[str], folder: Path, named: Callable[[str], Path]) -
     found: dict[str, Path] = {}
     for source in dict.fromkeys(sources):
         name, number = named(source), 2
-        plain = name
+        plain, suffix = name, ".mp4" * (name.suffix == ".mp4")  # (of folders what is behind a dot is none)
         while folder / name in found.values():
-            name, number = plain.with_stem(f"{plain.stem}_{number}"), number + 1
+            name, number = plain.with_name(f"{plain.name.removesuffix(suffix)}_{number}{suffix}"), number + 1
         found[source] = folder / name
     return found

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from small_takes import images, moving, recording
 
 from interp.commands.interpolate import interpolate
-from interp.commands.many import sources_in
+from interp.commands.many import places, sources_in
 from vid2ev.errors import UsageError
 
 
@@ -66,6 +66,15 @@ def test_many_are_made_in_turn_or_shared_out_to_the_same_bytes() -> None:
     assert run("films", "-o", "two").exit_code == 2
     result = run("films", "-o", "two", "--resume")
     assert result.exit_code == 0 and "2 of 2 done" in result.output and "5 frames" in result.output
+
+
+@pytest.mark.parametrize("name", ["v1.2_x8", "clip_x2.5", "clip_x2"])
+def test_of_sources_of_one_name_the_second_has_a_number_behind_it(name: str) -> None:
+    for suffix in ("", ".mp4"):
+        found = places(["a", "b", "a", "c"], Path("out"), lambda _, made=f"{name}{suffix}": Path(made))  # type: ignore[misc]
+        assert found == {
+            source: Path("out") / f"{name}{number}{suffix}" for source, number in (("a", ""), ("b", "_2"), ("c", "_3"))
+        }
 
 
 def test_where_none_can_be_made_nothing_appears() -> None:
