@@ -45,7 +45,7 @@ def reformat(
     target           the file to make; DAT makes more of them where one cannot hold the times.  Those of a recording
                      that is replaced go with it
     name             of the format; by default what the suffix of target says
-    start_s, stop_s  the part to take [s after the beginning]
+    start_s, stop_s  the part to take [s after the beginning, see `window.beginning_us`]
     report           called with the recording and the number of events done
 
     Returns what was made, ready for JSON.  Raises UsageError for what a format cannot hold and for a target that is

@@ -45,7 +45,10 @@ EVENTS = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} events, {rate_fmt}, {elap
     output="What to make.  [default: NAME_seen.mp4 here]",
     play="Pictures per second of the film.  [default: real time; 30 with N events]",
 )
-@click.option("--start", "start_s", type=Finite(), metavar="S", help="Begin S seconds after the beginning.")
+@click.option(
+    "--start", "start_s", type=Finite(), metavar="S",
+    help="Begin S seconds after the beginning: from when the file counts, or its first event if that is long after.",
+)  # fmt: skip
 @click.option("--stop", "stop_s", type=Finite(), metavar="S", help="End S seconds after the beginning.")
 @event_options(contrast="0.15")
 @device_option

@@ -16,7 +16,10 @@ from vid2ev.interrupts import heard
 @click.argument("source", metavar="IN")
 @click.argument("target", metavar="OUT", type=Path)
 @click.option("--format", "name", metavar="NAME", help="Format of OUT.  [default: what its suffix says]")
-@click.option("--start", "start_s", type=SECONDS, metavar="S", help="Begin S seconds after the beginning.")
+@click.option(
+    "--start", "start_s", type=SECONDS, metavar="S",
+    help="Begin S seconds after the beginning: from when the file counts, or its first event if that is long after.",
+)  # fmt: skip
 @click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds after the beginning.")
 @click.option("--overwrite", is_flag=True, help="Replace what is there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")

@@ -45,7 +45,10 @@ from vid2ev.interrupts import heard
     metavar="FACTOR",
     help="Of the film against reality; 0.1 is slow motion.  [default: 1]",
 )
-@click.option("--start", "start_s", type=SECONDS, metavar="S", help="Begin S seconds after the beginning.")
+@click.option(
+    "--start", "start_s", type=SECONDS, metavar="S",
+    help="Begin S seconds after the beginning: from when the file counts, or its first event if that is long after.",
+)  # fmt: skip
 @click.option("--stop", "stop_s", type=SECONDS, metavar="S", help="End S seconds after the beginning.")
 @click.option(
     "--size",

@@ -1,4 +1,5 @@
-"""Compiles what stands in for the usual sensors (`gui.stand_in`), at the lowest priority, while a page is open.
+"""Compiles what stands in for the usual sensors (`gui.stand_in`) while a page is open, at the lowest priority where a
+process can lower its own.
 
 What is compiled stays on disk: after the first time, this takes seconds.
 """
@@ -66,7 +67,8 @@ def _warm(pipe: Connection) -> None:
     """Compile the usual sensors."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
-    os.nice(19)
+    if hasattr(os, "nice"):  # (Windows has none)
+        os.nice(19)
     for spec in usual():
         see_something(spec)
         try:
