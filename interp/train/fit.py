@@ -27,6 +27,7 @@ from interp.train.schedule import Schedule, Steps
 from interp.train.scores import Scores
 from interp.train.session import Limits, Session, validate_every
 from vid2ev.errors import DataError, Vid2evError
+from vid2ev.recording.manifest import as_stated
 
 LOG_EVERY = 10  # steps
 Stop = Callable[[], bool]
@@ -78,7 +79,7 @@ class Fit:
     def run(self) -> Outcome:
         """Train.  Raises DataError where training does not get on, or a file does not hold what it should."""
         with unmentioned(), self._threads():
-            step = read_checkpoint(self.folder.checkpoint)["global_step"] if self.folder.checkpoint.exists() else 0
+            step = self._stands_at()
             steps = self._given()
             self._take_up(steps)
             trainer = self._trainer(step, steps)
@@ -86,6 +87,22 @@ class Fit:
             with made_by_workers():
                 trainer.fit(self.learner, self.feed, ckpt_path=self.folder.checkpoint if step else None)
             return self._outcome(trainer)
+
+    def _stands_at(self) -> int:
+        """The step that it goes on from.  Raises DataError for a checkpoint of another network, or damaged."""
+        path = self.folder.checkpoint
+        if not path.exists():
+            return 0
+        found = read_checkpoint(path)
+        with as_stated(path):
+            said, own = (
+                {name: tuple(each.shape) for name, each in one.items()}
+                for one in (found["state_dict"], self.learner.state_dict())
+            )
+            self.learner.on_load_checkpoint(found)
+        if said != own:
+            raise DataError(f"{path} is of another network; copy the run again, or start another with -o")
+        return int(found["global_step"])
 
     @contextmanager
     def _threads(self) -> Iterator[None]:

@@ -90,6 +90,24 @@ def test_a_torn_checkpoint_is_refused_in_a_sentence(tmp_path: Path) -> None:
         read_checkpoint(path)
 
 
+def test_a_checkpoint_of_another_run_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    assert session(tmp_path / "run", stop=lambda: True).step == 1
+    path = tmp_path / "run" / "checkpoint.ckpt"
+    found = torch.load(path, weights_only=True)
+    weights = dict(found["state_dict"])
+    name = next(iter(weights))
+    for changed, said in (
+        ({"state_dict": weights | {name: weights[name][None]}}, "is of another network"),
+        ({"state_dict": weights | {"more": weights[name]}}, "is of another network"),
+        ({"state_dict": weights | {name: 3}}, "does not say what it should"),
+        ({"best": [1, {"scenes": {"psnr": 30.0}}]}, "does not say what it should"),
+    ):
+        torch.save(found | changed, path)
+        with pytest.raises(DataError, match=rf"checkpoint\.ckpt {said}") as error:
+            session(tmp_path / "run", resume=True)
+        assert "\n" not in str(error.value)
+
+
 def test_a_run_keeps_all_that_it_has_to_show(tmp_path: Path) -> None:
     done = session(tmp_path / "run")
     assert done.scores["scenes"].keys() == {"network", *METHODS}
