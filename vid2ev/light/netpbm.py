@@ -1,7 +1,7 @@
-"""Codes of Netpbm's pictures: which of them is white, and PAM, which OpenCV reads wrongly.
+"""Codes of Netpbm's pictures: which of them is white, and those that OpenCV reads wrongly.
 
-OpenCV leaves the codes of P5, P6 and of 16 bits as they stand, whatever their header says is white; it scales those of
-P2 and P3 that fit into 8 bits.  Of a PAM it takes red for blue, and memory that nobody wrote for what has transparency.
+OpenCV leaves the codes of P5 and P6 as they stand, whatever their header says is white; it scales those of P2 and P3
+that fit into 8 bits, depth too.  Of a PAM it takes red for blue, and memory that nobody wrote where it is transparent.
 
 Source: netpbm, "PGM", "PPM" and "PAM" formats.
 """
@@ -16,35 +16,42 @@ import numpy as np
 from vid2ev.light.recognise import head_of
 from vid2ev.untrusted import check_bytes
 
-AS_STORED = (b"P5", b"P6", b"P7")
-WITH_WHITE = (b"P2", b"P3", *AS_STORED)
-PAM, END = b"P7", b"ENDHDR\n"
+TEXT, PAM, END = (b"P2", b"P3"), b"P7", b"ENDHDR\n"
+WITH_WHITE = (*TEXT, b"P5", b"P6", PAM)
 
 
 def white_in(path: Path) -> int | None:
     """The code that is white, where it is not the largest of 8 or 16 bits: 1023 as FFmpeg writes 10 of them, 100 or
-    anything else.  None for all others, and where OpenCV has scaled them."""
+    anything else.  None for all others."""
     head = head_of(path)
     words = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
     said = _pam(head).get(b"MAXVAL", b"") if head.startswith(PAM) else words[3] if len(words) > 3 else b""
     most = int(said) if head.startswith(WITH_WHITE) and said.isdigit() and len(said) < 6 else 0
-    held = 16 if most > 255 else 8
-    as_stored = held == 16 or head.startswith(AS_STORED)
-    return most if 0 < most < 2**held - 1 and as_stored else None
+    return most if 0 < most < (2**16 if most > 255 else 2**8) - 1 else None
 
 
-def pnm_of_pam(path: Path) -> bytes:
-    """A PNM of the same codes, without transparency.  Raises ValueError, KeyError for what is no PAM, DataError for one
-    that is larger than a file may be in memory."""
+def plain_pnm(path: Path) -> bytes:
+    """A PNM of bytes of the same codes as a PAM's or a text's, without transparency.  Raises ValueError, KeyError for
+    what is neither, DataError for one that is larger than a file may be in memory."""
     check_bytes(path, path.stat().st_size)
-    head, _, raster = path.read_bytes().partition(END)
-    said = _pam(head)
-    width, height, depth, most = (int(said[name]) for name in (b"WIDTH", b"HEIGHT", b"DEPTH", b"MAXVAL"))
+    content = path.read_bytes()
+    if content.startswith(PAM):
+        head, _, raster = content.partition(END)
+        said = _pam(head)
+        width, height, depth, most = (int(said[name]) for name in (b"WIDTH", b"HEIGHT", b"DEPTH", b"MAXVAL"))
+    else:
+        kind, *numbers, raster = re.sub(rb"#[^\n]*", b" ", content).split(maxsplit=4)
+        (width, height, most), depth = map(int, numbers), 1 if kind == b"P2" else 3
     if not 1 <= depth <= 4 or not 0 < most < 2**16:
         raise ValueError(f"{depth} channels, of which {most} is white")
-    codes = np.frombuffer(raster, ">u2" if most > 255 else "u1", width * height * depth).reshape(-1, depth)
+    dtype, count = np.dtype(">u2" if most > 255 else "u1"), width * height * depth
+    if content.startswith(PAM):
+        codes = np.frombuffer(raster, dtype, count)
+    else:
+        codes = np.array(raster.split()[:count], "S9").astype(np.int64).clip(0, np.iinfo(dtype).max).astype(dtype)
+    codes = codes.reshape(height, width, depth)
     kind, channels = (b"P5", 1) if depth < 3 else (b"P6", 3)
-    return b"%b %d %d %d\n" % (kind, width, height, most) + codes[:, :channels].tobytes()
+    return b"%b %d %d %d\n" % (kind, width, height, most) + codes[..., :channels].tobytes()
 
 
 def _pam(head: bytes) -> dict[bytes, bytes]:

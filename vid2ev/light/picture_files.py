@@ -1,9 +1,9 @@
 """Files of pictures: pixels, and which colours red, green and blue are in them.
 
-OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says; a PAM
-it is given as a PNM (`netpbm`).  The package OpenEXR reads EXR.  A PNG says what its codes stand for (`png_tags`).
-Transparency is left out.  Of an EXR with several parts or layers the first with colour counts: R, G, B or else Y.  Its
-data window is set into its display window, black around, and its chromaticities hold.
+OpenCV reads PNG, JPEG, TIFF, BMP, PNM, PFM, WebP, JPEG 2000 and Radiance HDR, and turns them as their EXIF says; PAM
+and PNM of text it is given as PNM of bytes (`netpbm`).  The package OpenEXR reads EXR.  A PNG says what its codes stand
+for (`png_tags`).  Transparency is left out.  Of an EXR with several parts or layers the first with colour counts: R, G,
+B or else Y.  Its data window is set into its display window, black around, and its chromaticities hold.
 
 Sources: OpenEXR, "Technical introduction" (windows, layers, standard attributes); Exif 2.32 tag 0x0112.
 """
@@ -19,7 +19,7 @@ import numpy as np
 
 from vid2ev.errors import DataError
 from vid2ev.light.icc import profile_name, remarks_on_profile
-from vid2ev.light.netpbm import PAM, pnm_of_pam
+from vid2ev.light.netpbm import PAM, TEXT, plain_pnm
 from vid2ev.light.pictures import TYPES
 from vid2ev.light.png_tags import png_tags, remarks_on_png
 from vid2ev.light.primaries import Primaries, primaries_at
@@ -103,10 +103,10 @@ def decoded(path: Path, flags: int, page: int = 0, count: int = 1) -> list[np.nd
         with _silent_decoders(), plain_name(path) as name:
             if head.startswith(TIFF):  # (imread gives up on pages that are to be turned)
                 return list(cv2.imreadmulti(name, page, count, flags=flags)[1])
-            pam = head.startswith(PAM)
-            one = cv2.imdecode(np.frombuffer(pnm_of_pam(path), np.uint8), flags) if pam else cv2.imread(name, flags)
+            anew = head.startswith((*TEXT, PAM))
+            one = cv2.imdecode(np.frombuffer(plain_pnm(path), np.uint8), flags) if anew else cv2.imread(name, flags)
             return [] if one is None else [one]
-    except (cv2.error, ValueError, KeyError) as error:
+    except (cv2.error, ValueError, KeyError, OverflowError) as error:
         if "MAX_IMAGE" not in str(error):
             return []
         raise DataError(
