@@ -168,6 +168,11 @@ def test_other_pixels_change_nothing(spec):
     assert_same(one, of_the_kept(play(spec, t_ns, wild, seed=3)))
 
 
+def test_nor_do_they_count_to_the_crossings_that_are_solved_of_a_pixel():
+    """Also where its signal turns: each stretch has as many, whatever others had in the one before."""
+    test_other_pixels_change_nothing(DvsSpec(max_crossings=60))
+
+
 def test_a_clean_pixel_alone_sends_what_it_sends_among_others():
     t_ns, light = clip()
     spec = clean(photoreceptor_tau_us=300, follower_tau_us=100)
