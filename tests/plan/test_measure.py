@@ -165,6 +165,16 @@ def test_what_is_sent_at_least_is_that_of_the_signal_behind_the_poles(more: dict
     assert 0.5 * len(sent(spec, SIZE, frames)) < found < len(sent(spec, SIZE, frames)) < 0.5 * most
 
 
+@pytest.mark.parametrize("way", ["before", "after"])
+@pytest.mark.parametrize("tau_us", [1e8, 1e9, 1e12])
+def test_of_poles_much_slower_than_the_clip_hardly_anything_is_sent_at_least(way: str, tau_us: float) -> None:
+    """However fast light changes: what rounding leaves of steep slopes is no signal."""
+    spec = clean(filter=way, random_phase=True, photoreceptor_tau_us=tau_us)
+    texture = np.exp(np.random.default_rng(0).normal(-1.5, 1, SIZE[::-1])).astype(np.float32)
+    frames = [Frame(np.roll(texture, k, 1), k * 1_000_000) for k in range(100)]
+    assert crossings(scene_of(spec, SIZE, frames)) < 1e-4 * scene_of(spec, SIZE, frames).events
+
+
 def test_times_are_those_since_a_shot_began() -> None:
     """Light rises in two intervals of a shot, and the one after a cut; the ends of shots are turns, too."""
     levels = [0.0, 0.0, 1.0, 1.0, 0.0, 2.0]

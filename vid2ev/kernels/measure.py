@@ -44,6 +44,7 @@ from vid2ev.kernels.measured import (
     WAY,
     WIDE,
     first_tau,
+    gone_of,
     left_of,
 )
 from vid2ev.kernels.play import follow
@@ -174,7 +175,7 @@ def look(own, scratch, flagged, halves, n, curve, num):
     before_log, rate, kept = num.before_log, F(1.0) / F(num.dt_s), F(num.kept)
     tau2, longest_back, longest_ahead = F(num.tau2_s), F(num.before_s), F(num.dt_s)
     slow, traced = F(num.tau1_s), left_of(longest_ahead, F(num.tau_s))
-    keep1, keep2 = left_of(longest_ahead, slow), left_of(longest_ahead, tau2)
+    gone1, keep2 = gone_of(longest_ahead, slow), left_of(longest_ahead, tau2)
     for i in range(n):
         seen, old, slope0 = scratch[SEEN + i], own[LIGHT * PITCH + i], own[SLOPE * PITCH + i]
         level, level0 = log_level_32(seen, curve), own[LEVEL * PITCH + i]
@@ -186,7 +187,7 @@ def look(own, scratch, flagged, halves, n, curve, num):
             speed = abs(slope)
         if len(num.by_light):
             slow = first_tau(dimmer, num)
-            keep1 = left_of(longest_ahead, slow)
+            gone1 = gone_of(longest_ahead, slow)
         back, ahead = min(slow + tau2, longest_back), min(F(4.0) * (slow + tau2), longest_ahead)
         near = max(min(old, min(old - slope0 * back, old + slope * ahead)), F(0.0))
         per = F(1.0) / light_per_nat_32(near, curve) if before_log else F(1.0)
@@ -194,9 +195,11 @@ def look(own, scratch, flagged, halves, n, curve, num):
         turned = min(bend, ROUNDED * np.sqrt(abs(slope * slope0)) * per)
         smooth, play, half = own[SMOOTH * PITCH + i], own[PLAY * PITCH + i], halves[i]
         own[LIGHT * PITCH + i], own[SLOPE * PITCH + i] = seen, slope
+        keep1 = F(1.0) - gone1
         own[BENDS * PITCH + i] = (bends + ROUNDED * bend) * max(keep1, keep2)
-        ahead, late = (seen if before_log else level) - slope * slow, slow * slope - (old if before_log else level0)
-        own[BEHIND * PITCH + i] = ahead + (own[BEHIND * PITCH + i] + late) * keep1
+        # (by the lag: of a slow pole it is little beside its slope, and what rounding left of that would add up)
+        lag = (old if before_log else level0) - own[BEHIND * PITCH + i]
+        own[BEHIND * PITCH + i] = (seen if before_log else level) - (lag * keep1 + slope * (slow * gone1))
         own[SMOOTH * PITCH + i] = slope + (smooth - slope) * kept
         own[LEVEL * PITCH + i], scratch[BEFORE + i], scratch[BENT + i] = level, level0, bend
         scratch[UNBENT + i] = abs(slope0) * per

@@ -36,9 +36,15 @@ PER_MS, PER_MS2 = F(1e-3), F(1e-6)  # of 1/s and 1/s^2, so that sums are within 
 
 
 @inner
+def gone_of(dt_s, tau_s):
+    """What is gone of an exponential after a time; all if it has no time constant."""
+    return -expm1_32(-dt_s / tau_s) if tau_s > F(0.0) else F(1.0)
+
+
+@inner
 def left_of(dt_s, tau_s):
-    """What is left of an exponential after a time; nothing if it has no time constant."""
-    return F(1.0) + expm1_32(-dt_s / tau_s) if tau_s > F(0.0) else F(0.0)
+    """What is left of it."""
+    return F(1.0) - gone_of(dt_s, tau_s)
 
 
 @inner
