@@ -409,6 +409,20 @@ def held(spec: DvsSpec, size: tuple[int, int], frames: list[Frame], *effects: st
         assert 0 < changed <= said.distance, effect
 
 
+@pytest.mark.parametrize("cut", [None, 2])
+def test_what_a_shading_has_set_apart_by_the_end_of_a_shot_stays_so(cut: int | None) -> None:
+    """Of light that goes one way no pixel turns before."""
+    texture = np.exp(np.random.default_rng(91).normal(-1.5, 1, (32, 48)))
+    levels = [0.0, -0.1, -0.2] if cut is None else [0.0, -0.1, 1.0, 0.9]
+    frames = [
+        Frame((texture * math.exp(level)).astype(np.float32), 80_000 * k, cut=k == cut)
+        for k, level in enumerate(levels)
+    ]
+    thresholds = {"threshold_on": 0.09, "threshold_off": 0.09 if cut else 0.14}
+    spec = clean(shading=(-0.3, -0.2, 0.1), dark_level=0.08, random_phase=True, **thresholds)
+    held(spec, (48, 32), frames, "shading")
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("more", [{"mismatch": 0.015}, {"crossing_noise": 0.01}, {"threshold_off": 0.2}])
 def test_what_trembling_light_has_brought_to_rest_is_not_counted_on(more: dict) -> None:

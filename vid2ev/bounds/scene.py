@@ -161,7 +161,7 @@ class Scene:
                               that counts by its sum at turns; and of the turns themselves
     by_strays ...             the same by the root of the sum of bend^2 x slope / threshold [nat/ms^1.5]
     bare_apart, bare_frozen   [tiles] of light without the lens shading: |p_a - p_b| over the time that either is pushed
-                              [nat s], and where either turns [nat]
+                              [nat s], and at turns and ends of either [nat]
     bare_travel               [tiles] its travel
     by_bare                   the travel that counts, by the sum of |p_a - p_b| at turns before it
     moving                    how many pixels have any travel

@@ -5,8 +5,8 @@ instant (`vid2ev.bounds.scene`):
 
     E |N_a - N_b| <= |p_a - p_b| / theta
 
-It costs while either is pushed, and once at every turn of either.  Within an interval |p_a - p_b| is no more than at
-its begin or than the signals differ by at its ends, as light goes one way.
+It costs while either is pushed, once at every turn of either, and at the end.  Within an interval |p_a - p_b| is no
+more than at its begin or than the signals differ by at its ends, as light goes one way.
 """
 
 from __future__ import annotations
@@ -106,10 +106,10 @@ def compare(count, hits, num, own, other, scratch, lanes, tile, spread):
         pushed, way = F(level - half > play) - F(level + half < play), own[WAY * PITCH + i]
         way0, shaded_way0 = other[BARE_WAY * PITCH + i], other[SHADED_WAY * PITCH + i]
         shaded_play0, shaded_play = other[SHADED_PLAY * PITCH + i], own[PLAY * PITCH + i]
-        apart0 = abs(shaded_play0 - (play - offset))
+        apart0 = apart_before(i, other)
         turns = F((way0 != F(0.0)) & (pushed != way0)) + F((shaded_way0 != F(0.0)) & (way != shaded_way0))
         if turns != F(0.0):
-            here = weight * turns * levels(apart0 + other[STIRRED * PITCH + i], half)
+            here = weight * turns * frozen_at(i, half, other)
             frozen += here
             other[AT_TURNS * PITCH + i] += here
         other[BARE_WAY * PITCH + i], other[SHADED_WAY * PITCH + i] = pushed, way
@@ -136,6 +136,29 @@ def compare(count, hits, num, own, other, scratch, lanes, tile, spread):
     tile[FROZEN] += frozen
     tile[BARE_TRAVEL] += travelled
     tile[APART_S] += num.dt_s * apart_s
+
+
+@compiled
+def end_bare(num, bare):
+    """The end of a shot is a turn of what is pushed: one of both, as they end together."""
+    for k in range(len(bare.tiles)):
+        other = bare.state[k * BARE_PLANES * PITCH : (k + 1) * BARE_PLANES * PITCH]
+        for i in range(BLOCK):
+            if (other[BARE_WAY * PITCH + i] != F(0.0)) | (other[SHADED_WAY * PITCH + i] != F(0.0)):
+                half = num.halves[i]
+                bare.tiles[k, FROZEN] += F(num.half) / half * frozen_at(i, half, other)
+
+
+@inner
+def apart_before(i, other):
+    """How far the two plays of a pixel are apart [nat]."""
+    return abs(other[SHADED_PLAY * PITCH + i] - (other[BARE_PLAY * PITCH + i] - other[OFFSET * PITCH + i]))
+
+
+@inner
+def frozen_at(i, half, other):
+    """What it costs that a pixel turns where its two signals are."""
+    return levels(apart_before(i, other) + other[STIRRED * PITCH + i], half)
 
 
 @inner

@@ -11,7 +11,7 @@ from vid2ev.errors import UsageError
 from vid2ev.kernels.calm import STRIPS
 from vid2ev.kernels.layout import BLOCK, PITCH
 from vid2ev.kernels.measure import LEAST, Pace, Seen, measure_blocks, settle_measure
-from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare
+from vid2ev.kernels.measure_bare import BARE_FIGURES, BARE_PLANES, Bare, end_bare
 from vid2ev.kernels.measured import (
     BY_ALL,
     BY_JUMPS,
@@ -92,7 +92,7 @@ class Measure:
             raise UsageError(f"frame time {frame.t_ns} ns after {self._t_ns} ns: expected a later one; sort the frames")
         light = np.ascontiguousarray(frame.light, np.float32).reshape(-1)
         if self._t_ns is None or frame.cut:
-            self._when = self._end(self._found.tiles, self._found.spread)
+            self._when = self._end(self._found)
             below = self._wide if self.spec.random_phase else 0.0
             settle_measure(
                 light, self._shade, self._curve, self._halves, below, self.spec.filter == "before", self._found
@@ -112,9 +112,9 @@ class Measure:
 
     def scene(self) -> Scene:
         """What was seen so far."""
-        travel, tiles, spread = self._plane(TRAVEL), self._found.tiles.copy(), self._found.spread.copy()
-        when_s = (self._end(tiles, spread) / np.maximum(tiles[:, TIMED], 1e-300)).T
-        bare = self._found.bare[0] if self._found.bare else _bare(len(travel), planes=0)
+        travel, found = self._plane(TRAVEL), _with_own_sums(self._found)
+        when_s = (self._end(found) / np.maximum(found.tiles[:, TIMED], 1e-300)).T
+        bare = found.bare[0] if found.bare else _bare(len(travel), planes=0)
         return Scene(
             size=self.size,
             frames=self._frames,
@@ -126,19 +126,21 @@ class Measure:
             moving=int(np.count_nonzero(travel)),
             busiest=float(travel.max()),
             by_pixel=_by_events(travel.ravel(), 2 * self._half),
-            **dict(zip(SPREAD, _spread(spread, len(SPREAD)), strict=True)),
+            **dict(zip(SPREAD, _spread(found.spread, len(SPREAD)), strict=True)),
             brightness=self._brightness.copy(),
-            **dict(zip(OF_TILES, tiles.T.copy(), strict=True)),
-            **dict(zip(OF_BARE, bare.tiles.T.copy(), strict=True)),
+            **dict(zip(OF_TILES, found.tiles.T, strict=True)),
+            **dict(zip(OF_BARE, bare.tiles.T, strict=True)),
             by_bare=_spread(bare.spread, 1)[0],
         )
 
-    def _end(self, tiles: np.ndarray, spread: np.ndarray) -> np.ndarray:
-        """Add the end of a shot to the sums; returns those of figures and times."""
-        before = tiles[:, TIMED]
+    def _end(self, found: Seen) -> np.ndarray:
+        """Add the end of a shot to the sums of what was found; returns those of figures and times."""
+        before = found.tiles[:, TIMED]
         if self._pace is not None:
-            end_measure(self._pace, self._found.state, tiles, spread)
-        return self._when + self._timed(tiles, before)
+            end_measure(self._pace, found.state, found.tiles, found.spread)
+            for bare in found.bare:
+                end_bare(self._pace, bare)
+        return self._when + self._timed(found.tiles, before)
 
     def _timed(self, tiles: np.ndarray, before: np.ndarray) -> np.ndarray:
         """What came to figures since then, times the time since the shot began."""
@@ -186,6 +188,12 @@ def _bare(blocks: int, planes: int = BARE_PLANES) -> Bare:
     """Nothing found yet beside a shading."""
     state = np.zeros(blocks * planes * PITCH, np.float32)
     return Bare(state, np.zeros((blocks, BARE_FIGURES)), np.zeros((blocks, 1, QUARTERS, 2)))
+
+
+def _with_own_sums(found: Seen) -> Seen:
+    """The same, with copies of the sums."""
+    bare = tuple(each._replace(tiles=each.tiles.copy()) for each in found.bare)
+    return found._replace(tiles=found.tiles.copy(), spread=found.spread.copy(), bare=bare)
 
 
 def _spread(found: np.ndarray, count: int) -> np.ndarray:
