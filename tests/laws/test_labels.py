@@ -88,3 +88,15 @@ def test_no_events_are_labelled_too(rate_hz):
     dvs = Dvs(clean(frame_rate_hz=rate_hz), (3, 2), labels=True)
     still = [dvs.step(np.ones((2, 3), np.float32), k * 1_000_000) for k in range(3)]
     assert all(events.label is not None for events in [*still, dvs.flush(), dvs.flush()])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("timing", ["response", "linear"])
+def test_what_leaks_in_a_blind_time_is_gone_when_the_memory_jumps_to_the_signal(timing):
+    """A leak of a threshold a second, and 0.9 s in which the pixel is blind: 10 ms later light is the cause."""
+    blind = {"refractory": "track", "refractory_us": 900_000}
+    spec = clean(photoreceptor_tau_us=300, leak_rate_hz=1, threshold_on=0.2, threshold_off=0.2, timing=timing, **blind)
+    light = np.array([1, 1, 1.4, 1.4, 1.4, 2], np.float32)[:, None, None]
+    t_ns = [0, 10_000_000, 20_000_000, 920_000_000, 921_000_000, 931_000_000]
+    sent = play(spec, t_ns, light, labels=True)
+    assert sent.p.tolist() == [1, 1] and sent.label.tolist() == [Label.SIGNAL, Label.SIGNAL]

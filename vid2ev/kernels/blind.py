@@ -35,6 +35,13 @@ def blind_until(pixel, planes, num, iv):
 
 
 @inner
+def note_jump(pixel, planes, flags, num):
+    """The leak begins anew where the memory of a pixel jumps to the signal, as its blind time ends."""
+    if len(flags.labels) and len(flags.leak):
+        planes.t_reset[pixel] = planes.t_last[pixel] + num.refractory_ns
+
+
+@inner
 def stay_blind(pixel, planes, flags):
     """Levels of a pixel that is blind at the end of an interval: it is looked at in every one until they are known."""
     at = place_of(pixel, stride_of(flags))
@@ -86,6 +93,7 @@ def see(work, some, b, planes, flags, num):
         y = response_at(lanes, j, s, b)
         lanes[AT + j] = seen_at(lanes, j, y, s, flags, num)
         lanes[S0 + j], lanes[F0 + j] = s, y
+        note_jump(work.pixels[j], planes, flags, num)
     fresh_thresholds(lanes, work.pixels, who, some, planes, flags, num)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
-from vid2ev.kernels.blind import blind_until, stay_blind
+from vid2ev.kernels.blind import blind_until, note_jump, stay_blind
 from vid2ev.kernels.crossing import (
     AT,
     HOT,
@@ -117,6 +117,7 @@ def walk_pixel(
         s, begin = stop, end
         if stop == blind_s:
             pixels[0], lanes[AT] = pixel, end
+            note_jump(pixel, planes, flags, num)
             fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)
             leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
