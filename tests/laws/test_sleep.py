@@ -312,6 +312,13 @@ def test_an_interval_too_short_for_a_lag_to_move_does_not_end_the_making_up():
     assert_alike(spec, light, np.cumsum(dt_ns))
 
 
+def test_of_a_lag_that_a_flash_has_left_below_all_float32_not_the_sign_is_left_either():
+    light = np.full((8, *SIZE[::-1]), 0.001, np.float32)
+    light[0] = 1000.0
+    t_ns = np.cumsum([0, 10_000, 10_000, 20_000_000, *[1_000_000] * 4])
+    assert_alike(clean(photoreceptor_tau_us=100.0, follower_tau_us=30.0), light, t_ns)
+
+
 def test_strips_that_change_now_and_then_are_asked_as_often_as_it_pays():
     """Where frames say nothing, ever more rarely while they change; of those that do every word is heard."""
     light = np.full((18, *SIZE[::-1]), 0.5, np.float32)

@@ -35,6 +35,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.compiling.intrinsics import bits_32
 from vid2ev.kernels.crossing import least_threshold
 from vid2ev.kernels.forced import place_of_candidate
 from vid2ev.kernels.layout import BLOCK, HIGH, INPUT, LAG1, LAG2, LOW, PITCH, STRIP, last_light
@@ -166,7 +167,7 @@ def sleep_of(block, scratch, pixel, n, theta, flags, num, iv):
         if (poles > 0) & (len(flags.log_input) == 0):  # nor will it ever have to be refined
             quiet = quiet & (lag + SLACK * lag <= F(STEEP) * (bottom + floor))
         restless = np.int32(restless + np.int32(quiet == False))  # noqa: E712 (vectorises, `not` does not)
-        moving = np.int32(moving + np.int32(lag != F(0.0)))
+        moving = np.int32(moving + np.int32(is_moving(block, i, flags)))
     if restless > 0:
         return AWAKE, -np.inf, 0
     until = np.inf
@@ -176,6 +177,15 @@ def sleep_of(block, scratch, pixel, n, theta, flags, num, iv):
         return AWAKE, until, 0
     wide = pixels_not_calm(block, pixel, n, theta, flags, num) if len(flags.forced) else 0
     return (NAPS if moving > 0 else SLEEPS), until, wide
+
+
+@inner
+def is_moving(block, i, flags):
+    """Whether a lag of pixel i is not 0 to the bit: of -0, as what is below all float32 is left, a step makes 0."""
+    if len(flags.poles) == 0:
+        return False
+    first = bits_32(block[LAG1 * PITCH + i])
+    return (first | bits_32(block[LAG2 * PITCH + i]) if len(flags.poles) > 1 else first) != 0
 
 
 @inner
