@@ -113,6 +113,23 @@ def test_a_burst_is_over_whatever_times_there_are() -> None:
     assert [len(cis.step(np.ones((2, 2)), t_ns)) for t_ns in (1 - 2**63, 0, 2**63 - 1)] == [1, 0, 0]
 
 
+@pytest.mark.parametrize("first_ns", [1 - 2**63, -(2**62), 2**62, 2**63 - 1 - 20_000_000])
+@pytest.mark.parametrize("more", [[], ["delay_us=5", "frame_rate_hz=100"]])
+def test_a_state_of_whatever_time_is_taken_up(first_ns: int, more: list[str]) -> None:
+    spec = load_sensor("ideal", more)
+    dvs, other = Dvs(spec, (1, 1)), Dvs(spec, (1, 1))
+    cis, other_cis = (Cis(load_cis("ideal", ["colour=false"]), (1, 1)) for _ in range(2))
+    for sensor in (dvs, cis):
+        for k in range(2):
+            sensor.step(np.full((1, 1), 0.1 + k), first_ns + k * 10_000_000)
+    other.restore(dvs.state())
+    other_cis.restore(cis.state())
+    light, last_ns = np.full((1, 1), 4.0), first_ns + 20_000_000
+    sent, again = dvs.step(light, last_ns), other.step(light, last_ns)
+    assert len(sent) > 0 and np.array_equal(sent.t, again.t)
+    assert len(cis.step(light, last_ns)) == len(other_cis.step(light, last_ns))
+
+
 def test_what_is_no_state_of_the_sensor_is_refused() -> None:
     late = load_sensor("ideal", ["delay_us=5", "frame_rate_hz=100"])
     dvs, cis = (Dvs(late, (2, 2)), np.zeros((2, 2))), (Cis(CisSpec(), (2, 2)), np.zeros((2, 2, 3)))

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from vid2ev.errors import UsageError
 from vid2ev.stream.events import Events
 
-LATEST_NS = 1 << 62
+LATEST_NS = 1 << 63  # as of frames (`sensors.limits.time_ns`)
 MARK = "of"
 
 
