@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from against.clips import clean, hold, play
 
+from vid2ev.sensors.dvs import Dvs
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.stream import Events
 
@@ -84,3 +85,20 @@ def test_noise_that_frames_are_too_few_for_sends_as_much_as_the_noise_itself(eve
                  follower_tau_us=tau2_us)  # fmt: skip
     sent = len(at_rest(spec, seconds, every_ns, shape)) / (shape[0] * shape[1] * seconds)
     assert sent == pytest.approx(followed(300, tau2_us, sigma, 0.2, step_us, steps, 2000), rel=0.06)
+
+
+@pytest.mark.parametrize(("blind", "most"), [
+    ({}, 2 * (50 + 2)), ({"refractory_us": 1000.0, "refractory": "track"}, 40 + 1)
+])  # fmt: skip
+@pytest.mark.parametrize("thresholds", [(0.15, 0.15), (0.1, 0.2)])
+def test_noise_far_beyond_thresholds_is_bounded_work(blind, most, thresholds):
+    """Of time constants of a picosecond, which would be 10^10 crossings from frame to frame."""
+    on, off = thresholds
+    spec = clean(threshold_on=on, threshold_off=off, photoreceptor_noise=1, photoreceptor_tau_us=1e-6,
+                 follower_tau_us=1e-6, max_crossings=50, **blind)  # fmt: skip
+    dvs, light = Dvs(spec, (2, 1)), np.ones((1, 2), np.float32)
+    dvs.step(light, 0)
+    for k in range(1, 4):
+        before = dvs.counts
+        assert 2 < len(dvs.step(light, 40_000_000 * k)) <= 2 * most
+        assert (dvs.counts["capped"] > before["capped"]) == (not blind)

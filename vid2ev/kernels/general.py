@@ -37,8 +37,11 @@ from vid2ev.physics.random import unit
 
 
 @inner
-def next_rice(path, knots, s, k, on, off, pixel, num, iv):
-    """Candidate k of the unresolved noise after s: (its s, the expected number it stands for)."""
+def next_rice(path, knots, s, k, on, off, sees_from, pixel, num, iv):
+    """Candidate k of the unresolved noise after s: (its s, the expected number it stands for); none of a blind pixel,
+    whose levels are others when it sees."""
+    if sees_from > s:
+        return 2.0, 0.0
     top = bottom = value(path, 0.0)
     for knot in knots:
         here = value(path, knot)
@@ -88,7 +91,7 @@ def walk_pixel(
     sees_from = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
     if len(flags.track) and good:
         sees_from = blind_until(pixel, planes, num, iv)
-    rice_s, expected = next_rice(path, knots, s, 0, on, off, pixel, num, iv) if rice else (2.0, 0.0)
+    rice_s, expected = next_rice(path, knots, s, 0, on, off, sees_from, pixel, num, iv) if rice else (2.0, 0.0)
     while True:
         forced_s = 2.0
         if j < forced:
@@ -105,14 +108,14 @@ def walk_pixel(
             solved += 1
             if solved > num.max_crossings:
                 tally[CAPPED] += 1
-                here, at = stop, end
+                here, at, rice, rice_s = stop, end, False, 2.0
             s, begin = here, at
             on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
             if len(flags.track):
                 sees_from = blind_until(pixel, planes, num, iv)
             if rice:
                 candidate += 1
-                rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
+                rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
             continue
         s, begin = stop, end
         if stop == blind_s:
@@ -122,6 +125,9 @@ def walk_pixel(
             leave_levels(lanes, pixels, 1, planes, flags, num)
             on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
             sees_from = -1.0
+            if rice:
+                candidate += 1
+                rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
         elif stop == forced_s:
             on, off, out, n = force(
                 lanes, pixels, pixel, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
@@ -133,13 +139,16 @@ def walk_pixel(
             polarity = accept_rice(path, s, candidate, expected, on, off, pixel, num, iv)
             candidate += 1
             if polarity != 0 and not blind:
-                at = on if polarity > 0 else off
+                at, solved = on if polarity > 0 else off, solved + 1
                 on, off, out, n = cross_one(
                     lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
                 )
                 if len(flags.track):
                     sees_from = blind_until(pixel, planes, num, iv)
-            rice_s, expected = next_rice(path, knots, s, candidate, on, off, pixel, num, iv)
+            rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
+            if solved > num.max_crossings:
+                tally[CAPPED] += 1
+                rice, rice_s = False, 2.0
         elif knots[piece] >= 1.0:
             break
         else:

@@ -40,7 +40,8 @@ class Comparator(BaseModel, frozen=True, extra="forbid"):
         4096,
         ge=1,
         le=1_000_000,
-        description="crossings solved per pixel and monotone stretch of an interval; the rest is one step, and counted",
+        description="crossings solved per pixel and monotone stretch of an interval; the rest is one step, without"
+        " noise, and counted",
     )
 
     @field_validator("threshold_on", "threshold_off")
