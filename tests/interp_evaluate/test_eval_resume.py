@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 from footage_made import pictures, write_film, write_hsergb, write_predictions
+from render_pools import pools_begun
 from rows_read import read_rows
 
 from interp.evaluate import run
@@ -24,7 +24,6 @@ from vid2ev.cluster.task import Task
 from vid2ev.cluster.work import Outcome, outcomes
 from vid2ev.cluster.workers import Workers
 from vid2ev.recording.exposures import write_codes
-from vid2ev.scenes import render
 
 pytestmark = pytest.mark.long
 
@@ -95,19 +94,11 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
 def test_a_worker_renders_scenes_by_its_share_of_the_cores(
     jobs: int, pools: set[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun: set[int] = set()
+    begun = pools_begun(monkeypatch, 4, cluster_workers)
 
     def here(tasks: Sequence[Task], _: Workers) -> Iterator[Outcome]:
         return (Outcome(task.name, task.call(lambda _: None)) for task in tasks)
 
-    class Pool(ThreadPoolExecutor):
-        def __init__(self, threads: int):
-            begun.add(threads)
-            super().__init__(threads)
-
-    monkeypatch.setattr(render, "ThreadPoolExecutor", Pool)
-    for module in (render, cluster_workers):
-        monkeypatch.setattr(module, "usable_cores", lambda: 4)
     sources = ["scene:flicker,size=128x96,scene.duration_s=0.04"]
     evaluate(sources, tmp_path, baselines=["nearest"], limit=1, workers=Workers(jobs), share=here)
     assert begun == pools

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,12 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from render_pools import pools_begun
 
 from vid2ev import Dvs, convert, load_sensor
 from vid2ev.errors import UsageError
 from vid2ev.making import conversion
 from vid2ev.recording.manifest import read_manifest
-from vid2ev.scenes import render
 from vid2ev.scenes.source import SceneSource, parse_request, split_outside
 from vid2ev.scenes.world import World
 from vid2ev.sources import open_source
@@ -135,16 +134,7 @@ def test_a_scene_is_rendered_by_as_many_threads_as_its_conversion_is_given(
     threads: int | None, pools: set[int], edits: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By default by as many as there are cores for this process, however many the machine has."""
-    begun: set[int] = set()
-
-    class Pool(ThreadPoolExecutor):
-        def __init__(self, threads: int):
-            begun.add(threads)
-            super().__init__(threads)
-
-    monkeypatch.setattr(render, "ThreadPoolExecutor", Pool)
-    for module in (render, conversion):
-        monkeypatch.setattr(module, "usable_cores", lambda: 3)
+    begun = pools_begun(monkeypatch, 3, conversion)
     text = "scene:room,size=128x96,duration_s=0.02"
     convert(text, tmp_path / "made", "ideal", preview=False, threads=threads, fps=100, **edits)
     assert begun == pools
