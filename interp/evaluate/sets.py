@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -42,11 +43,12 @@ def footage_of(
     Raises UsageError for what is none of these, or where nothing can be used.
     """
     places, unusable = list[tuple[str, str | Recorded]](), dict[str, str]()
-    for dataset in dict.fromkeys(datasets):
+    datasets = _each_once(datasets)
+    for dataset in datasets:
         found, broken = _places(dataset)
         places += [(dataset, place) for place in found]
         unusable |= broken
-    footage, sets, called = list[Footage](), dict[str, list[str]](), set_names([*dict.fromkeys(datasets)])
+    footage, sets, called = list[Footage](), dict[str, list[str]](), set_names(datasets)
     names = apart([_called(place) for _, place in places])
     folders = _folders_of(places, names, called)
     for (dataset, place), name, folder in zip(places, names, folders, strict=True):
@@ -60,6 +62,14 @@ def footage_of(
     if not footage:
         raise DataError(f"nothing in {', '.join(datasets)} can be scored: {'; '.join(list(unusable.values())[:3])}")
     return Found(footage, sets, unusable)
+
+
+def _each_once(datasets: Sequence[str]) -> list[str]:
+    """Data sets that are not the same place, however it was written."""
+    places = dict[str, str]()
+    for each in datasets:
+        places.setdefault(each if is_scene(each) else os.path.realpath(each), each)
+    return [*places.values()]
 
 
 def check_simulated(footage: Sequence[Footage], simulated: Simulated | None) -> None:
