@@ -87,6 +87,14 @@ def test_noise_that_frames_are_too_few_for_sends_as_much_as_the_noise_itself(eve
     assert sent == pytest.approx(followed(300, tau2_us, sigma, 0.2, step_us, steps, 2000), rel=0.06)
 
 
+def test_noise_goes_by_the_thresholds_that_a_shot_has_drawn():
+    """Within an interval, too: other thresholds are passed at another rate from there on."""
+    spec = clean(threshold_on=0.2, threshold_off=0.2, crossing_noise=0.06, photoreceptor_noise=0.05,
+                 photoreceptor_tau_us=300, follower_tau_us=100, shot_rate_hz=20, shot_light_factor=1)  # fmt: skip
+    often, once = (len(at_rest(spec, 1, every_ns, (32, 64))) for every_ns in (1_000_000, 1_000_000_000))
+    assert once == pytest.approx(often, rel=0.03)
+
+
 @pytest.mark.parametrize(("blind", "most"), [
     ({}, 2 * (50 + 2)), ({"refractory_us": 1000.0, "refractory": "track"}, 40 + 1)
 ])  # fmt: skip

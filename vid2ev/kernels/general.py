@@ -87,12 +87,15 @@ def walk_pixel(
     on = lanes[AT] + lanes[LEVEL_ON] if good else np.inf
     off = lanes[AT] - lanes[LEVEL_OFF] if good else -np.inf
     rice = len(flags.noise) > 0 and not iv.noise_resolved
-    piece, s, begin, solved, candidate = 0, 0.0, value(path, 0.0), 0, 0
+    piece, s, begin, solved, candidate = 0, 0.0, value(path, 0.0), 0, -1
     sees_from = -1.0  # end of a refractory period of the kind `track`; a hot pixel has no memory to set then
     if len(flags.track) and good:
         sees_from = blind_until(pixel, planes, num, iv)
-    rice_s, expected = next_rice(path, knots, s, 0, on, off, sees_from, pixel, num, iv) if rice else (2.0, 0.0)
+    rice_s, expected, stale = 2.0, 0.0, True  # the next candidate of unresolved noise, and whether levels are others
     while True:
+        if rice and stale:
+            candidate, stale = candidate + 1, False
+            rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
         forced_s = 2.0
         if j < forced:
             whose, when = place_of_candidate(keys[j], iv)
@@ -101,74 +104,73 @@ def walk_pixel(
         blind_s = sees_from if blind else 2.0
         stop = min(min(knots[piece], forced_s), min(rice_s, blind_s))
         end = value(path, stop)
-        if not blind and (end >= on or end <= off):
-            up = end >= on
-            at = on if up else off
-            here = stop if num.frame_time else reach(path, at, s, stop, begin, end, up)
-            solved += 1
+        crosses, up, at, label = not blind and (end >= on or end <= off), end >= on, end, SIGNAL
+        if crosses:
+            at, solved = on if up else off, solved + 1
+            s = stop if num.frame_time else reach(path, at, s, stop, begin, end, up)
             if solved > num.max_crossings:
                 tally[CAPPED] += 1
-                here, at, rice, rice_s = stop, end, False, 2.0
-            s, begin = here, at
-            on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, SIGNAL, planes, flags, num, iv, out, n, tally)
+                s, at, rice, rice_s = stop, end, False, 2.0
+            begin = at
+        else:
+            s, begin = stop, end
+            if stop == blind_s:
+                pixels[0], lanes[AT] = pixel, end
+                note_jump(pixel, planes, flags, num)
+                fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)
+                leave_levels(lanes, pixels, 1, planes, flags, num)
+                on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
+                sees_from, stale = -1.0, True
+            elif stop == forced_s:
+                if chance[j] == 0.0:
+                    out, n = fire_hot(pixel, s, planes, num, iv, out, n)
+                else:
+                    crosses, up, label = good and takes_shot(pixel, s, planes, flags, num, iv), chance[j] > 0.0, SHOT
+                j += 1
+            elif stop == rice_s:
+                polarity, stale = accept_rice(path, s, candidate, expected, on, off, pixel, num, iv), True
+                crosses, up = polarity != 0 and not blind, polarity > 0
+                at, solved = on if up else off, solved + crosses
+                if solved > num.max_crossings:
+                    tally[CAPPED] += 1
+                    rice, rice_s = False, 2.0
+            elif knots[piece] >= 1.0:
+                break
+            else:
+                piece, solved = piece + 1, 0
+        if crosses:
+            stale = True
+            on, off, out, n = cross_one(lanes, pixels, pixel, up, at, s, label, planes, flags, num, iv, out, n, tally)
             if len(flags.track):
                 sees_from = blind_until(pixel, planes, num, iv)
-            if rice:
-                candidate += 1
-                rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
-            continue
-        s, begin = stop, end
-        if stop == blind_s:
-            pixels[0], lanes[AT] = pixel, end
-            note_jump(pixel, planes, flags, num)
-            fresh_thresholds(lanes, pixels, pixels[1:], 1, planes, flags, num)
-            leave_levels(lanes, pixels, 1, planes, flags, num)
-            on, off = lanes[LEVEL_ON], lanes[LEVEL_OFF]
-            sees_from = -1.0
-            if rice:
-                candidate += 1
-                rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
-        elif stop == forced_s:
-            on, off, out, n = force(
-                lanes, pixels, pixel, s, end, chance[j], on, off, planes, flags, num, iv, out, n, tally
-            )
-            if len(flags.track) and good:
-                sees_from = blind_until(pixel, planes, num, iv)
-            j += 1
-        elif stop == rice_s:
-            polarity = accept_rice(path, s, candidate, expected, on, off, pixel, num, iv)
-            candidate += 1
-            if polarity != 0 and not blind:
-                at, solved = on if polarity > 0 else off, solved + 1
-                on, off, out, n = cross_one(
-                    lanes, pixels, pixel, polarity > 0, at, s, SIGNAL, planes, flags, num, iv, out, n, tally
-                )
-                if len(flags.track):
-                    sees_from = blind_until(pixel, planes, num, iv)
-            rice_s, expected = next_rice(path, knots, s, candidate, on, off, sees_from, pixel, num, iv)
-            if solved > num.max_crossings:
-                tally[CAPPED] += 1
-                rice, rice_s = False, 2.0
-        elif knots[piece] >= 1.0:
-            break
-        else:
-            piece, solved = piece + 1, 0
     if sees_from > 1.0:
         stay_blind(pixel, planes, flags)
     return out, n
 
 
 @inner
-def force(lanes, pixels, pixel, s, end, chance, on, off, planes, flags, num, iv, out, n, tally):
-    """A forced candidate at s, where the signal is `end`: (c_on, c_off, out, n)."""
-    t_ns = iv.t0_ns + np.int64(s * iv.dt_ns)
-    blind = num.refractory_ns > 0 and t_ns - planes.t_last[pixel] < num.refractory_ns
-    if chance == 0.0:  # a hot pixel
-        if not blind:
-            planes.t_last[pixel % planes.t_last.size] = t_ns
-            out = room(out, n, 1)
-            n = put(out, n, key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv), True)
-        return on, off, out, n
-    if on == np.inf or (blind and len(flags.track)):
-        return on, off, out, n
-    return cross_one(lanes, pixels, pixel, chance > 0.0, end, s, SHOT, planes, flags, num, iv, out, n, tally)
+def fire_hot(pixel, s, planes, num, iv, out, n):
+    """The event at s of a hot pixel, unless that is blind: (out, n)."""
+    if is_blind(pixel, s, planes, num, iv):
+        return out, n
+    planes.t_last[pixel % planes.t_last.size] = t_of(s, iv)
+    out = room(out, n, 1)
+    return out, put(out, n, key_of(s * iv.dt_ns, pixel, np.int64(1), HOT, iv), True)
+
+
+@inner
+def takes_shot(pixel, s, planes, flags, num, iv):
+    """Whether shot noise at s resets the memory of a good pixel: not while one is blind whose memory will jump."""
+    return len(flags.track) == 0 or not is_blind(pixel, s, planes, num, iv)
+
+
+@inner
+def is_blind(pixel, s, planes, num, iv):
+    """Whether s is within the refractory period of the last event of a pixel."""
+    return num.refractory_ns > 0 and t_of(s, iv) - planes.t_last[pixel] < num.refractory_ns
+
+
+@inner
+def t_of(s, iv):
+    """The instant [ns]."""
+    return iv.t0_ns + np.int64(s * iv.dt_ns)
