@@ -163,6 +163,14 @@ def test_numpy_without_a_name_that_numba_cuda_asks_for_stays_without_it():
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("name", ["two poles", "paper"])
+def test_a_walk_has_most_of_its_lane_in_registers(name):
+    """Where the compiler does not know that there is one lane, that is 672 bytes of memory, and half again the code."""
+    ptx = strictly(flags_of(SENSORS[name], labels=False), "walk")
+    assert sum(map(int, re.findall(r"\.local .*\[(\d+)\]", ptx))) <= 320
+
+
+@pytest.mark.long
 def test_a_glance_at_a_pixel_is_in_registers():
     for spec in SENSORS.values():
         assert ".local" not in strictly(flags_of(spec, labels=False), "glance")

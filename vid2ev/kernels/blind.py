@@ -23,7 +23,7 @@ from vid2ev.kernels.crossing import (
 )
 from vid2ev.kernels.ladder import END, REACHED, RUNGS, few
 from vid2ev.kernels.lanes import BLIND, F0, S0, S1, response_at, seen_at
-from vid2ev.kernels.layout import CAPPED, HIGH, LOW, PITCH, place_of, stride_of
+from vid2ev.kernels.layout import CAPPED, HIGH, LOW, PITCH, lane, place_of, stride_of
 from vid2ev.kernels.response import next_piece
 from vid2ev.kernels.roots import batch_times
 
@@ -76,7 +76,7 @@ def seeing(lanes, live, left, who):
     """The lanes of live[:left] that become able to see in their piece, into `who`; returns their number."""
     some = np.int64(0)
     for k in range(left):
-        j = live[k]
+        j = lane(live[k])
         until = lanes[BLIND + j]
         who[some] = j
         some += np.int64((until > lanes[S0 + j]) & (until <= lanes[S1 + j]))
@@ -88,7 +88,7 @@ def see(work, some, b, planes, flags, num):
     """The memories of the lanes who[:some] jump to the signal, and their pieces begin there."""
     lanes, who = work.lanes, work.who
     for k in range(some):
-        j = who[k]
+        j = lane(who[k])
         s = lanes[BLIND + j]
         y = response_at(lanes, j, s, b)
         lanes[AT + j] = seen_at(lanes, j, y, s, flags, num)
@@ -103,7 +103,7 @@ def reaching(lanes, live, left, who, levels, num, tally):
     `levels`, too; returns their number."""
     cap, some, over = np.float64(num.max_crossings), np.int64(0), np.int64(0)
     for k in range(left):
-        j = live[k]
+        j = lane(live[k])
         end, at = lanes[END + j], lanes[AT + j]
         up = end >= at + lanes[LEVEL_ON + j]
         reached = (up | (end <= at - lanes[LEVEL_OFF + j])) & (lanes[BLIND + j] <= lanes[S0 + j])
@@ -125,12 +125,13 @@ def turn_blind(work, some, planes, flags, num, iv, out, n, tally):
     """Send the crossings of the lanes who[:some], which see nothing for a while then: (out, n)."""
     lanes, who, when = work.lanes, work.who, work.when
     for k in range(some):
-        j = who[k]
+        j = lane(who[k])
         lanes[S0 + j] = when[k] = max(when[k], lanes[S0 + j])
     out, n = send(when, who, some, lanes, work.pixels, planes, flags, num, iv, out, n, tally)
     fresh_thresholds(lanes, work.pixels, who, some, planes, flags, num)
     for k in range(some):
-        lanes[BLIND + who[k]] = blind_until(work.pixels[who[k]], planes, num, iv)
+        j = lane(who[k])
+        lanes[BLIND + j] = blind_until(work.pixels[j], planes, num, iv)
     return out, n
 
 
@@ -139,7 +140,7 @@ def with_more(work, left, b, flags, num):
     """Keep those of live[:left] that see again in the interval, or have another piece; returns their number."""
     lanes, live, kept = work.lanes, work.live, np.int64(0)
     for k in range(left):
-        j = live[k]
+        j = lane(live[k])
         live[kept] = j
         if lanes[REACHED + j] > 0.0:
             kept += np.int64(lanes[BLIND + j] <= 1.0)

@@ -11,6 +11,12 @@ def together():
 
 
 @inner
+def rolled(times):
+    """So many times, in a loop that need not be short of code."""
+    return times
+
+
+@inner
 def anyone(does):
     """Whether any of those that go together does."""
     return does

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
-from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, place_of, stride_of
+from vid2ev.kernels.layout import HIGH, LANE_PITCH, LOW, PITCH, SWALLOWED, lane, place_of, stride_of
 from vid2ev.kernels.scan import MARGIN, compared
 from vid2ev.kernels.sink import put, room
 from vid2ev.physics.crossing_noise import noisy_thresholds
@@ -66,13 +66,14 @@ def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
     """Thresholds [nat] of the lanes live[:alive], which have just crossed, into LEVEL_ON and LEVEL_OFF."""
     theta, drawn, crossings = planes.theta, planes.drawn, planes.count
     for k in range(alive):
-        j = live[k]
+        j = lane(live[k])
         lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = num.threshold_on, num.threshold_off
         if num.mismatch > 0.0:
             lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = theta[pixels[j], 0], theta[pixels[j], 1]
     if len(flags.crossing_noise):
         for k in range(alive):
-            j, pixel = live[k], pixels[live[k]]
+            j = lane(live[k])
+            pixel = pixels[j]
             lanes[DRAWN_ON + k], lanes[DRAWN_OFF + k] = lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j]
             lanes[DRAWN_FOR + k], lanes[DRAWN_AT + k] = pixel, crossings[pixel]
             crossings[pixel] += np.uint32(1)
@@ -87,7 +88,8 @@ def fresh_thresholds(lanes, pixels, live, alive, planes, flags, num):
                 np.int64(lanes[DRAWN_AT + k]),
             )
         for k in range(alive):  # the rounded thresholds are the thresholds, now and when they are read back
-            j, pixel = live[k], pixels[live[k]]
+            j = lane(live[k])
+            pixel = pixels[j]
             drawn[pixel, 0], drawn[pixel, 1] = lanes[DRAWN_ON + k], lanes[DRAWN_OFF + k]
             lanes[LEVEL_ON + j], lanes[LEVEL_OFF + j] = drawn[pixel, 0], drawn[pixel, 1]
 
@@ -121,7 +123,7 @@ def send(when, who, count, lanes, pixels, planes, flags, num, iv, out, n, tally)
     out = room(out, n, count)
     t_last, t_reset = planes.t_last, planes.t_reset
     for k in range(count):
-        j = who[k]
+        j = lane(who[k])
         pixel, polarity, when_ns = pixels[j], np.int64(lanes[UP + j]), when[k] * iv.dt_ns
         t_ns = iv.t0_ns + np.int64(when_ns)
         label = np.int64(lanes[LABEL + j]) if len(flags.labels) else np.int64(SIGNAL)

@@ -28,6 +28,7 @@ from vid2ev.kernels.lanes import (
     A,
     enter,
 )
+from vid2ev.kernels.layout import lane
 from vid2ev.kernels.path import Path, knots_of, slope_terms
 from vid2ev.physics.elementary import log64
 from vid2ev.physics.log_curve import log_slope
@@ -67,7 +68,7 @@ def split_drifting(work, count, b, flags, num):
     slopes_to_jobs(work, some, b, num)
     left = R.approach(work.levels, work.when, work.steps, work.jobs, work.guesses, some, b, flags.poles, (), num)
     for k in range(some):
-        j, turns, turn = live[k], work.jobs[R.WAY + k], work.when[k]
+        j, turns, turn = lane(live[k]), work.jobs[R.WAY + k], work.when[k]
         if turns == ONCE:
             if not work.steps[k] < R.ENOUGH:
                 turn = R.finish(work.levels, work.jobs, turn, k, b, flags.poles, (), num, left)
@@ -89,7 +90,7 @@ def slopes_to_jobs(work, some, b, num):
     """
     lanes, jobs, live = work.lanes, work.jobs, work.live
     for k in range(some):
-        j = live[k]
+        j = lane(live[k])
         a, drift, k1, k2 = lanes[A + j], lanes[DRIFT + j], lanes[A + j] * lanes[C1 + j], b * lanes[C2 + j]
         start, rise, c1, c2 = slope_terms(
             lanes[Y0 + j], lanes[RISE + j], lanes[C1 + j], lanes[C2 + j], a, b, drift, drift * num.curve.dark

@@ -12,7 +12,7 @@ import numpy as np
 from vid2ev.compiling.compiler import inner
 from vid2ev.compiling.intrinsics import floor
 from vid2ev.kernels.crossing import AT, FREE, LEVEL_OFF, LEVEL_ON, UP
-from vid2ev.kernels.layout import CAPPED, LANE_COUNT, LANE_PITCH
+from vid2ev.kernels.layout import CAPPED, LANE_COUNT, LANE_PITCH, lane
 
 # Where the signal goes [nat]; crossings so far; the first level and the step to the next; whether there is one.
 END, RUNGS, FIRST, STEP, REACHED = (FREE + k * LANE_PITCH for k in range(5))
@@ -90,7 +90,7 @@ def reached_lanes(lanes, count, live):
 def few(count):
     """A number of lanes, of which there are no more than LANE_COUNT: a compiler for lanes of one pixel then knows that
     loops over them are none, which makes a quarter of the code."""
-    return min(count, np.int64(LANE_COUNT))
+    return np.int64(count > 0) if LANE_COUNT == 1 else min(count, np.int64(LANE_COUNT))
 
 
 @inner
@@ -99,6 +99,6 @@ def keep_lanes(lanes, first, last, pixels, live, alive):
     for start in range(first, last, LANE_PITCH):
         plane = lanes[start : start + LANE_PITCH]
         for k in range(alive):
-            plane[k] = plane[live[k]]
+            plane[k] = plane[lane(live[k])]
     for k in range(alive):
-        pixels[k] = pixels[live[k]]
+        pixels[k] = pixels[lane(live[k])]

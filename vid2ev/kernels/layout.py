@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vid2ev.compiling.compiler import compiled
+from vid2ev.compiling.compiler import compiled, inner
 from vid2ev.kernels.widths import BLOCK, BLOCK_BITS, LANE_COUNT, LANE_PITCH, PITCH
 from vid2ev.physics.log_curve import Curve
 from vid2ev.stream.still import STRIP  # pixels of a block that sleep or are awake together
@@ -121,6 +121,13 @@ class Planes(NamedTuple):
     t_reset: np.ndarray  # int64 [n]: when its level last moved [ns]
     hot: np.ndarray  # int32: indices of the hot pixels, ascending
     shade: np.ndarray  # float32 [n]: optical gain, if there is shading; else [1], 1
+
+
+@inner
+def lane(number):
+    """The number of a lane, below LANE_COUNT, a power of two: of one lane a compiler then knows which, and has it in
+    registers."""
+    return number & np.int64(LANE_COUNT - 1)
 
 
 @compiled

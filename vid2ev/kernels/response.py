@@ -37,7 +37,7 @@ from vid2ev.kernels.lanes import (
     end_in_nats,
     enter,
 )  # fmt: skip
-from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH
+from vid2ev.kernels.layout import HIGH, INPUT, LOW, PITCH, lane
 from vid2ev.kernels.scratch import CLOCK, NEW, NOISE0, NOISE1
 from vid2ev.kernels.steep import new_lag, old_lag
 from vid2ev.physics.elementary import exp64
@@ -134,13 +134,13 @@ def split_pieces(lanes, turns, guesses, live, count, b):
         lanes[REACHED + j] = may_turn(lanes, j)
     some = reached_lanes(lanes, count, live)
     for k in range(some):
-        j = live[k]
+        j = lane(live[k])
         turns[T.RISE + k], turns[T.C1 + k], turns[T.C2 + k] = lanes[RISE + j], lanes[C1 + j], lanes[C2 + j]
         turns[T.A + k], turns[T.AT_0 + k], turns[T.AT_1 + k] = lanes[A + j], lanes[SLOPE0 + j], lanes[SLOPE1 + j]
     T.find_turns(turns, guesses, some, b)
     for k in range(some):
         if turns[T.KIND + k] != T.NEVER:
-            j = live[k]
+            j = lane(live[k])
             lanes[S1 + j], lanes[NEXT + j] = turns[T.ROOT + k], T.second_turn(turns, k, b)
             lanes[F1 + j] = lanes[Y0 + j] + turns[T.VALUE + k]
 

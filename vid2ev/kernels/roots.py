@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.kernels.company import rolled
 from vid2ev.kernels.crossing import UP
 from vid2ev.kernels.ladder import AFTER_LADDER, END, REACHED
-from vid2ev.kernels.layout import LANE_PITCH
+from vid2ev.kernels.layout import LANE_PITCH, lane
 from vid2ev.kernels.path import Path, moved_light, reach, value_inside
 from vid2ev.physics.elementary import expm1_32, expm1_64
 from vid2ev.physics.log_curve import light_at
@@ -40,14 +41,14 @@ def gather_jobs(jobs, who, count, lanes, flags):
     """The jobs of the lanes `who`."""
     own = lanes[AFTER_LADDER:]
     for k in range(count):
-        j = who[k]
+        j = lane(who[k])
         jobs[Y0 + k], jobs[RISE + k] = own[Y0 + j], own[RISE + j]
         jobs[C1 + k], jobs[C2 + k], jobs[A + k] = own[C1 + j], own[C2 + j], own[A + j]
         jobs[FROM_S + k], jobs[TO_S + k] = own[FROM_S + j], own[TO_S + j]
         jobs[FROM_Y + k], jobs[TO_Y + k] = own[FROM_Y + j], own[TO_Y + j]
     if len(flags.drift):
         for k in range(count):
-            j = who[k]
+            j = lane(who[k])
             jobs[BASE + k], jobs[DRIFT + k], jobs[WAY + k] = own[BASE + j], own[DRIFT + j], lanes[UP + j]
 
 
@@ -88,7 +89,7 @@ def lane_times(levels, when, steps, guesses, live, alive, count, lanes, b, flags
             levels[j] = levels[j] if lanes[REACHED + j] > 0.0 else 0.5 * (jobs[FROM_Y + j] + jobs[TO_Y + j])
     left = approach(levels, when, steps, jobs, guesses, count, b, flags.poles, flags.drift, num)
     for k in range(alive):
-        j = live[k]
+        j = lane(live[k])
         when[k] = when[j]
         if not steps[j] < ENOUGH:
             when[k] = finish(levels, jobs, when[j], j, b, flags.poles, flags.drift, num, left)
@@ -103,11 +104,11 @@ def approach(levels, when, steps, jobs, guesses, count, b, poles, drift, num):
     taken by all at once or (`finish`) by one after the other, so times do not depend on who is in it.
     """
     guess(levels, jobs, guesses, count, drift, num)
-    for _ in range(4):
+    for _ in range(rolled(4)):
         improve(guesses, count, F(b), poles)
     for k in range(count):
         when[k], steps[k] = guesses[G_S + k], np.inf
-    left = POLISHES
+    left = rolled(POLISHES)
     while left > 0:
         left -= 1
         for k in range(count):

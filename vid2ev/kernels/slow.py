@@ -13,10 +13,12 @@ from vid2ev.kernels.blind import climb_seeing
 from vid2ev.kernels.company import anyone
 from vid2ev.kernels.crossing import AT, LABEL, WHEN, fresh_thresholds, leave_levels, load_thresholds, send
 from vid2ev.kernels.ladder import FIRST, RUNGS, STEP, count_rungs, few, lanes_with_more, next_rungs
-from vid2ev.kernels.layout import LANE_COUNT
+from vid2ev.kernels.layout import LANE_COUNT, lane
 from vid2ev.kernels.response import load_responses, next_pieces, prepare_responses
 from vid2ev.kernels.roots import batch_times, lane_times
 from vid2ev.kernels.straight import line_times, load_lines, prepare_lines, send_lines
+
+IN_PLACE = LANE_COUNT > 1  # of one lane a batch is its crossing, whatever it holds: one solver is enough
 
 
 @inner
@@ -76,7 +78,7 @@ def steady_levels(work, count, planes, flags, num, iv, out, n, tally):
     """Events of each lane's piece if its thresholds stay."""
     count_rungs(work.lanes, count, num, tally)
     first = 0
-    if len(flags.straight) == 0:
+    if len(flags.straight) == 0 and IN_PLACE:
         alive = lanes_with_more(work.lanes, count, work.live, 0.0)
         out, n = send_in_place(work, FIRST, alive, count, planes, flags, num, iv, out, n, tally)
         first = 1
@@ -118,7 +120,8 @@ def in_order(when, who, count, lanes):
     """No crossing of a piece is before the last one of its lane, the latest in WHEN: after a flash of many decades
     levels are nearer to each other than the signal is known, and each has a root of its own in what rounding left."""
     for k in range(count):
-        lanes[WHEN + who[k]] = when[k] = max(when[k], lanes[WHEN + who[k]])
+        j = lane(who[k])
+        lanes[WHEN + j] = when[k] = max(when[k], lanes[WHEN + j])
 
 
 @inner
@@ -129,7 +132,7 @@ def fill_batch(lanes, live, alive, who, levels, i, rung, first, num):
     """
     waiting = 0
     while i < alive:
-        j = live[i]
+        j = lane(live[i])
         rungs, level, step = np.int64(lanes[RUNGS + j]), lanes[FIRST + j], lanes[STEP + j]
         some = min(rungs, rung + LANE_COUNT - waiting)
         who[waiting], levels[waiting] = j, level + rung * step
@@ -148,7 +151,7 @@ def fill_batch(lanes, live, alive, who, levels, i, rung, first, num):
 @inner
 def drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
     """Events of each lane's piece if its thresholds are drawn anew at each crossing."""
-    waiting, climbed = 0, len(flags.straight) > 0
+    waiting, climbed = 0, len(flags.straight) > 0 or not IN_PLACE
     while True:
         alive = next_rungs(work.lanes, count, work.live, num, tally)
         if not climbed:
@@ -169,4 +172,5 @@ def drawn_levels(work, count, planes, flags, num, iv, out, n, tally):
 def add_to_batch(lanes, who, levels, live, alive, waiting):
     """The crossings that the lanes live[:alive] have just made."""
     for k in range(alive):
-        who[waiting + k], levels[waiting + k] = live[k], lanes[AT + live[k]]
+        j = lane(live[k])
+        who[waiting + k], levels[waiting + k] = j, lanes[AT + j]

@@ -10,7 +10,7 @@ import numpy as np
 from vid2ev.compiling.compiler import inner
 from vid2ev.kernels.crossing import SIGNAL, UP, key_of
 from vid2ev.kernels.ladder import AFTER_LADDER, END, FIRST, RUNGS, STEP
-from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH
+from vid2ev.kernels.layout import INPUT, LANE_PITCH, PITCH, lane
 from vid2ev.kernels.scratch import NEW, NOISE0, NOISE1
 from vid2ev.kernels.sink import put, put_two, replace_last, room
 from vid2ev.kernels.steep import new_lag, old_lag
@@ -63,7 +63,7 @@ def to_nats(plane, count, num):
 def line_times(levels, when, who, count, lanes, num):
     """Times of a batch of crossings."""
     for k in range(count):
-        j = who[k]
+        j = lane(who[k])
         here = (levels[k] - lanes[START + j]) * lanes[PER_NAT + j]
         # (a NaN, from a line without a slope, is its start)
         when[k] = 1.0 if num.frame_time else (min(here, 1.0) if here > 0.0 else 0.0)

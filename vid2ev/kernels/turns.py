@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from vid2ev.compiling.compiler import inner
+from vid2ev.kernels.company import rolled
 from vid2ev.kernels.layout import LANE_PITCH
 from vid2ev.physics.elementary import exp64, expm1_32, expm1_64, log32, log64
 from vid2ev.physics.photoreceptor import response, slope_zero
@@ -118,7 +119,7 @@ def find_turns(turns, guesses, count, b):
     """ROOT is the first turning point of each lane, VALUE the response there less y0; not where KIND is NEVER."""
     bracket_turns(turns, count, b)
     start_turns(turns, guesses, count, b)
-    for _ in range(4):
+    for _ in range(rolled(4)):
         improve_turns(guesses, count, np.float32(b))
     for k in range(count):
         turns[ROOT + k] = guesses[G_ROOT + k]

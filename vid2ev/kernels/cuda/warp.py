@@ -8,6 +8,7 @@ must come to each of these places.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import cuda
 
 from vid2ev.compiling.compiler import inner
@@ -19,6 +20,12 @@ ALL = 0xFFFFFFFF
 def together():
     """Wait for the others."""
     cuda.syncwarp(ALL)
+
+
+@inner
+def rolled(times):
+    """So many times; the compiler, which does not know that `blockDim.y` is 1, cannot write the loop out."""
+    return times + (np.int64(cuda.blockDim.y) - np.int64(1))
 
 
 @inner
