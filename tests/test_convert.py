@@ -124,7 +124,8 @@ def test_an_option_that_is_misspelt_is_named_before_anything_is_opened(tmp_path:
     [
         {"bayer": ""}, {"bayer": 3}, {"bayer": False}, {"labels": "no"}, {"labels": None}, {"cis": ""}, {"crop": ""},
         {"subframes": 1.5}, {"subframes": "x"}, {"subframes": True}, {"max_subframes": 2.5}, {"max_subframes": "9"},
-        {"probe": [(1.5, 2)]}, {"probe": [(1, 2, 3)]},
+        {"probe": [(1.5, 2)]}, {"probe": [(1, 2, 3)]}, {"threads": 0}, {"threads": 1.5}, {"piece": 0}, {"piece": 1e9},
+        {"tolerance": np.nan},
     ],
     ids=str,
 )  # fmt: skip

@@ -16,15 +16,17 @@ from typing import Any
 from vid2ev.cluster.task import share_of
 from vid2ev.cores import usable_cores
 from vid2ev.errors import DataError, UsageError, check_names
-from vid2ev.plan.plan import TOLERANCE
+from vid2ev.plan.plan import TOLERANCE, check_tolerance
 from vid2ev.plan.planner import Planner
 from vid2ev.plan.recordings import described, planned
 from vid2ev.recording.folder import Folder, begun_job, check_free
 from vid2ev.recording.manifest import machine, write_manifest
+from vid2ev.requests import is_whole
 from vid2ev.seen.instants import instants
 from vid2ev.seen.recipe import Recipe, plain
 from vid2ev.seen.sight import scene_of
 from vid2ev.sensors.devices import device_for
+from vid2ev.sensors.limits import check_threads
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
 from vid2ev.sources import begins_s, short_name
@@ -106,13 +108,16 @@ def convert(
     """
     check_names(rest, Outputs.options() + Recipe.options())
     directory = default_directory(video) if directory is None else Path(directory)
+    check_threads(threads := usable_cores() if threads is None else threads)
+    check_tolerance(tolerance)
+    if not is_whole(piece, 1):
+        raise UsageError(f"piece {piece!r}: expected a whole number of pixel-steps, of at least 1; leave it out")
     if seed is None:
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
     check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
-    threads = threads or usable_cores()
     where = device_for(device, recipe.work, threads)
     if scene := scene_of(recipe.source):
         scene.world.afresh, scene.memory = not skip, where.memory

@@ -39,7 +39,7 @@ def check_sensor(size: tuple[int, int], seed: int, camera: int, threads: int) ->
 def check_threads(threads: int) -> None:
     """Raise UsageError for what is no number of threads."""
     if not is_whole(threads, 1):
-        raise UsageError(f"threads {threads!r}: expected a whole number of at least 1; leave it out for one")
+        raise UsageError(f"threads {threads!r}: expected a whole number of at least 1; leave it out")
 
 
 def check_seed(seed: int) -> None:
