@@ -79,10 +79,14 @@ def predictions_in(
     folder = Path(folder)
     sequences = sequence_folders(folder, footage)
     inner = sorted({each.name for of in sequences for each in folders_in(of) if pictures_in(each)})
-    known = identity(folder, copies=True, deep=True, besides=besides) if sequences else {}
-    found = [Predictions(plain(name), folder, name, known) for name in inner]
+
+    def known(within: str | None) -> dict[str, Any]:
+        others = [each / name for each in sequences for name in inner if name != within]
+        return identity(folder, copies=True, deep=True, besides=[*besides, *others])
+
+    found = [Predictions(plain(name), folder, name, known(name)) for name in inner]
     if any(map(pictures_in, sequences)):
-        found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known))
+        found.insert(0, Predictions(plain(folder.resolve().name), folder, None, known(None)))
     if not found:
         others = "".join(f"; {said}" for said in other_pictures(folder, sequences))
         raise UsageError(

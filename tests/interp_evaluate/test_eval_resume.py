@@ -172,6 +172,18 @@ def test_a_report_may_lie_in_what_it_is_made_of(tmp_path: Path, within: str) -> 
     assert repr([row for row in rows if row.method != "nearest"]) == repr(first.rows)
 
 
+def test_pictures_of_another_method_may_come_to_lie_beside_those_that_were_scored(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "x", pictures(5))
+    places: dict[str, Any] = {"baselines": (), "predictions": [tmp_path / "theirs"], "protocol": Protocol(3, 3)}
+    for name in ("ours", "yours"):
+        write_predictions(tmp_path / "theirs" / "x" / name, pictures(5))
+        found = evaluate([str(tmp_path / "x")], tmp_path / "report", resume=name == "yours", **places)
+    assert [of["perfect"] for of in found.summary["methods"].values()] == [3, 3]
+    write_codes(tmp_path / "theirs" / "x" / "ours" / "1.png", pictures(5)[0])
+    with pytest.raises(UsageError, match=r"was begun with methods\.ours"):
+        evaluate([str(tmp_path / "x")], tmp_path / "report", resume=True, **places)
+
+
 def test_names_and_folders_that_are_taken_are_refused(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
