@@ -15,8 +15,10 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from vid2ev import convert
+from vid2ev.commands import main
 from vid2ev.errors import DataError, UsageError
 from vid2ev.sources import live, open_source, short_name
 from vid2ev.tracks.recorder import Progress
@@ -124,6 +126,30 @@ def test_a_second_time_is_refused(pipe) -> None:
     assert len(list(source.frames())) == 3
     with pytest.raises(UsageError, match="standard input: can be read once only"):
         next(source.frames())
+
+
+@pytest.mark.parametrize("size", [(48, 64), (600, 800)])
+def test_a_pipe_is_opened_again_until_frames_were_taken_of_it(pipe, size: tuple[int, int]) -> None:
+    """As who looks at a video first and converts it then does."""
+    pipe(y4m(noise(12, size)))
+    looked = [open_source("-") for _ in range(3)]
+    frames = list(looked[-1].frames())
+    assert [frame.t_ns for frame in frames] == [40_000_000 * k for k in range(12)]
+    with pytest.raises(UsageError, match="standard input: can be read once only"):
+        open_source("-")
+    pipe(y4m(noise(5)))
+    assert len(list(open_source("-").frames())) == 5
+
+
+def test_a_pipe_is_converted_for_who_wants_to_be_told_first(tmp_path: Path) -> None:
+    common = ["convert", "-", "--sensor", "ideal", "--upsample", "none", "--threads", "1", "--no-preview"]
+    events = []
+    for more in ([], ["--verbose"]):
+        output = tmp_path / f"out{len(more)}"
+        done = CliRunner().invoke(main, [*common, "-o", str(output), *more], input=y4m(noise(7)))
+        assert done.exit_code == 0, done.output
+        events.append((output / "events.h5").read_bytes())
+    assert events[0] == events[1]
 
 
 def test_a_pipe_is_read_again_by_who_wants_it_in_time(pipe) -> None:

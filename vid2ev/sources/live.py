@@ -21,13 +21,22 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.sources.footage import LiveStream, Piped, reason
 from vid2ev.sources.kept import Kept
 
+_opened: list[tuple[Any, Kept]] = []  # the stream that was standard input last, and what was read of it
+
 
 def open_standard_input() -> Piped:
-    """The video on standard input.  Raises UsageError if nothing is piped in, DataError if it is no video."""
+    """The video on standard input; once more, from its first frame on, until frames were taken of it.
+
+    Raises UsageError if nothing is piped in or it was read already, DataError if it is no video.
+    """
     stdin = getattr(sys.stdin, "buffer", None)
     if stdin is None or sys.stdin.isatty():
         raise UsageError("-: nothing is piped in; write `... | vid2ev convert -`, or give a file")
-    return Piped(Kept(stdin, "standard input"))
+    if not _opened or _opened[0][0] is not stdin:
+        _opened[:] = [(stdin, Kept(stdin, "standard input"))]
+    kept = _opened[0][1]
+    kept.wanted = True
+    return Piped(kept)
 
 
 def open_camera(text: str) -> LiveStream:
