@@ -34,7 +34,7 @@ PIXEL = [
 ]
 EVENT_FRAMES_HZ = 500
 STEP_MS = 0.02  # of the curves
-NO_REFRACTORY_US = 0.001  # shorter than any two events are apart; unlike 0 it needs no other kernel
+NO_REFRACTORY_US = 0.0001  # no nanosecond, as 0; unlike that it needs no other kernel
 INK, FAINT, CURVE, BAND = "#d8dce4", "#8a92a0", "#ffffff", "#2b303c"
 
 

@@ -245,13 +245,15 @@ def test_what_stands_in_needs_no_kernel_of_its_own() -> None:
             assert flags_of(chosen, False) in ready
             assert {key for key, value in other if getattr(chosen, key) != value} <= {*SLIGHT, *LEAK}
             assert Kernels().choose(other, frozenset()) == other
+            assert chosen.refractory_ns() == other.refractory_ns()  # (for many events come in one nanosecond)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("changed", [(), ("timing=frame",)])
 @pytest.mark.parametrize("name", ["ideal", "paper", "davis346"])
-def test_a_sensor_that_stands_in_for_another_sends_what_that_sends(name: str) -> None:
+def test_a_sensor_that_stands_in_for_another_sends_what_that_sends(name: str, changed: tuple[str, ...]) -> None:
     steps = np.random.default_rng(0).normal(size=(12, 48, 64)).cumsum(axis=0)
-    spec: Any = load(DVS, name)
+    spec: Any = load(DVS, name, changed)
     counts = [
         len(Events.concatenate([dvs.step(np.exp(0.2 * step).astype(np.float32), k * 10**7) for k, step in
                                 enumerate(steps)]))

@@ -20,7 +20,7 @@ from vid2ev.sensors.presets import DVS, load
 from vid2ev.sensors.spec import DvsSpec
 
 SIZE, FRAMES = (16, 16), 3  # of what is seen so that it is compiled
-SLIGHT = {"crossing_noise": 1e-9, "refractory_us": 1e-3, "shot_rate_hz": 1e-12}
+SLIGHT = {"crossing_noise": 1e-9, "refractory_us": 1e-4, "shot_rate_hz": 1e-12}  # (no nanosecond: events may share one)
 LEAK = {"leak_rate_hz": 1e-9}  # (for itself: it has most sensors take a slower way)
 
 
