@@ -14,9 +14,10 @@ from click.testing import CliRunner, Result
 from matplotlib.image import imread
 from moving_texture import texture
 
-from vid2ev.commands import Commands
+from vid2ev.commands import Commands, splitting
 from vid2ev.commands.convert import convert
 from vid2ev.commands.cost import cost
+from vid2ev.cost import choice
 
 COMMON = ["--sensor", "ideal", "--fps", "50", "--threads", "1"]
 
@@ -107,6 +108,57 @@ def test_a_conversion_that_goes_on_keeps_its_setting(clip: str) -> None:
     done = call(convert, *asked, "--resume")
     assert done.exit_code == 0 and "as before" in done.output
     assert Path("out/manifest.json").read_bytes() == before
+
+
+def test_what_is_given_later_does_not_give_way_to_what_was_chosen(clip: str) -> None:
+    """Of one that goes on; it is told so, as of anything else that differs."""
+    asked = [clip, *COMMON, "--no-preview", "-o", "out", "--budget", "time=1000000x"]
+    assert call(convert, *asked).exit_code == 0
+    before = Path("out/manifest.json").read_bytes()
+    assert json.loads(before)["budget"]["options"].keys() == {"subframes"}
+    done = call(convert, *asked, "--subframes", "2", "--resume")
+    assert done.exit_code == 2 and "out" in done.stderr and "as before" not in done.output
+    assert Path("out/manifest.json").read_bytes() == before
+    assert call(convert, *asked, "--cuts", "restart", "--resume").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [["--format", "nonsense"], ["--cis-out", "png"], ["--probe", "1000,1000"], ["--jobs", "2", "--split", "cuts",
+     "--cuts", "keep"]],
+)  # fmt: skip
+def test_what_cannot_be_converted_is_refused_before_anything_is_tried(
+    clip: str, wrong: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choice, "measured", lambda *_, **__: pytest.fail("it was tried"))
+    plain, done = (call(convert, clip, *COMMON, "-o", "out", *wrong, *more) for more in ([], ["--budget", "vR=0.1"]))
+    assert plain.exit_code == done.exit_code == 2 and plain.stderr == done.stderr
+    assert not Path("out").exists()
+
+
+def test_truth_is_written_within_a_budget_as_without(clip: str) -> None:
+    asked = [clip, *COMMON, "--no-preview", "--depth", "plane:2", "--truth", "depth", "--truth-rate", "100"]
+    done = call(convert, *asked, "-o", "out", "--budget", "vR=1")
+    assert done.exit_code == 0, done.output
+    assert call(convert, *asked, "-o", "plain").exit_code == 0
+    assert {path.name for path in Path("out").iterdir()} == {path.name for path in Path("plain").iterdir()}
+
+
+def test_parts_are_made_with_effects_that_are_known_before(clip: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    ladders: list[set[str]] = []
+    monkeypatch.setattr(splitting, "split_among", lambda *_: {})
+    within = choice.measured
+
+    def measured(*arguments: Any, **options: Any) -> Any:
+        cost = within(*arguments, **options)
+        ladders.append({row.rung.name for row in cost.rows})
+        return cost
+
+    monkeypatch.setattr(choice, "measured", measured)
+    noisy = [clip, *COMMON, "--set", "leak_rate_hz=5", "--budget", "vR=1", "--jobs", "2", "-q"]
+    for split in (["--split", "tiles"], []):
+        call(convert, *noisy, *split, "-o", f"out{len(ladders)}")
+    assert [("effects auto" in names, "effects none" in names) for names in ladders] == [(False, True), (True, True)]
 
 
 @pytest.mark.parametrize(

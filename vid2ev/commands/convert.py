@@ -208,11 +208,12 @@ def convert(
         options["threads"] = options["threads"] or workers.threads
 
     def each(video: str, directory: Path) -> dict[str, Any]:
-        if split and in_parts and not dry_run:
-            chosen = chosen_for(video, directory, quiet, dict(options), given())
-            return split_among(workers, video, directory, split, quiet, chosen)
-        if dry_run:
+        if dry_run or in_parts:
             checked_for(workers, video, directory, split if in_parts else None, options)
+        if split and in_parts and not dry_run:
+            # (Effects that are found while a clip passes are not to be found in parts of it.)
+            chosen = chosen_for(video, directory, quiet, dict(options), given() | {"effects auto"})
+            return split_among(workers, video, directory, split, quiet, chosen)
         return convert_one(video, directory, dry_run, verbose, quiet, dict(options))
 
     directories = {videos[0]: directory} if single else batch.directories(found, Path(output or ""))

@@ -40,7 +40,7 @@ def convert_one(
                 click.echo(f"then with the fastest setting within the budget {budget}, by `vid2ev cost`")
         if dry_run:
             return recipe
-    live = video == "-" or video.startswith("camera:")
+    live = _passes(video)
     with kept(directory, again=not live), heard(gently=live) as check, bar(quiet, check) as report:
         manifest = conversion.convert(video, directory, report=report, **options)
     if not quiet:
@@ -53,7 +53,7 @@ def check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> 
     """Raise UsageError for what no worker need try."""
     from vid2ev.recording.folder import check_free
 
-    if video == "-" or video.startswith("camera:"):
+    if _passes(video):
         raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
     check_free(directory, overwrite, resume)
 
@@ -87,9 +87,12 @@ def _within(
     budget: str, video: str, directory: Path, quiet: bool, options: dict[str, Any], named: set[str]
 ) -> dict[str, Any]:
     """The options of a conversion with the setting for its budget, that of an interrupted one if it goes on; those
-    `named` on the command line stay as they are."""
+    `named` on the command line stay as they are.  What is refused anyway is so before anything is tried."""
+    from vid2ev.commands.dry_run import checked
     from vid2ev.commands.progress import pass_bar
     from vid2ev.cost.choice import chosen, taken_up
+    from vid2ev.cost.front import Budget
+    from vid2ev.cost.ladder import Given
     from vid2ev.making.split import begun_part
     from vid2ev.recording.folder import begun_job, check_free
     from vid2ev.tracks.outputs import Outputs
@@ -97,8 +100,10 @@ def _within(
     check_free(directory, options["overwrite"], options["resume"])
     job = begun_job(directory) or begun_part(directory) if options["resume"] else {}
     begun = job.get("budget", {})
-    choice = taken_up(begun, budget)
+    choice = taken_up(begun, budget, Given(options, named))
     if choice is None:
+        if not _passes(video):
+            checked(video, directory, options, Budget.parse(budget))
         rest = dict(options)
         Outputs.taken_from(rest)
         threads, *_ = (rest.pop(name) for name in ("threads", "overwrite", "resume", "device"))
@@ -107,3 +112,8 @@ def _within(
     if not quiet:
         click.echo(choice.line)
     return choice.rung.applied(options) | {"notes": {"budget": choice.note}}
+
+
+def _passes(video: str) -> bool:
+    """Whether a video is live."""
+    return video == "-" or video.startswith("camera:")

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vid2ev.cost.front import Budget
+    from vid2ev.seen.recipe import Recipe
+    from vid2ev.tracks.outputs import Outputs
+
+MANNER = ("device", "threads", "overwrite", "resume", "skip", "effects", "tolerance", "notes")  # no part of a recipe
 
 
 def planned(
@@ -15,26 +19,14 @@ def planned(
     """The recipe for programs, and lines for people; raises what the conversion would raise before its first frame."""
     from vid2ev.commands import summary
     from vid2ev.cores import usable_cores
-    from vid2ev.making import conversion
     from vid2ev.plan import recordings
-    from vid2ev.recording.folder import check_free
-    from vid2ev.seen.recipe import Recipe
     from vid2ev.sensors.devices import device_for
     from vid2ev.terminal import lines
     from vid2ev.tracks import recorder
-    from vid2ev.tracks.outputs import Outputs
 
-    device = options.pop("device")
-    threads, outputs, seed = options.pop("threads"), Outputs.of(**Outputs.taken_from(options)), options.pop("seed")
-    overwrite, resume, _ = options.pop("overwrite"), options.pop("resume"), options.pop("skip")
-    effects, tolerance = options.pop("effects"), options.pop("tolerance")
-    options.pop("notes", None)
-    recipe = Recipe.of(video, seed=seed or 0, **options)
-    if budget is not None:
-        budget.check({mount.kind for mount in recipe.mounts})
-    recordings.check_effects(effects, tolerance)
-    conversion.check_outputs(recipe, outputs)
-    check_free(directory, overwrite, resume)
+    recipe, outputs = checked(video, directory, options, budget)
+    effects, tolerance = options["effects"], options["tolerance"]
+    device, threads, seed = options["device"], options["threads"], options["seed"]
     recipe, plans = (recipe, {}) if effects == "auto" else recordings.planned(recipe, effects, tolerance)
     described = recipe.describe() | recordings.described(plans) | {"seed": "drawn at random" if seed is None else seed}
     truth = ["truth"] * (recipe.truth is not None)
@@ -47,3 +39,22 @@ def planned(
     facts += summary.device_facts(device_for(device, recipe.work, threads or usable_cores()).describe())
     text = lines([*facts, *([("threads", str(threads))] if threads else [])])
     return described | {"outputs": outputs.describe()}, text
+
+
+def checked(video: str, directory: Path, options: dict[str, Any], budget: Budget | None) -> tuple[Recipe, Outputs]:
+    """The recipe and the outputs of a conversion; raises what it would raise before it looks at the light."""
+    from vid2ev.making import conversion
+    from vid2ev.plan import recordings
+    from vid2ev.recording.folder import check_free
+    from vid2ev.seen.recipe import Recipe
+    from vid2ev.tracks.outputs import Outputs
+
+    rest = {name: value for name, value in options.items() if name not in MANNER}
+    outputs = Outputs.of(**Outputs.taken_from(rest))
+    recipe = Recipe.of(video, **rest | {"seed": rest["seed"] or 0})
+    if budget is not None:
+        budget.check({mount.kind for mount in recipe.mounts})
+    recordings.check_effects(options["effects"], options["tolerance"])
+    conversion.check_outputs(recipe, outputs)
+    check_free(directory, options["overwrite"], options["resume"])
+    return recipe, outputs

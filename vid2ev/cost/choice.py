@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vid2ev.cost.front import Budget, refusal
+from vid2ev.cost.ladder import Given
 from vid2ev.cost.measure import measured
 from vid2ev.cost.rung import Rung
 from vid2ev.cost.table import recommendation
@@ -15,7 +16,7 @@ from vid2ev.cost.turns import Report
 from vid2ev.errors import UsageError
 
 FRAMES, REPEATS = 15, 2  # of 640x480 pixels: a short stretch
-NOT_MEASURED = ("labels", "truth", "truth_rate_hz", "skip", "seed")  # what changes no error
+NOT_MEASURED = ("labels", "skip", "seed")  # what changes no error
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ def chosen(
 ) -> Choice:
     """The setting for a budget (`front`), by the ladder on a short stretch in the middle of a clip.
 
-    options  of the conversion, those of `Recipe.of` and the effects; those `given` explicitly stay as they are
+    options  of the conversion, those of `Recipe.of` and the effects; those `given` explicitly stay as they are, and
+             rungs that are named there are not taken
 
     Raises UsageError where no setting is within the budget, and as `measured` does.
     """
@@ -63,9 +65,10 @@ def chosen(
     return Choice(rung, note, recommendation(cost))
 
 
-def taken_up(note: Mapping[str, Any], budget: str) -> Choice | None:
-    """What was chosen by an interrupted conversion, from its `note`; None if another budget was asked for."""
-    if note.get("asked") != Budget.parse(budget).text:
+def taken_up(note: Mapping[str, Any], budget: str, given: Given) -> Choice | None:
+    """What was chosen by an interrupted conversion, from its `note`; None if another budget was asked for, or something
+    was `given` since that it chose."""
+    if note.get("asked") != Budget.parse(budget).text or given.any(*note["options"], *note["settings"]):
         return None
     rung = Rung(note["setting"], options=note["options"], settings=note["settings"])
     return Choice(rung, note, f"budget {budget}: {rung.name} ({rung.arguments() or 'nothing to set'}), as before")

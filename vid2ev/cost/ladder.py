@@ -48,7 +48,8 @@ class Ladder:
 
 
 class Given:
-    """What has been given explicitly: names of options, and the keys of sensors in `overrides`."""
+    """What has been given explicitly: names of options, and the keys of sensors in `overrides`; or names of rungs that
+    cannot be taken."""
 
     def __init__(self, options: Mapping[str, Any], given: Collection[str]):
         keys = [text.partition("=")[0].strip().removeprefix("dvs.") for text in options.get("overrides", ())]
@@ -74,7 +75,7 @@ def ladder_of(recipe: Recipe, given: Given, steps: int) -> Ladder:
         "light": _light(recipe, given, steps),
         "timing": [] if given.any("timing") else _timing(dvs),
         "filter": [] if given.any("filter") else _filter(dvs),
-        "effects": [] if given.any("effects") else _effects(dvs),
+        "effects": [] if given.any("effects") else _effects(dvs, given),
         "frames": _frames(cis, given),
         "views": _views(recipe),
         "size": _size(recipe, given),
@@ -145,10 +146,11 @@ def _filter(dvs: list[DvsSpec]) -> list[Rung]:
     return [Rung(f"filter {other} log", "filter", settings={"filter": other})]
 
 
-def _effects(dvs: list[DvsSpec]) -> list[Rung]:
+def _effects(dvs: list[DvsSpec], given: Given) -> list[Rung]:
     if not any(spec.effects() for spec in dvs):
         return []
-    return [Rung(f"effects {word}", "effects", {"effects": word}) for word in ("auto", "none")]
+    rungs = [Rung(f"effects {word}", "effects", {"effects": word}) for word in ("auto", "none")]
+    return [rung for rung in rungs if not given.any(rung.name)]
 
 
 def _frames(cis: list[CisSpec], given: Given) -> list[Rung]:
