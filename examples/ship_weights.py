@@ -1,6 +1,6 @@
 """Weights to ship, of a run of `vid2ev train`: 16 bits, and a card that says where they come from.
 
-    python examples/ship_weights.py RUN [REPORT ...]
+    python examples/ship_weights.py RUN [REPORT ...] --hours 17
 
 writes interp/pretrained/NETWORK-SIZE.safetensors and NETWORK-SIZE.md.  REPORT are folders of `vid2ev eval --network
 NETWORK-SIZE`, for the scores on the card: run this first, then that, then this again; the weights are the same bytes

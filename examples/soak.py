@@ -71,6 +71,11 @@ def times_are_exact(path: Path, fps: Fraction, frames: int) -> int:
     return len(t)
 
 
+def frames_in(fps: float, seconds: float) -> int:
+    """How many frames there are up to an instant."""
+    return int(Fraction(str(seconds)) * Fraction(str(fps))) + 1
+
+
 def soak(title: str, clip: str, fps: float, seconds: float) -> bool:
     """Convert a clip and print a line of the table; whether memory stayed."""
     with tempfile.TemporaryDirectory() as folder:
@@ -79,9 +84,8 @@ def soak(title: str, clip: str, fps: float, seconds: float) -> bool:
         if done.returncode:
             raise click.ClickException(done.stderr[-2000:])
         said = json.loads(done.stdout)
-        rate = Fraction(str(fps))
-        frames = int(Fraction(str(seconds)) * rate) + 1
-        events = times_are_exact(Path(folder) / "out" / "events.h5", rate, frames)
+        frames = frames_in(fps, seconds)
+        events = times_are_exact(Path(folder) / "out" / "events.h5", Fraction(str(fps)), frames)
     samples = said["samples"]
     before, after = max(samples[len(samples) * 3 // 10 : len(samples) // 2]), max(samples[len(samples) // 2 :])
     flat = after - before <= GROWN_MB
@@ -108,9 +112,9 @@ def main(chosen: str, hours: float, fps: float, frames: int) -> None:
         clip = f"synthetic:sine,size=32x24,fps={fps},duration_s={seconds},frequency_hz=0.01"
         flat &= soak(f"{hours:g} h of 32x24 at {fps:g} fps", clip, fps, seconds)
     if chosen != "day":
-        seconds = (frames - 1) / 60
-        clip = f"synthetic:moving-edge,size=3840x2160,fps=60,duration_s={seconds + 1e-6:.6f}"
-        flat &= soak("3840x2160 at 60 fps", clip, 60, round(seconds, 6))
+        seconds = round((frames - 1) / 60 + 1e-6, 6)  # (not before the last frame)
+        clip = f"synthetic:moving-edge,size=3840x2160,fps=60,duration_s={seconds}"
+        flat &= soak("3840x2160 at 60 fps", clip, 60, seconds)
     sys.exit(0 if flat else 1)
 
 

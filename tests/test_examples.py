@@ -23,6 +23,7 @@ from vid2ev.recording.depth_files import write_depth
 from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.sensors.devices import missing_for_cuda
+from vid2ev.sources import open_source
 from vid2ev.sources.with_depth import parse_depth
 
 pytestmark = pytest.mark.long
@@ -62,6 +63,22 @@ def test_each_example_finds_what_it_imports_and_says_what_it_is(name: str, monke
     for command in commands:
         told = CliRunner().invoke(command, ["--help"])
         assert told.exit_code == 0 and told.output.startswith("Usage:")
+        needed = [option.opts[-1] for option in command.params if isinstance(option, click.Option) and option.required]
+        assert [option for option in needed if f" {option} " not in (module.__doc__ or "")] == []
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [["--clip", "4k", "--frames", str(n)] for n in (2, 20, 60, 61, 150)]
+    + [["--clip", "day", "--hours", hours, "--fps", fps] for hours, fps in (("24", "1"), ("0.01", "29.97"))],
+)
+def test_a_soak_expects_as_many_frames_as_its_clip_has(asked: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    soak, clips = example("soak"), []
+    monkeypatch.setattr(soak, "soak", lambda _, *clip: clips.append(clip) or True)
+    assert CliRunner().invoke(soak.main, asked).exit_code == 0
+    for clip, fps, seconds in clips:
+        assert open_source(clip).frames_expected == soak.frames_in(fps, seconds)
+        assert "4k" not in asked or soak.frames_in(fps, seconds) == int(asked[-1])
 
 
 def test_the_presets_obey_the_laws(measured: list[dict]) -> None:
