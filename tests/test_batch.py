@@ -137,6 +137,37 @@ def test_a_mistake_of_the_program_stops_one_video_only(monkeypatch: pytest.Monke
     assert Path("out/a9_events").exists()
 
 
+@pytest.mark.parametrize("jobs", [[], ["--jobs", "2"]])
+def test_what_no_disk_takes_stops_one_video_only_and_is_a_sentence(jobs: list[str]) -> None:
+    long = "a" * 300
+    Path("list.txt").write_text(f"{long}\n{long}.mp4\nclips/a9.npy\n")
+    for k, videos in enumerate((["list.txt"], [long, f"{long}.mp4", "clips/a9.npy"])):
+        result = vid2ev(*videos, "-o", f"out{k}", *jobs)
+        assert result.exit_code == 1 and "1 of 3 done, 2 failed" in result.stdout
+        told = [line for line in result.stdout.splitlines() if line.startswith("failed ")]
+        assert len(told) == 2 and all("File name too long; give" in line for line in told)
+        assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize("error", [MemoryError(), PermissionError(13, "Permission denied", "clips/a10.npy")])
+def test_what_is_told_of_one_video_is_told_of_one_of_many(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    from vid2ev.making import conversion
+
+    convert = conversion.convert
+
+    def failing(video: str, *arguments: object, **options: object) -> object:
+        if "a10" in video:
+            raise error
+        return convert(video, *arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(conversion, "convert", failing)
+    alone = vid2ev("clips/a10.npy", "-o", "alone").stderr
+    assert alone.startswith("error: ") and alone.count("\n") == 1
+    result = vid2ev("clips/a10.npy", "clips/a9.npy", "-o", "out")
+    assert result.exit_code == 1 and result.stderr == alone and "1 of 2 done" in result.stdout
+    assert alone.removeprefix("error: ") in result.stdout
+
+
 def test_several_outputs_of_one_conversion_agree() -> None:
     formats = ["hdf5", "aedat4", "evt2", "evt3", "dat", "npz", "csv", "rpg", "v2e-hdf5", "ros1"]
     options = ["--format", ",".join(formats[:4]), "--format", ",".join(formats[4:])]

@@ -69,14 +69,12 @@ class Commands(click.Group):
                 click.echo(f"error: {place}: {error.strerror}; make room, or print to another place", err=True)
                 _print_nowhere()
                 sys.exit(DataError.exit_code)
-            # (no name of a file, a folder that may not be entered: what the system says of it is all that is known)
-            said = DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
-            click.echo(f"error: {said}", err=True)
-            sys.exit(said.exit_code)
+            click.echo(f"error: {as_told(error)}", err=True)
+            sys.exit(DataError.exit_code)
         except Exception as error:
-            if not (full := what_is_full(error)):
+            if (told := as_told(error)) is error:
                 raise
-            click.echo(f"error: {full}", err=True)
+            click.echo(f"error: {told}", err=True)
             sys.exit(DataError.exit_code)
         except KeyboardInterrupt:
             say_interrupted()
@@ -96,6 +94,15 @@ def _print_nowhere() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
+
+
+def as_told(error: Exception) -> Exception:
+    """What a person is told of a file that cannot be opened and of memory that is full; other errors as they are."""
+    if isinstance(error, OSError) and not isinstance(error, Vid2evError) and error.filename is not None:
+        # (no name of a file, a folder that may not be entered: what the system says of it is all that is known)
+        return DataError(f"{error.filename}: {error.strerror}; give the name of a file that can be opened")
+    full = what_is_full(error)
+    return DataError(full) if full else error
 
 
 def what_is_full(error: Exception) -> str | None:

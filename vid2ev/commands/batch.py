@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vid2ev.commands import as_told
 from vid2ev.errors import Vid2evError
 
 if TYPE_CHECKING:
@@ -47,11 +48,11 @@ def convert_each(directories: dict[str, Path], convert: Convert, quiet: bool) ->
         result: dict[str, Any] = {"video": video, "directory": str(directory)}
         try:
             made = convert(video, directory)
-        except Vid2evError as error:
-            click.echo(f"error: {error}", err=True)
-            result |= _failed(error)
         except Exception as error:  # (a mistake of ours in one video does not stop the others either)
-            traceback.print_exc()
+            if isinstance(told := as_told(error), Vid2evError):
+                click.echo(f"error: {told}", err=True)
+            else:
+                traceback.print_exc()
             result |= _failed(error)
         else:
             result |= _done(made)
@@ -78,9 +79,11 @@ def convert_shared(
     for video, directory in directories.items():
         try:
             check(video, directory)
-        except Vid2evError as error:
+        except Exception as error:
+            if not isinstance(told := as_told(error), Vid2evError):
+                raise
             results[video] = _failed(error)
-            click.echo(f"error: {error}", err=True)
+            click.echo(f"error: {told}", err=True)
         else:
             tasks.append(Task(video, partial(convert, video=video, directory=directory)))
 
@@ -92,10 +95,10 @@ def convert_shared(
 
     for outcome in shared_out(tasks, workers, "clips", quiet, said):
         results[outcome.name] = _result(outcome)
-        if outcome.error and not isinstance(outcome.error, Vid2evError):
+        if outcome.error and not isinstance(as_told(outcome.error), Vid2evError):
             traceback.print_exception(outcome.error)
         if outcome.error and quiet:
-            click.echo(f"error: {outcome.error}", err=True)
+            click.echo(f"error: {as_told(outcome.error)}", err=True)
     return [{"video": video, "directory": str(directories[video])} | results[video] for video in directories]
 
 
@@ -134,8 +137,8 @@ def _told(result: dict[str, Any]) -> str:
 
 
 def _failed(error: Exception) -> dict[str, Any]:
-    if isinstance(error, Vid2evError):
-        return {"state": "failed", "error": str(error), "exit_code": error.exit_code}
+    if isinstance(told := as_told(error), Vid2evError):
+        return {"state": "failed", "error": str(told), "exit_code": told.exit_code}
     return {"state": "failed", "error": f"{type(error).__name__}: {error}", "exit_code": 1}
 
 

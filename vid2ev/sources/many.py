@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from vid2ev.errors import UsageError
@@ -29,7 +30,7 @@ def sources_in(video: str) -> list[str]:
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not folder.is_dir() or _is_recording(folder):
+    if video == "-" or not os.path.isdir(folder) or _is_recording(folder):  # (Path's complains of names too long)
         return [video]
     clips = [path for path in folder.iterdir() if _is_clip(path)]
     films = sum(path.suffix.lower() not in ARRAYS for path in clips)
@@ -56,7 +57,7 @@ def holds_pictures(folder: Path) -> bool:
 
 def is_list(path: Path) -> bool:
     """Whether a file named NAME.txt is a list: a text that holds no events."""
-    if path.suffix.lower() != LIST or not path.is_file():
+    if path.suffix.lower() != LIST or not os.path.isfile(path):
         return False
     head = head_of(path)
     return (b"\0" not in head or head.startswith(UTF_16)) and recognise(path) is None
