@@ -105,6 +105,18 @@ def test_frames_stand_among_the_events_and_come_back(tmp_path: Path, shape: tupl
     assert camera.getNextFrame() is None
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_frames_whose_times_go_back_leave_the_events_as_they_are(tmp_path: Path, seed: int) -> None:
+    """As they may stand in a file of others, whose events are put in order and whose frames are not."""
+    events = events_at(TIMES["dense"] + START_US)
+    order = np.random.default_rng(seed).permutation(10)
+    pictures = pictures_at(START_US + 9_973 * order, 3, 4)
+    write_events(tmp_path / "events.aedat4", recording_of(events, pictures=pictures))
+    found = open_events(tmp_path / "events.aedat4")
+    assert_same(Events.concatenate(found.events()), events)
+    assert_same_pictures(list(found.frames()), pictures)
+
+
 def test_packets_are_in_order_of_time(tmp_path: Path) -> None:
     events = events_at(TIMES["dense"] + START_US)
     pictures = pictures_at(START_US + 9_973 * np.arange(12), 3, 4)

@@ -56,7 +56,8 @@ def write_events(path: Path, recording: Recording) -> None:
 
 
 def _by_time(recording: Recording, pictures: Iterator[Picture]) -> Iterator[np.ndarray | Picture]:
-    """The events, as they are stored, and the pictures, each picture after the last event up to its instant."""
+    """The events, as they are stored, and the pictures, each picture after the last event up to its instant, or after
+    the picture before it where its time goes back."""
     picture = next(pictures, None)
     for _, block in promised(recording):
         stored = np.zeros(len(block), EVENT)
@@ -64,7 +65,7 @@ def _by_time(recording: Recording, pictures: Iterator[Picture]) -> Iterator[np.n
             stored[name] = getattr(block, name)
         at = 0
         while picture is not None and picture.t_us < block.t[-1]:
-            until = int(np.searchsorted(block.t, picture.t_us, side="right"))
+            until = max(at, int(np.searchsorted(block.t, picture.t_us, side="right")))
             yield stored[at:until]
             yield picture
             at, picture = until, next(pictures, None)

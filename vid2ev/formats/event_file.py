@@ -35,7 +35,7 @@ class Recording:
     blocks       gives the events afresh at each call, in order of time, `BLOCK` of them at a time but for the last;
                  times are absolute
     labelled     whether events have labels
-    frames       gives the frames beside them, in order of time; None if there are none
+    frames       gives the frames beside them, in order of time, or as they stand in a file; None if there are none
     frame_us     the instants of the frames of the source, int64, absolute; None if there were none
     """
 
