@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from vid2ev.commands.convert import convert
 from vid2ev.commands.gui import gui
 from vid2ev.commands.worker_options import NAMES
+from vid2ev.compare.recordings import compare_recordings
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
@@ -34,6 +35,7 @@ from vid2ev.gui.tasks import gathered
 from vid2ev.gui.unanswered import Unanswered
 from vid2ev.gui.why import why_not
 from vid2ev.making.conversion import default_directory
+from vid2ev.reformat import reformat
 from vid2ev.rig.camera import Camera
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.seen.recipe import Recipe
@@ -469,3 +471,18 @@ def test_a_recording_of_the_page_is_compared_by_its_own_folder(tmp_path: Path) -
     write_events(tmp_path / "dvs" / "events.h5", Recording((4, 3), 0, 900, 3, lambda: iter([events])))
     found = [gathered(lambda *_: None, str(folder)) for folder in (tmp_path, tmp_path / "dvs")]
     assert found[0].as_dict() == found[1].as_dict() and found[0].shortest_us == 200
+
+
+@pytest.mark.parametrize("name", ["later.csv", "later.raw"])
+def test_a_recording_that_says_no_beginning_is_looked_at_from_its_first_event_on(tmp_path: Path, name: str) -> None:
+    """As it is by compare --statistics: a camera's clock may be 0 long before it records."""
+    events = "".join(f"{10_000_000 + 1000 * k},{k % 5},{k % 3},1\n" for k in range(1001))
+    (tmp_path / "later.csv").write_text(f"t,x,y,p\n{events}")
+    if name == "later.raw":
+        reformat(tmp_path / "later.csv", tmp_path / name)
+        said = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(said.replace(b"% start_us 0\n", b""))
+    found = gathered(lambda *_: None, str(tmp_path / name))
+    assert found.span_us == (10_000_000, 11_000_000) and found.rate_hz == pytest.approx(1001 / 15)
+    alone = compare_recordings(tmp_path / name, tmp_path / name, statistics=True).alone
+    assert alone and alone[0].as_dict() == found.as_dict()

@@ -70,15 +70,17 @@ def costed(tell: Tell, setup: Setup, repeats: int = 1, duration_s: float | None 
 
 
 def gathered(tell: Tell, path: str) -> Any:
-    """The statistics of an event file, or of a recording that has one event camera."""
+    """The statistics of an event file, or of a recording that has one event camera: over its time, or where it does not
+    say when it begins from its first event on, as of files that are compared."""
     from vid2ev.compare.statistics import Gathering
     from vid2ev.formats import of_only_camera, open_events, survey
 
-    recording = survey(open_events(of_only_camera(path)))
+    file = open_events(of_only_camera(path))
+    recording = survey(file)
     gathering, seen = Gathering(recording.size), 0
     for events in recording.blocks():
         gathering.add(events)
         seen += len(events)
         tell(seen, recording.count, f"{seen:,} events")
     start_us = recording.start_us
-    return gathering.statistics((start_us, start_us + recording.duration_us))
+    return gathering.statistics((start_us, start_us + recording.duration_us) if file.says_start else None)
