@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import os
 import sqlite3
 import struct
 import sys
@@ -35,7 +36,7 @@ from vid2ev.formats import describe_events, format_named, open_events, read_even
 from vid2ev.formats.event_file import Picture
 from vid2ev.formats.ros1 import EVENTS, IMAGES
 from vid2ev.formats.ros2 import DEFINITIONS
-from vid2ev.formats.ros_messages import Message, image
+from vid2ev.formats.ros_messages import EventArray, Message, event_array_bytes, image
 from vid2ev.stream.events import Events
 
 TIMES = times_us()
@@ -50,6 +51,18 @@ uint64 time_base
 string encoding
 bool is_bigendian
 uint8[] events
+"""
+METADATA = """rosbag2_bagfile_information:
+  version: 4
+  storage_identifier: sqlite3
+  relative_file_paths: [bag.db3]
+  duration: {nanoseconds: 0}
+  starting_time: {nanoseconds_since_epoch: 5}
+  message_count: 1
+  topics_with_message_count:
+  - message_count: 1
+    topic_metadata: {name: /dvs/events, type: dvs_msgs/msg/EventArray, serialization_format: cdr,
+                     offered_qos_profiles: ''}
 """
 
 
@@ -393,16 +406,39 @@ def test_a_small_chunk_that_swells_without_end_is_refused(tmp_path: Path, compre
     refused(tmp_path / "bomb")
 
 
-@pytest.mark.parametrize("content", [None, 1 << 40, 0.5, "text"])
-def test_messages_of_a_base_that_are_no_bytes_are_refused(tmp_path: Path, content: object) -> None:
-    """A number would be taken for how many bytes to make."""
-    with closing(sqlite3.connect(tmp_path / "bag.db3")) as base, base:
+def base_of(path: Path, content: object) -> Path:
+    """A base of SQLite with one message of events."""
+    with closing(sqlite3.connect(path.with_name("base"))) as base, base:
         base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
         columns = "name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT"
         base.execute(f"CREATE TABLE topics(id INTEGER PRIMARY KEY, {columns})")
         base.execute("INSERT INTO topics VALUES (1, '/dvs/events', 'dvs_msgs/msg/EventArray', 'cdr', '')")
         base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 5, ?)", (content,))
-    assert "damaged" in refused(tmp_path / "bag.db3")
+    return path.with_name("base").rename(path)
+
+
+@pytest.mark.parametrize("content", [None, 1 << 40, 0.5, "text"])
+def test_messages_of_a_base_that_are_no_bytes_are_refused(tmp_path: Path, content: object) -> None:
+    """A number would be taken for how many bytes to make."""
+    assert "damaged" in refused(base_of(tmp_path / "bag.db3", content))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has fewer letters for names")
+@pytest.mark.parametrize("name", [b"run#1.db3", b"run?mode=rwc", b"r%75n", b"a b.db3", "ü:€".encode(), b"\xff.db3"])
+def test_a_base_is_read_whatever_it_and_its_folder_are_called(tmp_path: Path, name: bytes) -> None:
+    """Not another one, which has the beginning of its name."""
+    events, folder = events_at(START_US + np.arange(99)), tmp_path / os.fsdecode(name)
+    folder.mkdir()
+    whole, part = (
+        event_array_bytes(EventArray(SIZE, START_US, events.stretch(0, count)), 0, cdr=True) for count in (99, 9)
+    )
+    path = base_of(folder / os.fsdecode(name), whole)
+    for other in (folder / "run", tmp_path / "run"):
+        base_of(other, part)
+    assert_same(Events.concatenate(read_events(path)), events)
+    path.rename(folder / "bag.db3")
+    (folder / "metadata.yaml").write_text(METADATA)
+    assert_same(Events.concatenate(read_events(folder)), events)
 
 
 def test_without_rosbags_one_sentence_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,12 +13,14 @@ Source: https://mcap.dev/spec and https://github.com/ros2/rosbag2
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from urllib.parse import quote
 
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Format, Picture, Recording
@@ -69,9 +71,8 @@ class Ros2Bag:
     def _opened(self) -> Any:
         """The reader of the file, open; its name does not count."""
         try:
-            from rosbags.rosbag2 import Reader
+            from rosbags.rosbag2.reader import DirectoryReader
             from rosbags.rosbag2.storage_mcap import McapReader
-            from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
         except ImportError as error:
             raise DataError(f"{self.path} cannot be read: {MISSING}") from error
         with open(self.path, "rb") as file:
@@ -81,15 +82,23 @@ class Ros2Bag:
             bound_decompression()
             if head.startswith(METADATA):
                 check_bag(self.path)
-                reader = Reader(self.path.parent)
+                reader = DirectoryReader(self.path.parent)
+                reader.STORAGE_PLUGINS = {**reader.STORAGE_PLUGINS, "sqlite3": _base}
             else:
-                reader = (McapReader if head.startswith(MCAP) else Sqlite3Reader)(self.path)
+                reader = McapReader(self.path) if head.startswith(MCAP) else _base(self.path)
             reader.open()
         except DataError:
             raise
         except Exception as error:
             raise ValueError("no bag that rosbags can read") from error
         return reader
+
+
+def _base(path: Path) -> Any:
+    """The reader of a base of SQLite.  (rosbags makes a URI of its name, in which a # or ? ends it.)"""
+    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
+    return Sqlite3Reader(Path(quote(os.fsencode(path))))
 
 
 def open_events(path: Path) -> RosEvents:
