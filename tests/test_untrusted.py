@@ -22,7 +22,9 @@ from interp import weights
 from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
 from vid2ev.errors import DataError, UsageError, Vid2evError
-from vid2ev.formats import open_events, recognise
+from vid2ev.formats import format_named, open_events, recognise
+from vid2ev.formats.event_file import Picture, Recording
+from vid2ev.formats.ros1 import write_events as write_bag
 from vid2ev.light.picture_files import read_picture
 from vid2ev.light.recognise import head_of
 from vid2ev.recording.exposures import read_codes, read_spans
@@ -152,6 +154,58 @@ def test_hdf5_cannot_fill_the_memory_or_reach_into_other_files(tmp_path: Path) -
                 file.create_virtual_dataset("events/t", layout)
         with pytest.raises(DataError, match="is in another file"):
             open_events(path)
+
+
+def event_stream(path: Path, size: tuple[int, int]) -> Path:
+    path.write_bytes(b"Event Stream" + bytes([2, 0, 0, 1]) + struct.pack("<HH", *size) + bytes(5))
+    return path
+
+
+def hdf5_of(path: Path, size: tuple[int, int]) -> Path:
+    with h5py.File(hdf5(path), "r+") as file:
+        file.attrs.update(width=size[0], height=size[1])
+    return path
+
+
+def bag_of(path: Path, size: tuple[int, int]) -> Path:
+    write_bag(path, Recording(size, 0, 0, 0, lambda: iter(())))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "size"),
+    [
+        *((event_stream, size) for size in ((0, 0), (0, 3), (3, 0))),
+        *((hdf5_of, size) for size in ((0, 8), (8, -1), (1 << 40, 8), (8, (1 << 16) + 1))),
+        *((bag_of, size) for size in ((1 << 31, 1 << 31), (8, (1 << 16) + 1))),
+    ],
+)
+def test_sizes_that_no_sensor_has_are_refused(
+    make: Callable[[Path, tuple[int, int]], Path], size: tuple[int, int], tmp_path: Path
+) -> None:
+    path = make(tmp_path / "events", size)
+    with pytest.raises(DataError, match=rf"says {size[0]}x{size[1]} pixels, expected 1 to 65536"):
+        open_events(path)
+    assert open_events(make(tmp_path / "events", (1 << 10, 1))).size == (1 << 10, 1)
+
+
+def pictures_of(name: str, path: Path, shape: tuple[int, int]) -> Path:
+    """A file of events with a frame."""
+    picture = Picture(5, np.zeros(shape, np.uint8))
+    write = format_named(name).write
+    assert write
+    write(path, Recording((8, 8), 0, 10, 0, lambda: iter(()), frames=lambda: iter([picture])))
+    return path
+
+
+@pytest.mark.parametrize("name", ["aedat4", "ros1", "ros2"])
+@pytest.mark.parametrize("shape", [(0, 0), (0, 3), (3, 0)])
+def test_frames_of_no_pixels_are_refused(name: str, shape: tuple[int, int], tmp_path: Path) -> None:
+    assert [frame.pixels.shape for frame in open_events(pictures_of(name, tmp_path / "one", (1, 1))).frames()] == [
+        (1, 1)
+    ]
+    with pytest.raises(DataError, match="damaged"):
+        list(open_events(pictures_of(name, tmp_path / "none", shape)).frames())
 
 
 def test_texts_that_are_nested_too_deeply_are_no_texts(tmp_path: Path) -> None:

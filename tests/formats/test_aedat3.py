@@ -129,6 +129,7 @@ HUGE = struct.pack("<hhiiiiii", 1, 1, 8, 4, 0, 1 << 28, 1 << 28, 1 << 28)
         packet(-0x8000 | 1, 8, 0, [bytes(8)]),
         packet(2, 20, 0, [b"\x03" + bytes(19)]),
         packet(2, 40, 0, [frame(1, np.zeros((3, 4, 1)), 0)[:40]]),
+        packet(2, 36, 0, [frame(1, np.zeros((0, 0, 1)), 0)]),
         struct.pack("<hhiiiiii", 1, 1, 0, 4, 0, 9, 9, 9),
         struct.pack("<hhiiiiii", 1, 1, 8, 4, 0, 9, -9, 9),
     ],

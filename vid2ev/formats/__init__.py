@@ -58,6 +58,7 @@ FORMATS = {
 
 
 LONG_SILENCE_US = 3_600_000_000  # before the first event: the file counts from another instant than it begins
+LARGEST_SIDE = 1 << 16  # pixels of a sensor, as columns and rows are uint16
 LATEST_US = 1 << 62  # which times are nearer to 0 than: differences of two, and twice as much, still fit into 64 bits
 DEEPEST_US = 60_000_000  # how far times may go back; events of so long are held in memory
 
@@ -265,7 +266,13 @@ def _opened(path: str | Path) -> tuple[Format, EventFile]:
     if kind is None or kind.open is None:
         refuse_mat(path)
         raise DataError(f"{path} is no event file of a known format; expected one of {', '.join(FORMATS)}")
-    return kind, kind.open(path)
+    file = kind.open(path)
+    if file.size is not None and not 1 <= min(file.size) <= max(file.size) <= LARGEST_SIDE:
+        width, height = file.size
+        raise DataError(
+            f"{path} says {width}x{height} pixels, expected 1 to {LARGEST_SIDE} a side; it is damaged: get another copy"
+        )
+    return kind, file
 
 
 def _parts_of(kind: Format, path: Path) -> list[Path]:

@@ -155,7 +155,7 @@ def _picture(content: bytes, overflows: int) -> Iterator[Picture]:
     channels, (width, height) = int(head["info"]) >> 1 & 7, head["size"].tolist()
     if not head["info"] & 1:
         return
-    if width < 0 or height < 0 or channels not in (1, 3, 4):
+    if width < 1 or height < 1 or channels not in (1, 3, 4):
         raise ValueError(f"a frame of {width}x{height} pixels of {channels} channels")
     count = width * height * channels
     if FRAME_HEAD.itemsize + 2 * count > len(content):

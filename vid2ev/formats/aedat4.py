@@ -213,7 +213,7 @@ def _picture(content: bytes) -> Picture:
     kind, width, height = frame.scalar(5, "b"), frame.scalar(6, "h"), frame.scalar(7, "h")
     depth, channels = np.dtype({0: "u1", 2: "<u2"}.get(kind & 7, "V4")), (kind >> 3) + 1
     pixels = frame.vector(10, np.dtype("u1"))
-    if width < 0 or height < 0 or pixels.size != width * height * channels * depth.itemsize:
+    if width < 1 or height < 1 or pixels.size != width * height * channels * depth.itemsize:
         raise ValueError("a frame of another size than its header says")
     if channels not in CHANNELS or depth.kind != "u":
         raise ValueError(f"frames of OpenCV's type {kind}")

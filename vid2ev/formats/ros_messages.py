@@ -144,7 +144,7 @@ def image(content: bytes, cdr: bool) -> Picture:
     pixels = fields.take(fields.number("I"))
     channels, bits = CHANNELS.get(encoding, (0, 8))
     length = width * channels * bits // 8
-    if not channels or step < length or step * height != len(pixels):
+    if not (channels and length and height) or step < length or step * height != len(pixels):
         raise ValueError(f"an image of {width}x{height} pixels in {encoding}")
     rows = np.frombuffer(pixels, np.uint8).reshape(height, step)[:, :length]
     # The upper byte of each pixel, of those that have two.
