@@ -36,7 +36,7 @@ from vid2ev.formats import describe_events, format_named, open_events, read_even
 from vid2ev.formats.event_file import Picture
 from vid2ev.formats.ros1 import EVENTS, IMAGES
 from vid2ev.formats.ros2 import DEFINITIONS
-from vid2ev.formats.ros_messages import EventArray, Message, event_array_bytes, image
+from vid2ev.formats.ros_messages import EventArray, Message, event_array_bytes, image, image_bytes
 from vid2ev.stream.events import Events
 
 TIMES = times_us()
@@ -333,6 +333,35 @@ def test_images_of_other_encodings_are_read(cdr: bool) -> None:
     for encoding, seen in (("rgb8", [1, 2, 3]), ("rgba8", [1, 2, 3]), *((name, [3, 2, 1]) for name in BLUE_FIRST)):
         pixels = bytes([1, 2, 3, 4][: 4 if "a" in encoding else 3])
         assert image_message(cdr, encoding, pixels, 1).pixels.tolist() == [[seen]]
+
+
+def simulators_bag(folder: Path, kind: str, topics: dict[str, bytes]) -> Path:
+    """A bag with an event and, before it, an image of 1x1 pixels in some encodings, each of five letters."""
+    types, path = types_of(kind), folder / ("camera.bag" if kind == "ros1" else "camera")
+    bag: Any = rosbag1.Writer(path) if kind == "ros1" else rosbag2.Writer(path, version=9)
+    with bag:
+        for number, (topic, encoding) in enumerate(topics.items()):
+            content = image_bytes(Picture(5_000_000, np.full((1, 1), number, np.uint8)), 0, kind == "ros2")
+            connection = bag.add_connection(topic, "sensor_msgs/msg/Image", typestore=types)
+            bag.write(connection, 10**9 + number, content.replace(b"mono8", encoding))
+        content = event_array_bytes(EventArray((8, 8), 5_000_000, events_at([5_000_000])), 0, kind == "ros2")
+        bag.write(bag.add_connection("/cam0/events", ARRAY, typestore=types), 2 * 10**9, content)
+    return path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_images_beside_events_those_that_are_pictures_are_read(tmp_path: Path, kind: str) -> None:
+    """ESIM writes /cam0/image_raw and /cam0/depthmap; MVSEC has depth_image_raw."""
+    topics = {"/cam1/image_raw": b"mono8", "/cam0/depthmap": b"32FC1", "/cam0/depth_image_raw": b"32FC1"}
+    found = open_events(simulators_bag(tmp_path, kind, topics | {"/cam0/image_raw": b"mono8"}))
+    assert found.describe()["images"] == "/cam0/image_raw"
+    assert [picture.pixels.tolist() for picture in found.frames()] == [[[3]]]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_images_in_an_encoding_that_is_not_read_are_not_said_to_be_damaged(tmp_path: Path, kind: str) -> None:
+    said = refused(simulators_bag(tmp_path, kind, {"/cam0/depthmap": b"32FC1"}))
+    assert "images of /cam0/depthmap in the encoding '32FC1', expected mono8, " in said and "--no-frames" in said
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -27,7 +27,7 @@ import numpy as np
 from vid2ev.errors import DataError, UsageError, read_as
 from vid2ev.formats.event_file import BLOCK, PACKETS, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.evt_state import Left, State, said_of
-from vid2ev.formats.ros_messages import KINDS, EventArray, EventPacket, event_array, event_packet, image
+from vid2ev.formats.ros_messages import CHANNELS, KINDS, EventArray, EventPacket, event_array, event_packet, image
 from vid2ev.formats.rosbag import Topic
 from vid2ev.formats.sequential import leave_out, outside_of
 from vid2ev.stream.events import Events
@@ -87,8 +87,15 @@ class RosEvents:
     def frames(self) -> Iterator[Picture]:
         """The images of the topic next to that of the events."""
         with read_as(self.path, "a bag"):
-            for _, content in self._bag.messages([self._images.name] if self._images else []):
-                yield image(content, self._bag.cdr)
+            for topic, content in self._bag.messages([self._images.name] if self._images else []):
+                try:
+                    picture = image(content, self._bag.cdr)
+                except KeyError as error:
+                    raise DataError(
+                        f"{self.path} holds images of {topic} in the encoding {error}, expected {', '.join(CHANNELS)};"
+                        " leave them out: render with --no-frames, reformat to a format without frames, such as hdf5"
+                    ) from error
+                yield picture
 
     def _look(self) -> None:
         """Size, start and encoding, from the first messages."""
@@ -127,9 +134,15 @@ class RosEvents:
 
 
 def _nearest(images: list[Topic], events: Topic) -> Topic | None:
-    """The topic whose name begins like that of the events."""
+    """The topic whose name begins like that of the events; of several that of pictures, and not of depth, as
+    simulators have it."""
     beside = [topic for topic in images if topic.name.split("/")[:-1] == events.name.split("/")[:-1]]
-    return (beside or images or [None])[0]  # type: ignore[list-item]
+
+    def is_other(topic: Topic) -> tuple[bool, bool]:
+        name = topic.name.rpartition("/")[2]
+        return "depth" in name, "image" not in name
+
+    return min(beside or images, key=is_other, default=None)
 
 
 class _Words:

@@ -137,14 +137,15 @@ def event_packet(content: bytes, cdr: bool) -> EventPacket:
 
 
 def image(content: bytes, cdr: bool) -> Picture:
-    """The message of sensor_msgs/Image, of more than 8 bits cut to 8.  Raises ValueError."""
+    """The message of sensor_msgs/Image, of more than 8 bits cut to 8.  Raises ValueError, KeyError for an encoding that
+    is not read."""
     fields = Fields(content, cdr)
     stamp_us = fields.header()
     (width, height), encoding, big, step = fields.size(), fields.text(), fields.number("B"), fields.number("I")
     pixels = fields.take(fields.number("I"))
-    channels, bits = CHANNELS.get(encoding, (0, 8))
+    channels, bits = CHANNELS[encoding]
     length = width * channels * bits // 8
-    if not (channels and length and height) or step < length or step * height != len(pixels):
+    if not (length and height) or step < length or step * height != len(pixels):
         raise ValueError(f"an image of {width}x{height} pixels in {encoding}")
     rows = np.frombuffer(pixels, np.uint8).reshape(height, step)[:, :length]
     # The upper byte of each pixel, of those that have two.
