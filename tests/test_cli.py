@@ -247,6 +247,15 @@ def test_info_on_everything() -> None:
     assert json.loads(vid2ev("info", "clip.mp4", "--json").stdout)["size"] == [64, 48]
 
 
+def test_info_does_not_print_the_lines_of_a_header() -> None:
+    """Of AEDAT 2 they may be 186 kB."""
+    settings = b"# a setting\r\n" * 9000 + b"# AEChip: Davis346blue\r\n#End Of ASCII Header\r\n"
+    Path("old.aedat").write_bytes(b"#!AER-DAT2.0\r\n" + settings + bytes([0, 0, 0, 0, 0, 0, 0, 5]))
+    said = vid2ev("info", "old.aedat").stdout
+    assert "346x260" in said and "stored    aedat2, 1" in said and "setting" not in said
+    assert len(json.loads(vid2ev("info", "old.aedat", "--json").stdout)["stored"]["header"]) == 9003
+
+
 def test_warnings_of_a_rig_say_which_cameras_they_are_about() -> None:
     """Those of all are of no single one."""
     counts = {"frames": 2, "subframes": 0, "events": 0, "on": 0}

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from vid2ev import terminal
-from vid2ev.terminal import MORE, SELDOM_S, bar_of
+from vid2ev.terminal import MORE, SELDOM_S, bar_of, lines
 
 STEPS = "{percentage:3.0f}% {bar:12} step {n_fmt}/{total_fmt}, {remaining} left{postfix}"
 
@@ -74,3 +74,8 @@ def test_work_goes_on_where_nobody_reads_its_log(monkeypatch, stderr):
             bar.update()
             bar.refresh()
     assert bar.disable == (stderr == "none") or bar.n == 2
+
+
+def test_what_is_quoted_of_files_moves_no_cursor() -> None:
+    text = lines([("camera", "DVS\x1b[2J\x9b31m\r\nmade"), ("na\x07me", "\udcff é\t1")])
+    assert text == "camera    DVS [2J 31m made\nna me     \udcff é 1"

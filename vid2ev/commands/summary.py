@@ -177,7 +177,7 @@ def event_facts(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     if facts["times_going_back"]:
         found.append(("order", f"times go back at {facts['times_going_back']:,} places"))
     said = {key.replace("_", " "): value for key, value in facts["stored"].items() if value is not None}
-    stored = [facts["format"], *(f"{key} {value}" for key, value in said.items() if not isinstance(value, dict))]
+    stored = [facts["format"], *(f"{key} {value}" for key, value in said.items() if not isinstance(value, dict | list))]
     stored += [f"{facts['bytes'] / count:.2f} bytes per event"] if count else []
     stored += [f"with {name}" for name in ("labels", "frames") if facts[name]]
     return [*found, ("stored", ", ".join(stored)), *(("warning", text) for text in facts["warnings"])]
