@@ -196,6 +196,8 @@ def test_other_formats_have_an_index_of_frames_beside_them() -> None:
     assert len(blocks) > 3 and Path("again.csv").read_bytes() == Path("out/frame_index.csv").read_bytes()
     assert vid2ev("clips/a9.npy", "-o", "both", "--format", "hdf5,csv").exit_code == 0
     assert not Path("both/frame_index.csv").exists()  # (which is in events.h5)
+    assert vid2ev("clips/a9.npy", "-o", "v2e", "--format", "v2e-hdf5,hdf5").exit_code == 0
+    assert Path("v2e/frame_index.csv").read_bytes() == Path("out/frame_index.csv").read_bytes()  # (events.h5 is v2e's)
 
 
 @pytest.mark.parametrize(

@@ -120,11 +120,16 @@ class Outputs:
             taken[kind.name] = f"events-{kind.name}{kind.suffix}" if plain in taken.values() else plain
         return taken
 
+    @property
+    def _index_beside(self) -> bool:
+        """Whether the file that is read of the folder, the first that there is, has no instants of frames inside."""
+        return self.files().get("hdf5") != f"events{format_named('hdf5').suffix}"
+
     def names(self, kind: str = "dvs") -> list[str]:
         """All files of a camera of a kind, the manifest among them."""
         if kind == "cis":
             return [*(exposures.KINDS[name] for name in self.pictures), "manifest.json"]
-        files = [*self.files().values(), *([] if "hdf5" in self.formats else [FRAME_INDEX])]
+        files = [*self.files().values(), *[FRAME_INDEX] * self._index_beside]
         files += [KINDS[self.frames]] if self.frames else []
         files += ["frames.csv"] * (self.frames == "mp4")  # (the slices that its pictures are of)
         files += ["probe.csv", "probe.png"] if self.probe else []
@@ -147,7 +152,7 @@ class Outputs:
                 raise SavedError(
                     f"{folder}: {error}; what was kept to go on from is damaged, --overwrite starts again"
                 ) from error
-        if recording.frame_us is not None and "hdf5" not in self.formats:  # (which has it inside)
+        if recording.frame_us is not None and self._index_beside:
             write_frame_index(folder / FRAME_INDEX, recording)
         if self.frames is not None:
             path = folder / KINDS[self.frames]
