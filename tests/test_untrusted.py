@@ -21,6 +21,7 @@ import torch
 from interp import weights
 from interp.networks import make
 from interp.train.checkpoints import read_checkpoint
+from vid2ev.compare.recordings import compare_recordings
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.formats import format_named, open_events, recognise
 from vid2ev.formats.event_file import Picture, Recording
@@ -31,6 +32,7 @@ from vid2ev.recording.exposures import read_codes, read_spans
 from vid2ev.recording.manifest import as_stated, read_manifest
 from vid2ev.recording.pose_text import read_poses
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, write_flow
+from vid2ev.reformat import reformat
 from vid2ev.rig.calibration import read_calibration
 from vid2ev.rig.depth import DepthScale
 from vid2ev.rig.depth_files import DepthFiles
@@ -44,6 +46,7 @@ from vid2ev.sources.motion import parse_motion
 from vid2ev.sources.times import read_timestamp_array, read_timestamps
 from vid2ev.toml_text import parsed_toml
 from vid2ev.untrusted import LARGEST, PATHS, beside, json_of, most_bytes, read_arrays, read_text
+from vid2ev.views.render import render
 
 MEGABYTE = 1 << 20
 
@@ -187,6 +190,20 @@ def test_sizes_that_no_sensor_has_are_refused(
     with pytest.raises(DataError, match=rf"says {size[0]}x{size[1]} pixels, expected 1 to 65536"):
         open_events(path)
     assert open_events(make(tmp_path / "events", (1 << 10, 1))).size == (1 << 10, 1)
+
+
+@pytest.mark.usefixtures("small")
+def test_sensors_take_no_more_memory_than_a_file_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of 21 bytes may say that it is of 65535x65535 pixels."""
+    path = event_stream(tmp_path / "large.es", (1000, 1000))
+    with pytest.raises(DataError, match=r"a comparison of 1000x1000 pixels would take 48 MB"):
+        compare_recordings(path, path)
+    with pytest.raises(DataError, match=r"a picture of 1000x1000 pixels would take 16 MB"):
+        render(path, tmp_path / "a.png")
+    assert reformat(path, tmp_path / "large.npz")["size"] == [1000, 1000]  # (which has nothing of each pixel)
+    monkeypatch.setenv(LARGEST, "48")
+    assert compare_recordings(path, path).comparison.events == 1
+    assert render(path, tmp_path / "a.png")["events"] == 1
 
 
 def pictures_of(name: str, path: Path, shape: tuple[int, int]) -> Path:

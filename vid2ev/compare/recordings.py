@@ -7,6 +7,7 @@ out is counted.
 Streams of any length are compared in bands of rows: all events of a band of both recordings are in memory at a time, at
 most `LIMIT` of them (or those of one row) at 20 bytes each, 60 if one pixel has them all, and the files are read once
 more for each band.  Pixels know nothing of each other here, so the numbers are the same however the bands are cut.
+Each pixel of the sensor takes `PIXEL` bytes beside them.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ from vid2ev.errors import DataError, UsageError
 from vid2ev.formats import open_events, survey
 from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.stream.events import Events
+from vid2ev.untrusted import check_bytes
 
 LIMIT = 1 << 25  # events in memory at a time: 0.7 GB
+PIXEL = 50  # bytes of a pixel
 
 Report = Callable[[Recording, int], object]
 
@@ -122,6 +125,7 @@ def compare_recordings(
     files = open_events(recording), open_events(reference)
     one, other = (_Side(str(path), survey(file)) for path, file in zip((recording, reference), files, strict=True))
     size = _size(one, other, *(file.size for file in files))
+    check_bytes(one.path, PIXEL * size[0] * size[1], f"a comparison of {size[0]}x{size[1]} pixels")
     if align == "start":
         begins_us, other_us = _beginnings((one, other), files)
         other = replace(other, shift_us=begins_us - other_us)

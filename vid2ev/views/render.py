@@ -22,6 +22,7 @@ from vid2ev.formats.event_file import EventFile, Recording
 from vid2ev.formats.frame_index import frame_times_beside
 from vid2ev.pictures.film import film_size
 from vid2ev.recording.disk import whole, writing
+from vid2ev.untrusted import check_bytes
 from vid2ev.views.canvas import Canvas
 from vid2ev.views.destination import check_free, kind_of
 from vid2ev.views.on_disk import FPS, write_film, write_picture, write_pictures
@@ -32,6 +33,7 @@ from vid2ev.views.window import beginning_us, window, with_frame_times
 
 VIEWS = {"polarity": "counts", "accumulated": "frame", "voxel": "voxel", "time-surface": "time-surface"}
 SIDE = 1280  # pixels
+PIXEL = 16  # bytes of a pixel of the sensor, until its picture is reduced
 RANGES = {"fps": (0.01, 1000), "speed": (1e-6, 1e6), "start": (0, 1e9), "stop": (0, 1e9), "size": (64, 8192)}
 
 Report = Callable[[Recording, int], object]
@@ -79,6 +81,8 @@ def render(
     zero_us = beginning_us(file)
     frame_us = frame_times_beside(file.path) if isinstance(slicing, Source) and not file.has_frames else None
     recording = _recording(file, zero_us, start_s, stop_s, bool(frames), frame_us)
+    width, height = recording.size
+    check_bytes(file.path, PIXEL * width * height, f"a picture of {width}x{height} pixels")
     if isinstance(slicing, Source):
         recording = with_frame_times(recording)
     if made_as == "png" and by is None and speed is None and (start_s, stop_s) != (None, None):
