@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,6 +129,25 @@ def test_a_finished_recording_is_left_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="threshold_on"), Folder(tmp_path / "out", OTHER, resume=True):
         pass
     assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("finished", [False, True])
+@pytest.mark.parametrize("more", [{"part": [0, 3]}, {"since_ns": 5}, {"truth": {"kinds": ["depth"]}}])
+def test_what_was_asked_for_in_addition_is_another_job(tmp_path: Path, more: dict[str, Any], finished: bool) -> None:
+    """Not only what is asked for in addition; that a finished recording has more in it is as good."""
+    for begun_with, asked in ((JOB | more, JOB), (JOB, JOB | more)):
+        out = tmp_path / f"out{len(asked)}"
+        with Folder(out, begun_with, **COLUMNS) as folder:
+            made(folder) if finished else folder.checkpoint({"level": np.arange(4.0)})
+        again = Folder(out, asked, resume=True, **COLUMNS)
+        if finished and asked == JOB and "truth" in more:
+            with again:
+                assert again.finished
+            continue
+        with pytest.raises(UsageError, match=rf"was begun with {min(more)}"), again:
+            pass
+        with Folder(out, begun_with, resume=True, **COLUMNS) as folder:
+            assert finished or folder.saved()
 
 
 def test_overwriting_keeps_the_old_until_the_new_is_whole(tmp_path: Path) -> None:

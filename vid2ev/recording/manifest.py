@@ -19,6 +19,8 @@ from typing import Any
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.untrusted import json_of, read_text
 
+JOB = "job.json"  # what is made, and nothing else, while it is
+OF_A_PART = ("part", "since_ns")  # what a job has only where it is not of all pixels, or all of the time
 LONGEST = 100  # characters of a value that is not as it was
 LIBRARIES = ("vid2ev", "numpy", "numba", "av", "opencv-contrib-python-headless", "h5py")
 HEAD, LEAST = 1 << 20, 4096  # bytes of all beginnings by which files are known, and of each at least; of ends as many
@@ -103,7 +105,8 @@ def is_of_job(path: Path, job: Mapping[str, Any], output: Path, overwrite: bool)
     """Whether the job or manifest in a file is of this job; if it is not, that is a UsageError unless `output` may be
     overwritten."""
     earlier = read_manifest(path)
-    changed = difference({key: earlier.get(key) for key in job}, job)
+    known = {*earlier} if path.name == JOB else {*job, *OF_A_PART}  # (a manifest says what came of it, too)
+    changed = difference({key: earlier[key] for key in earlier if key in known}, job)
     if changed and not overwrite:
         raise UsageError(
             f"{output} was begun with {changed}; --resume needs the options it was begun with, --overwrite starts again"
