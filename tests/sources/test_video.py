@@ -17,6 +17,7 @@ from vid2ev.commands.summary import source_text
 from vid2ev.errors import DataError, UsageError
 from vid2ev.light.transfer import parse_transfer
 from vid2ev.sources import footage, open_source
+from vid2ev.sources.kept import Kept
 
 LIMITED, FULL = 1, 2
 
@@ -457,6 +458,24 @@ def test_a_disk_that_fails_ends_the_clip_with_a_remark(encode, monkeypatch: pyte
     frames = list(source.frames())
     assert 18 <= len(frames) <= 20  # (the decoder's rest included)
     assert any("cannot be read to its end" in warning for warning in source.warnings)
+
+
+@pytest.mark.parametrize("name", ["a.mkv", "a.mp4", "a.nut"])
+def test_a_title_may_be_of_any_bytes(encode, tmp_path: Path, name: str) -> None:
+    """As of programs that write it in the letters of their country."""
+    plain, titled, title = encode("plain.mkv", flat([10, 20, 30]), codec="libx264"), tmp_path / name, b"a title of all"
+    with av.open(str(plain)) as one, av.open(str(titled), "w") as other:
+        other.metadata["title"] = title.decode()
+        stream = other.add_stream_from_template(one.streams.video[0])
+        for packet in (packet for packet in one.demux(video=0) if packet.size):
+            packet.stream = stream
+            other.mux(packet)
+    content = titled.read_bytes()
+    titled.write_bytes(content.replace(title, b"caf\xe9 \xa9 1998..."))
+    assert titled.read_bytes() != content and len(list(open_source(titled).frames())) == 3
+    if name == "a.mkv":  # (which can be read from a pipe)
+        with open(titled, "rb") as file:
+            assert len(list(footage.Piped(Kept(file, "a pipe")).pictures([]))) == 3
 
 
 def test_a_change_of_size_is_refused(encode) -> None:

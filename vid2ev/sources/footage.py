@@ -25,6 +25,7 @@ from vid2ev.sources.transport_stream import TAIL, remarks_on_end
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
 STREAMS = "Y4M, Matroska, MPEG-TS or fragmented MP4"
+ANY_TEXT = "replace"  # of titles and remarks, which may be of any bytes
 SEEKABLE = ("mp4", "matroska")  # containers with an index, and a presentation time for every picture
 STEPS_BACK_S = (0, 2, 10)  # how far before the place a key frame is looked for
 
@@ -97,7 +98,8 @@ class VideoFile:
     def _opened(self) -> Iterator[tuple[Any, Any]]:
         try:
             # `file:` and the whitelist keep playlists and odd file names from opening anything but local files
-            container = av.open(f"file:{self.path}", format=self._format, options={"protocol_whitelist": "file"})
+            whitelist = {"protocol_whitelist": "file"}
+            container = av.open(f"file:{self.path}", format=self._format, options=whitelist, metadata_errors=ANY_TEXT)
         except (av.FFmpegError, ValueError) as error:
             raise DataError(f"{self.path}: not a video that can be read ({reason(error)}); {REMEDY}") from error
         with container:
@@ -141,7 +143,7 @@ class Piped:
     @contextmanager
     def _opened(self, reader: Reader) -> Iterator[tuple[Any, Any]]:
         try:
-            container = av.open(reader, options={"protocol_whitelist": ""})
+            container = av.open(reader, options={"protocol_whitelist": ""}, metadata_errors=ANY_TEXT)
         except (av.FFmpegError, ValueError) as error:
             raise DataError(
                 f"{self.name}: not a video that can be read from a pipe ({reason(error)}); pipe {STREAMS} in, or give"
