@@ -110,6 +110,15 @@ def test_broken_files_are_refused(tmp_path: Path, content: bytes | None) -> None
         open_source(path, fps=1)
 
 
+@pytest.mark.parametrize("shape", [(2**32, 2**32, 2), (2**62, 4, 4), (2**63, 4, 4), (10**30, 4, 4)], ids=str)
+def test_a_shape_that_no_file_can_hold_is_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    with open(tmp_path / "clip.npy", "wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f4", "fortran_order": False, "shape": shape})
+        file.write(bytes(400))
+    with pytest.raises(DataError, match=r"clip\.npy: not a \.npy array"):
+        open_source(tmp_path / "clip.npy", fps=1)
+
+
 def test_no_code_is_run_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "clip.npy"
     np.save(path, np.array([[[{"an": "object"}]]], dtype=object), allow_pickle=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -115,6 +116,15 @@ def test_a_bad_timestamp_file_is_refused_by_name(tmp_path: Path, text: str) -> N
     file = tmp_path / "timestamps.txt"
     file.write_text(text)
     with pytest.raises(DataError, match=r"timestamps\.txt"):
+        read_timestamps(file)
+
+
+@pytest.mark.parametrize("word", ["1e999", "1e1_000", "1e-9_99", "1E+3_0_0"])
+def test_numbers_of_more_digits_than_any_time_are_not_worked_out(tmp_path: Path, word: str) -> None:
+    """What reads them takes as long, and as much memory, as they say."""
+    file = tmp_path / "timestamps.txt"
+    file.write_text(f"0\n{word}\n")
+    with pytest.raises(DataError, match=f"'{re.escape(word)}' is no time"):
         read_timestamps(file)
 
 

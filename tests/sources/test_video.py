@@ -432,6 +432,28 @@ def test_a_matroska_file_that_lacks_its_last_bytes_says_so(encode, codec: str) -
     assert not list_warnings(path)
 
 
+@pytest.mark.parametrize("length", [2**40, 2**56 - 2])
+def test_a_matroska_header_longer_than_any_file_is_no_video(tmp_path: Path, length: int) -> None:
+    path = tmp_path / "a.mkv"
+    path.write_bytes(bytes.fromhex("1a45dfa3") + (1 << 56 | length).to_bytes(8, "big") + bytes(100))
+    with pytest.raises(DataError, match="not a video"):
+        open_source(path)
+
+
+@pytest.mark.parametrize("hours", ["9" * 400, "9" * 12, "00"])
+def test_a_length_that_no_clip_has_is_not_believed(tmp_path: Path, hours: str) -> None:
+    path = tmp_path / "a.nut"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=30)
+        stream.width, stream.height, stream.metadata["DURATION"] = 48, 32, f"{hours}:00:00.2"
+        for k, picture in enumerate(flat([10, 20, 30, 40, 50, 60])):
+            frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format="yuv420p")
+            frame.pts = k
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    assert open_source(path).duration_expected_s == pytest.approx(0.2, abs=0.05)
+
+
 def list_warnings(path: Path) -> list[str]:
     source = open_source(path)
     list(source.frames())

@@ -25,6 +25,7 @@ from vid2ev.sources.transport_stream import TAIL, remarks_on_end
 
 REMEDY = "give a video, a folder of images, a .npy or .npz array or synthetic:NAME"
 STREAMS = "Y4M, Matroska, MPEG-TS or fragmented MP4"
+DURATION = re.compile(r"(\d{1,9}):(\d{1,9}):(\d{1,9}(?:\.\d{1,99})?)")  # hours, minutes, seconds
 ANY_TEXT = "replace"  # of titles and remarks, which may be of any bytes
 SEEKABLE = ("mp4", "matroska")  # containers with an index, and a presentation time for every picture
 STEPS_BACK_S = (0, 2, 10)  # how far before the place a key frame is looked for
@@ -211,7 +212,7 @@ def announced_end_s(container: Any, stream: Any, begin_s: Fraction) -> Fraction 
     Containers say how long it lasts, and so does Matroska as mkvmerge writes it; libavformat writes the end there, and
     reads it so of NUT.
     """
-    tag = re.fullmatch(r"(\d+):(\d+):(\d+(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
+    tag = DURATION.fullmatch(stream.metadata.get("DURATION", ""))
     if tag:
         hours, minutes, seconds = map(Fraction, tag.groups())
         said_s = 3600 * hours + 60 * minutes + seconds

@@ -19,7 +19,9 @@ def missing_bytes(path: Path) -> int:
     with open(path, "rb") as file:
         if file.read(4) != HEADER:
             return 0
-        file.seek(_number(file) or 0, 1)
+        if (header := _number(file) or 0) > path.stat().st_size:  # (where a file system may not lead)
+            return 0
+        file.seek(header, 1)
         if file.read(4) != SEGMENT:
             return 0
         said = _number(file)

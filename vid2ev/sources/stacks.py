@@ -33,7 +33,7 @@ Read = Callable[[int], np.ndarray]
 FRAMES = ("frames", "images", "video", "light", "arr_0")
 TIMES = re.compile(r"(?:t|times|timestamps)(?:_(s|ms|us|ns))?")
 BROKEN = (  # what numpy and zipfile raise for damaged files
-    OSError, ValueError, TypeError, EOFError, KeyError,
+    OSError, ValueError, TypeError, EOFError, KeyError, OverflowError,
     RuntimeError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 
@@ -63,7 +63,8 @@ class NpyStack:
 
     def _map(self) -> np.ndarray:
         try:
-            return np.load(self.path, mmap_mode="r", allow_pickle=False)
+            with np.errstate(over="ignore"):  # (of shapes that no file can hold)
+                return np.load(self.path, mmap_mode="r", allow_pickle=False)
         except BROKEN as error:
             raise DataError(f"{self.path}: not a .npy array that can be read; write it with numpy.save") from error
 

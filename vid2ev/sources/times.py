@@ -214,7 +214,7 @@ def _rise(values: Iterable[Fraction]) -> bool:
 
 def _number(word: str) -> Fraction:
     """A number as it is written.  Raises ValueError for what is none, or has more digits than there is memory for."""
-    exponent = re.search(r"e([-+]?\d+)$", word, re.IGNORECASE)
+    exponent = re.search(r"e([-+]?[\d_]+)$", word, re.IGNORECASE)
     if len(word) > LONGEST_WORD or (exponent and abs(int(exponent[1])) > LONGEST_WORD):
         raise ValueError("a number of too many digits")
     return Fraction(word)
