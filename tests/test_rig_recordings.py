@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from vid2ev import DataError, Events, UsageError, convert, read_events
 from vid2ev.commands import main
 from vid2ev.making.conversion import Paused
+from vid2ev.making.split import convert_split
 from vid2ev.recording.truth_files import read_depth, read_flow, read_mask, read_pixel_map, read_poses
 from vid2ev.rig.bands import Bands
 from vid2ev.rig.camera import Camera, Rig, Source
@@ -518,6 +519,23 @@ def test_codes_of_a_sensor_are_not_taken_for_pictures(tmp_path: Path) -> None:
     for folder, message in ((tmp_path / "out", "cameras cis, dvs"), (tmp_path / "out" / "cis", "frames and no events")):
         with pytest.raises(UsageError, match=message):
             next(read_events(folder))
+
+
+def test_a_recording_does_not_take_the_place_of_what_it_is_made_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    convert(CLIP, tmp_path / "out", frame_camera=True, pictures="png,mp4", **OPTIONS)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    monkeypatch.chdir(tmp_path)
+    for source in (Path("out/cis/frames"), tmp_path / "out" / "cis" / "frames.mp4"):
+        for make in (convert, lambda *a, **b: convert_split(str(a[0]), a[1], "tiles", 2, list, **b)):
+            with pytest.raises(UsageError, match=f"out holds what it is to be made of, {source}; choose another"):
+                make(source, Path("out"), overwrite=True, **OPTIONS)
+        for more in (["--dry-run"], ["--budget", "vR=1"]):
+            said = CliRunner().invoke(main, ["convert", str(source), "-o", "out", "--overwrite", *more])
+            assert said.exit_code == 2 and "out holds what it is to be made of" in said.stderr, said.output
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+    assert convert("out/cis/frames", Path("again"), overwrite=True, **OPTIONS)["counts"]["frames"] == 6
 
 
 def test_the_folder_that_one_is_in_is_what_its_own_name_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

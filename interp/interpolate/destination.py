@@ -39,13 +39,6 @@ def places_of(output: Path, kind: str) -> tuple[Path, ...]:
     return output, partial_of(output), manifest_of(output, kind)
 
 
-def check_apart(source: Path, output: Path) -> None:
-    """Raise UsageError where frames would take the place of what they are made of."""
-    made, of = output.resolve(), source.resolve()
-    if made in (of, *of.parents):
-        raise UsageError(f"{output} holds what frames are to be made of, {source}; choose another place with -o")
-
-
 def check_free(output: Path, kind: Kind, overwrite: bool, resume: bool) -> None:
     """Raise UsageError unless frames may be written to `output`, DataError for a name that nothing can have and for
     what has no manifest to go on by; touches nothing."""

@@ -16,7 +16,7 @@ import torch
 from interp import pretrained
 from interp.interpolate.after import After
 from interp.interpolate.choice import FALLBACK, choice, choice_of_one, device_of
-from interp.interpolate.destination import check_apart, kind_of, manifest_of, places_of
+from interp.interpolate.destination import kind_of, manifest_of, places_of
 from interp.interpolate.fill import Fill, Filled
 from interp.interpolate.instants import Grid, Number, Rate, Times, parse_number
 from interp.interpolate.of_sequence import OfSequence
@@ -30,6 +30,7 @@ from interp.methods.running import PLAIN, Running
 from interp.methods.tiling import tiling_of
 from interp.representation.carried import footprint_of
 from vid2ev.errors import DataError, UsageError
+from vid2ev.recording.destination import check_apart
 from vid2ev.recording.manifest import machine, versions
 
 Report = Callable[[int, int | None], object]  # frames done, of how many
@@ -87,7 +88,7 @@ def interpolate(
     ready = prepared(source, grid_of(multiple, fps), method, network, hdr, tile, cuts, where, options, running)
     take, grid, fill = ready.take, ready.grid, ready.fill
     if overwrite:
-        check_apart(Path(source), output)
+        check_apart(source, output)
     if told:
         told(f"{fill.method.name}: {ready.why}")
     rate = film_rate(take, grid, play, kind)

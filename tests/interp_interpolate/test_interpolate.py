@@ -303,7 +303,7 @@ def test_frames_do_not_take_the_place_of_what_they_are_made_of(
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     monkeypatch.chdir(tmp_path)
     for asked in ({"overwrite": True}, {"overwrite": True, "resume": True}):
-        with pytest.raises(UsageError, match="holds what frames are to be made of"):
+        with pytest.raises(UsageError, match="holds what it is to be made of"):
             interpolate(tmp_path / name, name, multiple=2, method="nearest", **asked)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 

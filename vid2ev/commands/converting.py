@@ -55,7 +55,7 @@ def check_shared(video: str, directory: Path, overwrite: bool, resume: bool) -> 
 
     if _passes(video):
         raise UsageError(f"{video} passes once, here; leave --jobs and --scheduler out")
-    check_free(directory, overwrite, resume)
+    check_free(directory, overwrite, resume, video)
 
 
 def convert_on_worker(
@@ -97,7 +97,7 @@ def _within(
     from vid2ev.recording.folder import begun_job, check_free
     from vid2ev.tracks.outputs import Outputs
 
-    check_free(directory, options["overwrite"], options["resume"])
+    check_free(directory, options["overwrite"], options["resume"], video)
     job = begun_job(directory) or begun_part(directory) if options["resume"] else {}
     begun = job.get("budget", {})
     choice = taken_up(begun, budget, Given(options, named))

@@ -56,5 +56,5 @@ def checked(video: str, directory: Path, options: dict[str, Any], budget: Budget
         budget.check({mount.kind for mount in recipe.mounts})
     recordings.check_effects(options["effects"], options["tolerance"])
     conversion.check_outputs(recipe, outputs)
-    check_free(directory, options["overwrite"], options["resume"])
+    check_free(directory, options["overwrite"], options["resume"], video)
     return recipe, outputs

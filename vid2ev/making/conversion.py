@@ -115,7 +115,7 @@ def convert(
     if seed is None:
         seed = (begun_job(directory) if resume else {}).get("seed", secrets.randbits(32))
     outputs = Outputs.of(**Outputs.taken_from(rest))
-    check_free(directory, overwrite, resume)  # (before the source is opened, which may take long)
+    check_free(directory, overwrite, resume, video)  # (before the source is opened, which may take long)
     recipe = Recipe.of(video, sensor, overrides, seed=seed, **rest)
     check_outputs(recipe, outputs)
     where = device_for(device, recipe.work, threads)

@@ -63,12 +63,12 @@ def convert_split(
 
     Raises UsageError for what cannot be split, and as `convert` does.
     """
-    check_parts_free(directory, overwrite, resume)
+    check_parts_free(directory, overwrite, resume, video)
     if resume and directory.exists() and not begun_parts(parts_of(directory)):
         return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
     parts, notes = _parts(video, kind, count, options | {"seed": options.get("seed") or 0}, look)
     with _held(directory) as beside:
-        check_parts_free(directory, overwrite, resume)  # (once more: another may have written there until now)
+        check_parts_free(directory, overwrite, resume, video)  # (once more: another may have written there until now)
         if overwrite and not resume:
             _remove_parts(beside)
         if options.get("seed", 0) is None:
@@ -84,13 +84,13 @@ def convert_split(
 
 def check_split(video: str, directory: Path, kind: str, *, overwrite: bool, resume: bool, **options: Any) -> None:
     """Raise UsageError for what `convert_split` refuses before it looks at the light."""
-    check_parts_free(directory, overwrite, resume)
+    check_parts_free(directory, overwrite, resume, video)
     _checked(video, kind, options | {"seed": options.get("seed") or 0})
 
 
-def check_parts_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
+def check_parts_free(directory: Path, overwrite: bool, resume: bool, video: str) -> None:
     """`recording.folder.check_free` of a recording and of its parts."""
-    check_free(directory, overwrite, resume)
+    check_free(directory, overwrite, resume, video)
     beside = parts_of(directory)
     if beside.exists() and not beside.is_dir():
         raise UsageError(f"{beside} is needed to work in, and is a file; choose another folder with -o")

@@ -33,6 +33,13 @@ def check_folder(folder: Path) -> None:
         raise UsageError(f"{folder} is a file; choose a folder with -o")
 
 
+def check_apart(source: str | Path, output: Path) -> None:
+    """Raise UsageError where what is made would take the place of a file or folder that it is made of."""
+    made, of = output.resolve(), Path(source).resolve()
+    if os.path.exists(source) and made in (of, *of.parents):
+        raise UsageError(f"{output} holds what it is to be made of, {source}; choose another place with -o")
+
+
 def begun_at(path: Path) -> set[str]:
     """The names of what is there of something that was begun.  Raises UsageError where others have that folder."""
     partial = partial_of(path)

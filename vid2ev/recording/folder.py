@@ -30,7 +30,7 @@ import numpy as np
 
 from vid2ev.errors import DataError, SavedError, UsageError, Vid2evError
 from vid2ev.formats.eager import EagerFile
-from vid2ev.recording.destination import begun_at, check_folder, partial_of
+from vid2ev.recording.destination import begun_at, check_apart, check_folder, partial_of
 from vid2ev.recording.disk import put_in_place, sync, whole_file, writing
 from vid2ev.recording.held import LOCK, Held
 from vid2ev.recording.manifest import is_of_job, read_manifest
@@ -233,10 +233,12 @@ def begun_job(directory: Path) -> dict[str, Any]:
     return {}
 
 
-def check_free(directory: Path, overwrite: bool = False, resume: bool = False) -> None:
-    """Raise UsageError unless a recording may be written to `directory`, DataError for a name that no folder can have;
-    touches nothing."""
+def check_free(directory: Path, overwrite: bool = False, resume: bool = False, of: str | Path | None = None) -> None:
+    """Raise UsageError unless a recording, `of` a file or folder, may be written to `directory`, DataError for a name
+    that no folder can have; touches nothing."""
     check_folder(directory)
+    if overwrite and of is not None:
+        check_apart(of, directory)
     held = list(directory.iterdir()) if directory.is_dir() else []
     others = {path.name for path in held if not (_may_be_made(path) or _is_camera(path))}
     if others:
