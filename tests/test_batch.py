@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -47,6 +48,24 @@ def test_a_folder_stands_for_what_is_in_it() -> None:
     assert many.sources_in("clips/a9.npy") == ["clips/a9.npy"]
     Path("bare").mkdir()
     assert many.sources_in("bare") == ["bare"]  # (which is refused in words)
+
+
+def test_what_systems_put_beside_videos_is_none_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thumbnails, what macOS keeps of each file on disks of others, and what has gone astray, which nobody may read."""
+    before = many.sources_in("clips")
+    Path("clips/._broken.mp4").write_bytes(bytes(99))
+    for name in (".thumbnails", "lost+found"):
+        shutil.copytree("clips/pictures", f"clips/{name}")
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "lost+found" and access(path, mode))
+    assert many.sources_in("clips") == before
+
+
+def test_a_name_longer_than_that_of_any_file_may_be_a_scene() -> None:
+    Path("images.toml").write_text("[scene]\nduration_s = 0.01\n[camera]\nsize = [8, 6]\n")
+    scene = f"scene:images.toml,{','.join(['background=0.5'] * 30)}"
+    assert many.sources_in(scene) == [scene] and len(scene) > 255
+    assert vid2ev(scene, "-o", "out").exit_code == 0
 
 
 def test_a_picture_beside_videos_is_none_of_them() -> None:

@@ -153,7 +153,7 @@ def is_single_picture(path: Path) -> bool:
     from vid2ev.light.picture_files import pages_of
     from vid2ev.light.recognise import recognise
 
-    return path.is_file() and recognise(path) == "picture" and pages_of(path) == 1
+    return os.path.isfile(path) and recognise(path) == "picture" and pages_of(path) == 1
 
 
 def _in_motion(path: Path, motion: str, **options: Any) -> Source:
@@ -186,7 +186,7 @@ def _scene(text: str, transfer: str, fps: float | Fraction | None, colour: Colou
 
 def is_scene(name: str) -> bool:
     """Whether a source is a scene: by its prefix, or a text of TOML (nothing else that can be read has this suffix)."""
-    return name.startswith(SCENE_PREFIX) or (name.endswith(".toml") and Path(name).is_file())
+    return name.startswith(SCENE_PREFIX) or (name.endswith(".toml") and os.path.isfile(name))
 
 
 def check_there(name: str) -> None:

@@ -22,27 +22,33 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # marks before a text that has zeros (and i
 
 def sources_in(video: str) -> list[str]:
     """The sources that an argument stands for: itself, what a folder holds that is not of pictures (videos, arrays and
-    folders of pictures, in natural order, but no recordings), or what the lines of a list NAME.txt stand for, as on the
-    command line.
+    folders of pictures, in natural order, but no recordings, nor what is hidden or may not be read), or what the lines
+    of a list NAME.txt stand for, as on the command line.
 
     Raises UsageError for a list without any, DataError for a list that cannot be read.
     """
     folder = Path(video)
     if is_list(folder):
         return [source for line in _listed(folder) for source in sources_in(line)]
-    if video == "-" or not os.path.isdir(folder) or _is_recording(folder):  # (Path's complains of names too long)
+    if video == "-" or not os.path.isdir(video) or _is_recording(folder):  # (Path's raise OSError for long names)
         return [video]
-    clips = [path for path in folder.iterdir() if _is_clip(path)]
+    held = [path for path in folder.iterdir() if not path.name.startswith(".")]
+    clips = [path for path in held if _is_clip(path)]
     films = sum(path.suffix.lower() not in ARRAYS for path in clips)
     if len(pictures_in(folder)) > films:  # (if they are no more, they are covers and stills of these)
         return [video]
-    folders = [path for path in folder.iterdir() if path.is_dir() and holds_pictures(path) and not _is_recording(path)]
+    folders = [path for path in held if _may_be_read(path) and holds_pictures(path) and not _is_recording(path)]
     found = sorted(clips + folders, key=lambda path: natural(path.name))
     return [str(path) for path in found] or [video]
 
 
 def _is_clip(path: Path) -> bool:
     return path.suffix.lower() in CLIPS and path.is_file() and not path.stem.endswith("_timestamps")
+
+
+def _may_be_read(path: Path) -> bool:
+    """Whether it is a folder, and not one of the system's own."""
+    return path.is_dir() and os.access(path, os.R_OK | os.X_OK)
 
 
 def _is_recording(folder: Path) -> bool:
