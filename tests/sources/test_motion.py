@@ -234,6 +234,24 @@ def test_a_large_photograph_made_smaller_in_advance_shows_the_same(tmp_path: Pat
         np.testing.assert_allclose(a.light, b.light, atol=0.02 * np.ptp(b.light))
 
 
+@pytest.mark.parametrize(("odd", "meant"), [(np.inf, 65504), (-np.inf, 0), (np.nan, 0)], ids=str)
+@pytest.mark.parametrize("motion", ["pan:speed=50", "zoom", "turn.csv", "pan:scale=0.2,speed=10"])
+def test_light_that_is_not_finite_is_all_of_it_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, odd: float, meant: float, motion: str
+) -> None:
+    """As half floats have it of the sun: the pixels around are what they are beside the brightest that there is."""
+    monkeypatch.chdir(tmp_path)
+    Path("turn.csv").write_text("t,x,y,angle,zoom\n0,-10,0,10,1\n0.3,10,5,40,1\n")
+    seen_of = []
+    for value in (odd, meant):
+        light = TEXTURE.copy()
+        light[60, 80] = value
+        seen_of.append(
+            [frame.light for frame in open_source(photograph(tmp_path, light), motion=motion, fps=4).frames()]
+        )
+    assert np.isfinite(seen_of[0]).all() and np.array_equal(*seen_of)
+
+
 def test_parts_of_a_motion(tmp_path: Path) -> None:
     path = photograph(tmp_path)
     whole = list(open_source(path, motion="saccade", fps=100).frames())

@@ -2,9 +2,9 @@
 
     place in the photograph = its middle + ((x, y) + turned (column, row) of the picture's middle / zoom) / scale
 
-`motion.py` has the paths, `spline.py` what becomes of the light.  Unless told otherwise the picture has the shape of
-the photograph and is the largest, up to 1280x720, that never sees beyond its border; of a given size it sees as much as
-it can.
+`motion.py` has the paths, `spline.py` what becomes of the light, of which infinite is 65504, and what is no number 0.
+Unless told otherwise the picture has the shape of the photograph and is the largest, up to 1280x720, that never sees
+beyond its border; of a given size it sees as much as it can.
 The frame rate is such that nothing moves more than half a pixel from frame to frame.
 """
 
@@ -24,6 +24,7 @@ from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
 from vid2ev.light.resample import resampled, taps_of
 from vid2ev.light.spline import seen
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.sources.framing import crop_box, parse_size
 from vid2ev.sources.motion import Motion, parse_motion
 from vid2ev.sources.times import parse_fps, round_ns
@@ -71,7 +72,9 @@ class Photograph:
             transfer = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
         self._reader, self._crop = PictureReader(transfer, colour, white_in(self.path)), crop
         self.warnings += self._reader.remarks_on(pixels)
-        self._light = self._reader.light(pixels, primaries)
+        light = self._reader.light(pixels, primaries)
+        # (means over many pixels would make many of one that is not finite)
+        self._light = np.nan_to_num(light, nan=0.0, posinf=MOST_OF_HALF_FLOATS, neginf=0.0)
         if crop is not None:
             x, y, width, height = map(int, crop_box(crop, (pixels.shape[1], pixels.shape[0])))
             self._light = np.ascontiguousarray(self._light[y : y + height, x : x + width])
