@@ -70,6 +70,8 @@ def test_what_a_lens_does_not_see_is_black_and_its_depth_is_not_known(tmp_path: 
     assert picture.light[seen].min() > 0.05
     far = ~cv2.dilate(seen.astype(np.uint8), np.ones((3, 3))).astype(bool)
     assert far.any() and not picture.light[far].any()
+    file.write_text(file.read_text().replace("ambient", "background"))  # (which lights as much, and is nowhere seen)
+    np.testing.assert_allclose(World.of(file).render(0, lens).light, picture.light, atol=1e-3)
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -102,8 +102,8 @@ def colour_of_corners(world, triangle, b1, b2):
 
 @law
 def background(world, x, y, across, down):
-    """The environment in a direction."""
-    if world.environment < 0:
+    """The environment in a direction; black where the lens sees nothing."""
+    if world.environment < 0 or x != x:
         return 0.0, 0.0, 0.0
     camera = len(world.kind)
     e = turned(world.to_environment, camera, x, y, 1.0)
