@@ -54,11 +54,11 @@ def test_lists_are_drawn_number_by_number() -> None:
     assert abs(statistics.correlation([p[0] for p in places], [p[1] for p in places])) < 0.08
 
 
-def test_spread_gives_each_of_many_its_own_part() -> None:
+@pytest.mark.parametrize("name", ["a", "a#1", "#3#12", "1\n#2"])
+def test_spread_gives_each_of_many_its_own_part(name: str) -> None:
     for seed in range(20):
-        values = [
-            drawn({"spread": [[0, 0], [8, 8]]}, chance_of(seed), f"objects.a#{k}.place", (k, 8)) for k in range(8)
-        ]
+        paths = [f"objects.{name}#{k}.place" for k in range(8)]
+        values = [drawn({"spread": [[0, 0], [8, 8]]}, chance_of(seed), path, (k, 8)) for k, path in enumerate(paths)]
         assert sorted(int(x) for x, _ in values) == sorted(int(y) for _, y in values) == list(range(8))
     orders = {
         tuple(int(drawn({"spread": [0, 8]}, chance_of(seed), f"objects.a#{k}.x", (k, 8))) for k in range(8))

@@ -104,7 +104,7 @@ def _number(kind: str, low: Any, high: Any, chance: Chance, path: str, place: Pl
 def _rank(chance: Chance, path: str, place: Place) -> int:
     """The place of a thing among its like, in an order of this path's own."""
     k, n = place
-    stem = re.sub(r"#\d+", "", path, count=1)
+    stem = re.sub(r"(.*)#\d+", r"\1", path, flags=re.DOTALL)  # (the last one: names may have some of their own)
     keys = [(chance(f"{stem} order {other}"), other) for other in range(n)]
     return sorted(keys).index(keys[k])
 
