@@ -25,6 +25,7 @@ from vid2ev.rig.intrinsics import Intrinsics
 from vid2ev.scenes import folder as folder_module
 from vid2ev.scenes.camera_folder import Contents
 from vid2ev.scenes.folder import write_scene
+from vid2ev.scenes.own_files import with_own_files
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.scenes.source import SceneSource
 from vid2ev.scenes.world import World
@@ -301,6 +302,16 @@ def test_a_scene_file_may_have_any_name(name: str) -> None:
     assert vid2ev("scene", *arguments).exit_code == 0
     assert read_scene("out/scene.toml").resolved() == read_scene(f"{name}.toml").resolved()
     assert vid2ev("scene", *arguments, "--resume").exit_code == 0
+
+
+@pytest.mark.parametrize("there", ["files/1", "files/1.png", "files/1/skin.obj", "files/2"])
+def test_no_file_takes_the_place_of_one_that_is_there(there: str) -> None:
+    """What a picture is its content says: its name may have no suffix."""
+    things = [{"name": name, "texture": name} for name in (there, "/one", "/two.png", "/one")]
+    tables, files = with_own_files({"objects": things})
+    names = [thing["texture"] for thing in tables["objects"]]
+    assert names[0] == there and names[1] == names[3] and len({Path(name).with_suffix("") for name in names}) == 3
+    assert files == {names[1]: Path("/one"), names[2]: Path("/two.png")}
 
 
 def test_a_dry_run_names_files_as_they_are_seen_from_here() -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping
 from itertools import count
@@ -28,7 +29,7 @@ def with_own_files(tables: dict[str, Any], into: str = FOLDER) -> tuple[dict[str
     tables = copy.deepcopy(tables)
     named = [(table, key) for table, key, _ in files_named(tables)]
     taken = tuple(table[key] for table, key in named)
-    numbers = (n for n in count(1) if not any(name.startswith((f"{into}/{n}.", f"{into}/{n}/")) for name in taken))
+    numbers = (n for n in count(1) if not any(re.match(rf"{re.escape(into)}/{n}([./]|$)", name) for name in taken))
     names: dict[Path, str] = {}
     for table, key in named:
         file = Path(table[key])
