@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 
 from vid2ev.errors import DataError, UsageError, Vid2evError
 from vid2ev.rig.camera import Camera, Rig, Source, default_rig, nearest_rotation
+from vid2ev.rig.intrinsics import Framing
 from vid2ev.rig.pose import rotation_of
 from vid2ev.rig.rig_file import EXAMPLE, read_rig, rig_text, write_rig
 
@@ -88,6 +89,20 @@ def test_the_field_of_the_video_is_assumed_where_nobody_states_it() -> None:
     assert [(view.camera.name, view.camera.sensor) for view in rig.viewpoints] == [("dvs", None), ("cis", None)]
     assert all(view.intrinsics == rig.source for view in rig.viewpoints)
     assert [camera.name for camera in default_rig().cameras] == ["dvs"]
+
+
+@pytest.mark.parametrize(("model", "distortion"), [("radtan", (-2.0, 0, 0, 0)), ("equidistant", (-5.0, 0, 0, 0))])
+def test_a_lens_that_does_not_see_the_field_that_is_assumed_is_refused(model: str, distortion: tuple) -> None:
+    """Where it is not stated; whoever took the video may say it, too."""
+    cameras = (Camera(name="a", kind="dvs"),)
+    rig = Rig(source=Source(distortion_model=model, distortion=distortion), cameras=cameras)
+    for framing in (None, Framing((64, 48), (10, 8), (32, 24), (32, 24))):
+        with pytest.raises(
+            UsageError, match="less than the 60 degrees that are assumed then; state fov_deg or focal_px"
+        ):
+            rig.resolved((32, 24) if framing else (64, 48), framing=framing)
+    taker = Source(size=(64, 48), focal_px=(50.0, 50.0), centre_px=(31.5, 23.5))
+    assert rig.around(taker).resolved((64, 48)).source.focal_px == (50, 50)
 
 
 def test_a_lens_of_another_shape_than_the_video_is_refused() -> None:

@@ -100,8 +100,7 @@ class Source(Optics):
         same_field = self.size is None and self.focal_px is None and framing is not None and framing.is_whole
         if framing is not None and self._is_before(framing) and not same_field:
             return framing.lens_of_part(self.intrinsics(framing.whole))
-        lens = self.lens(stated) or self.model_copy(update={"fov_deg": ASSUMED_FOV_DEG}).lens(stated)
-        assert lens is not None
+        lens = self.lens(stated) or self._assumed_lens(stated)
         if abs(stated[0] * size[1] - stated[1] * size[0]) > max(*stated, *size):  # (more than a pixel is rounded off)
             raise UsageError(
                 f"the rig's [source] size {stated[0]}x{stated[1]} is of another shape than the video,"
@@ -114,6 +113,17 @@ class Source(Optics):
         if framing is None or self._is_before(framing):
             return self.intrinsics(size)
         return framing.lens_of_whole(self.intrinsics(framing.size))
+
+    def _assumed_lens(self, size: tuple[int, int]) -> Intrinsics:
+        """The lens at a size where nobody says how wide it sees; raises UsageError if it does not see so far."""
+        try:
+            own: dict[str, Any] = {"model": self.distortion_model or "none", "distortion": self.distortion}
+            return Intrinsics.of_field(size, ASSUMED_FOV_DEG, **own)
+        except ValueError as error:
+            raise UsageError(
+                "the rig's [source] says nothing of how wide it sees, and its distortion lets it see less than the"
+                f" {ASSUMED_FOV_DEG:g} degrees that are assumed then; state fov_deg or focal_px, or correct distortion"
+            ) from error
 
     def _is_before(self, framing: Framing) -> bool:
         """Whether it says what the lens of the whole pictures is, not of what is framed out of them."""
