@@ -285,6 +285,15 @@ def test_a_camera_that_sees_nothing_of_the_video_says_so(tmp_path: Path, camera:
     assert said == {"left": False, "right": blind, "aps": False}
 
 
+@pytest.mark.parametrize(
+    ("names", "added"), [(["dvs"], "cis"), (["cis"], "cis_2"), (["CIS"], "cis_2"), (["cis", "cis_2", "a"], "cis_3")]
+)
+def test_a_frame_camera_that_is_added_has_a_name_of_its_own(names: list[str], added: str) -> None:
+    around = Rig(cameras=tuple(Camera(name=name, kind="dvs") for name in names))
+    recipe = Recipe.of(CLIP, rig=around, frame_camera=True, cis="phone")
+    assert [(mount.name, mount.kind) for mount in recipe.mounts] == [*((name, "dvs") for name in names), (added, "cis")]
+
+
 def test_a_rig_without_a_name_is_not_taken_for_none(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="give a rig file"):
         convert(CLIP, tmp_path / "out", rig="", **OPTIONS)

@@ -232,9 +232,13 @@ class Rig(BaseModel):
         return self
 
     def with_frames(self) -> Rig:
-        """The rig with a frame camera: its own, or else one where the video was taken."""
-        has_one = any(camera.kind == "cis" for camera in self.cameras)
-        return self if has_one else Rig(source=self.source, cameras=(*self.cameras, Camera(name="cis", kind="cis")))
+        """The rig with a frame camera: its own, or else one where the video was taken, of a name that none has."""
+        if any(camera.kind == "cis" for camera in self.cameras):
+            return self
+        taken = {camera.name.casefold() for camera in self.cameras}
+        names = ["cis", *(f"cis_{number}" for number in range(2, len(taken) + 2))]
+        added = Camera(name=next(name for name in names if name not in taken), kind="cis")
+        return Rig(source=self.source, cameras=(*self.cameras, added))
 
     def around(self, source: Source | None) -> Rig:
         """The rig around a video that comes with what took it, as far as [source] does not say how that sees."""
