@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from vid2ev import DataError, Events, UsageError, convert, read_events
+from vid2ev import CisSpec, DataError, Events, UsageError, convert, read_events
 from vid2ev.commands import main
 from vid2ev.making.conversion import Paused
 from vid2ev.making.split import convert_split
@@ -250,6 +250,12 @@ def options_of(options: dict[str, Any]) -> dict[str, Any]:
         ({"rig": rig(sensor="davis3")}, "did you mean davis346"),
         ({"rig": rig(translation_mm=(15.0, 0.0, 0.0)), "depth": "plane:-1"}, "plane:-1"),
         ({"rig": rig(), "depth": "plane:2", "cis": "papr"}, "did you mean paper"),
+        ({"rig": Rig(cameras=rig().cameras[:2]), "cis": "phone"}, "^cis 'phone': expected a frame camera in the rig"),
+        (
+            {"rig": Rig(cameras=rig().cameras[:2]), "cis": CisSpec()},
+            "^cis: expected a frame camera in the rig; add --fr",
+        ),
+        ({"truth_rate_hz": 7.0}, "^truth at 7 Hz: expected some to be written; add --truth"),
         ({"depth": "plane:2"}, "leave --depth out"),
         ({"rig": rig(translation_mm=(0.0, 0.0, 0.0)), "depth": "plane:2"}, "leave --depth out"),
         ({"rig": "missing.toml"}, "missing.toml"),

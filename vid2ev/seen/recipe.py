@@ -23,7 +23,7 @@ from vid2ev.rig.intrinsics import Framing
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.seen.mounts import Mount, Sensors, mounts_of
 from vid2ev.seen.sight import Sight, are_free, lens_of, scene_of, staged, taken_by
-from vid2ev.seen.truth import Wanted
+from vid2ev.seen.truth import USUAL_HZ, Wanted
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
 from vid2ev.sensors.limits import check_seed
@@ -84,7 +84,7 @@ class Recipe:
         rig: str | Path | Rig | None = None,
         depth: str | Path | None = None,
         truth: str | Sequence[str] = (),
-        truth_rate_hz: float = 30.0,
+        truth_rate_hz: float = USUAL_HZ,
         **rest: Any,
     ) -> Recipe:
         """The recipe for a video and its cameras, with everything checked that can be before the first frame.
@@ -92,7 +92,8 @@ class Recipe:
         video      a video file, a folder of images, an array file, `synthetic:NAME` or `scene:NAME`
         sensor     of event cameras that name none: a preset, a TOML file, or a specification
         overrides  `key=value` texts that change presets or files; keys of frame sensors begin with `cis.`
-        cis        the same of frame cameras; without a rig there is then one, as with `frame_camera`
+        cis        the same of frame cameras, of which a rig has to have some; without a rig there is then one, as with
+                   `frame_camera`
         frame_camera   put a frame camera where the video was taken, if the rig has none
         rig        the cameras: a rig file, or what is in one; without it that of a scene, or else an event camera where
                    the video was taken
@@ -111,6 +112,13 @@ class Recipe:
         alone = rig is None and len(asked.cameras) == 1
         chosen = Sensors(sensor, "paper" if cis is None else cis, overrides)
         chosen.check_changes(asked.cameras)
+        if cis is not None and all(camera.kind == "dvs" for camera in asked.cameras):
+            named = "" if isinstance(cis, CisSpec) else f" '{cis}'"
+            raise UsageError(f"cis{named}: expected a frame camera in the rig; add --frames, or leave it out")
+        if not truth and truth_rate_hz != USUAL_HZ:
+            raise UsageError(
+                f"truth at {truth_rate_hz:g} Hz: expected some to be written; add --truth, or leave it out"
+            )
         of = partial(chosen.of_file, file=rig) if isinstance(rig, str | Path) else chosen.of
         sensors = [of(camera) for camera in asked.cameras]
         coloured = pattern is not None or any(each.colour for each in sensors)

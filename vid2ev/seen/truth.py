@@ -32,6 +32,7 @@ from vid2ev.stream.frames import Frame
 EARLY = 0.05  # of a period
 NOTHING = np.zeros((0, 0), np.float32)
 KINDS = ("depth", "flow", "mask", "map", "poses")
+USUAL_HZ = 30.0
 
 
 class Truth(NamedTuple):
@@ -50,7 +51,7 @@ class Wanted:
     """What is asked for: some of `KINDS`, so many times a second.  Raises UsageError for what cannot be meant."""
 
     kinds: tuple[str, ...]
-    rate_hz: float = 30.0
+    rate_hz: float = USUAL_HZ
 
     def __post_init__(self) -> None:
         unknown = [kind for kind in self.kinds if kind not in KINDS]
