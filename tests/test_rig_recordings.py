@@ -122,11 +122,16 @@ def test_every_camera_has_a_recording_of_its_own(tmp_path: Path) -> None:
     assert codes.dtype == np.uint16 and codes.shape == (48, 64, 3) and codes.max() < 1024
 
 
-def test_a_clock_of_its_own_moves_times_and_nothing_else(tmp_path: Path) -> None:
-    options = OPTIONS | {"sensor": "ideal"}
-    convert(CLIP, tmp_path / "out", rig=rig(clock_offset_us=1_234_567), **options)
-    left, right = columns(tmp_path / "out" / "left"), columns(tmp_path / "out" / "right")
-    assert [t + 1_234_567 for t in left[0]] == right[0] and left[1:] == right[1:]
+@pytest.mark.parametrize("offset_us", [1_234_567, -5_000_000])
+@pytest.mark.parametrize("noise", [{"crossing_noise": 0.05}, {"photoreceptor_noise": 0.05}])
+def test_a_clock_of_its_own_moves_times_and_nothing_else(
+    tmp_path: Path, offset_us: int, noise: dict[str, float]
+) -> None:
+    """Of a camera that is the same otherwise, noise that is drawn by count among it."""
+    for name, late in (("early", 0), ("late", offset_us)):
+        convert(CLIP, tmp_path / name, rig=rig(clock_offset_us=late, set=noise), **OPTIONS)
+    early, late = (columns(tmp_path / name / "right") for name in ("early", "late"))
+    assert len(early[0]) > 1000 and [t + offset_us for t in early[0]] == late[0] and early[1:] == late[1:]
 
 
 @pytest.mark.parametrize("kind", ["ros1", "ros2"])

@@ -147,16 +147,21 @@ class Mount:
     ) -> Dvs:
         """The event sensor, before its first frame; on a CPU of a part of its pixels, or of another kind."""
         assert isinstance(self.sensor.spec, DvsSpec)
-        spec, number = self.sensor.spec, self.number
+        spec, number, origin_ns = (
+            self.sensor.spec,
+            self.number,
+            1000 * self.clock_offset_us,
+        )  # (0 of the source's clock)
         if device.name != "cpu":
             from vid2ev.sensors.dvs_on_card import DvsOnCard
 
             return DvsOnCard(
-                spec, self.size, self.seed, camera=number, labels=labels, memory=device.memory, origin_ns=0
+                spec, self.size, self.seed, camera=number, labels=labels, memory=device.memory, origin_ns=origin_ns
             )
         return kind(
-            spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part, origin_ns=0
-        )
+            spec, self.size, self.seed, camera=number, threads=threads, labels=labels, skip=skip, part=part,
+            origin_ns=origin_ns,
+        )  # fmt: skip
 
     def cis(self, threads: int = 1, device: Device = CPU) -> Cis:
         """The frame sensor, before its first frame."""
