@@ -7,10 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vid2ev.errors import UsageError
 from vid2ev.light.primaries import BRADFORD, CHROMATICITIES, D65, primaries_at, primaries_of
-from vid2ev.light.tags import BT709_WEIGHTS, MATRICES, WEIGHTS
+from vid2ev.light.tags import BT709_WEIGHTS, MATRICES
 from vid2ev.light.transfer import code_table, parse_transfer
 from vid2ev.sources import open_source
 
@@ -30,7 +32,7 @@ def random_planes(sizes: list[tuple[int, int]], bits: int) -> list[np.ndarray]:
     return [rng.integers(0, 2**bits, size).astype(np.uint8 if bits == 8 else np.uint16) for size in sizes]
 
 
-@pytest.mark.parametrize("tag", WEIGHTS)
+@pytest.mark.parametrize("tag", CHROMATICITIES)
 @pytest.mark.parametrize(("name", "bits", "small"), [
     ("yuv420p", 8, (17, 17)), ("yuv422p10le", 10, (33, 17)), ("yuv444p12le", 12, (33, 33)),
 ])  # fmt: skip
@@ -62,6 +64,16 @@ def test_wide_gamut_keeps_what_bt709_cannot_mix(encode, make_picture) -> None:
     bt709_to_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
     np.testing.assert_allclose(colour[0, 0], np.linalg.inv(bt709_to_2020)[:, 1], atol=3e-4)
     assert colour[0, 0].min() < -0.05
+
+
+@given(
+    st.lists(st.floats(-0.02, 0.02), min_size=8, max_size=8),
+    st.sampled_from([*CHROMATICITIES.values(), ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044), (0.32168, 0.33767))]),
+)
+def test_luminance_of_rgb_is_luminance_whatever_white_is(moved: list[float], places) -> None:
+    """Of the primaries of H.273 and ACEScg, and others near them."""
+    weights, to_bt709 = primaries_at([(x + moved[2 * k], y + moved[2 * k + 1]) for k, (x, y) in enumerate(places)])
+    np.testing.assert_allclose(weights, np.array(BT709_WEIGHTS) @ to_bt709, atol=3e-4)
 
 
 @pytest.mark.parametrize("tag", CHROMATICITIES)

@@ -1,10 +1,11 @@
 """Which colours red, green and blue are.
 
-    luminance of R, G, B = the middle row of M        M: linear RGB -> XYZ with white (1, 1, 1) at Y = 1
+    luminance of R, G, B = the middle row of A M      M: linear RGB -> XYZ with white (1, 1, 1) at Y = 1
     RGB in BT.709        = inv(M of BT.709) A M RGB   A: Bradford adaptation of the white point to D65
 
 M follows from the chromaticities of the primaries and of white.  Nothing is clipped: a colour that BT.709 cannot mix
-has a negative component there.  White stays white, whatever its chromaticity.
+has a negative component there.  White stays white, whatever its chromaticity.  Luminance is that of the RGB in BT.709:
+an event camera sees the same light whether a frame camera beside it sees colours or not.
 
 Sources: M, SMPTE RP 177; chromaticities, Rec. ITU-T H.273 table 2; adaptation, Lam, "Metamerism and colour constancy",
 University of Bradford 1985, with the matrix of Lindbloom.
@@ -60,11 +61,12 @@ def primaries_at(places: Sequence[Place]) -> Primaries:
     """The primaries with these chromaticities (x, y): red, green, blue, white.  Raises ValueError if they mix none."""
     own, own_white = _to_xyz(places)
     bt709, d65 = _to_xyz(CHROMATICITIES[BT709])
-    red, green, blue = own[1].tolist()
     if np.allclose(own, bt709, atol=1e-3):
         return Primaries(BT709_WEIGHTS, np.eye(3))
     adapted = np.linalg.inv(BRADFORD) @ np.diag(BRADFORD @ d65 / (BRADFORD @ own_white)) @ BRADFORD
-    return Primaries((red, green, blue), np.linalg.inv(bt709) @ adapted @ own)
+    seen = adapted @ own
+    red, green, blue = seen[1].tolist()
+    return Primaries((red, green, blue), np.linalg.inv(bt709) @ seen)
 
 
 def _to_xyz(places: Sequence[Place]) -> tuple[np.ndarray, np.ndarray]:
