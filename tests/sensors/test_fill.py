@@ -164,6 +164,18 @@ def test_the_newest_event_is_the_newest_after_a_flash_of_many_decades() -> None:
     np.testing.assert_array_equal(grid.take().max(axis=(1, 2, 3)), ends)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_was_taken_is_no_more_in_a_window(kind: str) -> None:
+    rng, windows = np.random.default_rng(0), [[0, 400], [300, 900]]
+    old = Windows(SIZE, kind, windows)
+    for count in (50, 30, 0):
+        new, t = Windows(SIZE, kind, windows), np.sort(rng.integers(0, 1000, count))
+        x, y, p = (rng.integers(0, most, count).astype(np.uint16) for most in (*SIZE, 2))
+        for grid in (old, new):
+            grid.add(Events(t, x, y, p.astype(np.uint8)))
+        np.testing.assert_array_equal(old.take(), new.take())
+
+
 def test_all_of_time_can_be_one_interval() -> None:
     counts = NetCounts(SIZE, [EVER.min, 0, EVER.max])
     t = np.array([-5, 0, 1, EVER.max])

@@ -14,6 +14,7 @@ the same order.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -75,8 +76,8 @@ class Windows:
 
     def __init__(self, size: tuple[int, int], kind: Kind | str, windows_us: Sequence[Sequence[int]] | np.ndarray):
         kind = parse_representation(kind) if isinstance(kind, str) else kind
-        self.windows_us = windows_of(windows_us)
-        self._views = [kind(size) for _ in self.windows_us]
+        self.windows_us, self._anew = windows_of(windows_us), partial(kind, size)
+        self._views = [self._anew() for _ in self.windows_us]
 
     def add(self, events: Events) -> None:
         """Take in events, those that are in a window."""
@@ -92,7 +93,9 @@ class Windows:
     def take(self) -> np.ndarray:
         """The arrays of the windows, [n, ...], of the events since the last call."""
         stops = self.windows_us[:, 1].tolist()
-        return np.stack([view.take(stop) for view, stop in zip(self._views, stops, strict=True)])
+        taken = np.stack([view.take(stop) for view, stop in zip(self._views, stops, strict=True)])
+        self._views = [self._anew() for _ in stops]  # (time surfaces remember what was before)
+        return taken
 
 
 def edges_of(edges_us: Sequence[int] | np.ndarray) -> np.ndarray:
