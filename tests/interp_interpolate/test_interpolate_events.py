@@ -351,6 +351,17 @@ def test_frames_to_rebuild_are_those_of_a_camera_that_sees_what_key_frames_show(
     same(sequence.events(start_us, stop_us).within(SIZE)[0], Events.concatenate(read_events(made / "c")))
 
 
+@pytest.mark.parametrize(("model", "apart"), [("none", False), ("radtan", False), ("equidistant", True)])
+def test_cameras_in_one_place_see_the_same_through_the_same_lens(tmp_path: Path, model: str, apart: bool) -> None:
+    """A fisheye lens is another than none, its coefficients may be 0."""
+    cameras = [f'[[camera]]\nname = "{kind}"\nkind = "{kind}"\nsensor = "ideal"\n' for kind in ("cis", "dvs")]
+    lens = f'distortion_model = "{model}"\ndistortion = {[] if model == "none" else [0, 0, 0, 0]}\n'
+    (tmp_path / "rig.toml").write_text(cameras[0] + cameras[1] + lens)
+    made = tmp_path / "made"
+    convert(images(tmp_path / "in", moving(3)), made, rig=tmp_path / "rig.toml", preview=False, threads=1)
+    assert open_sequence(made).apart == apart
+
+
 def test_a_recording_that_cannot_be_interpolated_says_what_it_lacks(tmp_path: Path) -> None:
     source, rig = images(tmp_path / "in", moving(4)), tmp_path / "rig.toml"
     rig.write_text('[[camera]]\nname = "a"\nkind = "cis"\n')

@@ -60,6 +60,6 @@ def _sight(camera: dict[str, Any]) -> np.ndarray:
     """Place, direction and lens as numbers: those of the lens in widths of the picture."""
     lens, pose = _placed(camera)
     edge = [*(np.array(lens.centre_px) + 0.5), *lens.focal_px]
-    bent = np.zeros(8)
-    bent[: len(lens.distortion)] = lens.distortion
+    bent = np.zeros(9)  # (of equidistant lenses 0, 0, 0, 0 is a distortion, too)
+    bent[: len(lens.distortion)], bent[-1] = lens.distortion, lens.model == "equidistant"
     return np.concatenate([pose.translation_m, *pose.rotation, np.array(edge) / lens.size[0], bent])
