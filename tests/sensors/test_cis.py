@@ -9,6 +9,8 @@ import pytest
 
 import vid2ev
 from vid2ev.errors import UsageError
+from vid2ev.light.tags import tag_of, transfer_of
+from vid2ev.light.transfer import parse_transfer
 from vid2ev.physics.shading import shading_map
 from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
@@ -278,6 +280,13 @@ def test_pictures_of_eight_bits_have_the_curve(gamma, middle):
     codes = CisSpec(gamma=gamma).picture_codes()
     assert codes.dtype == np.uint8 and len(codes) == 1024 and (codes[0], codes[-1]) == (0, 255)
     assert abs(int(codes[512]) - middle) <= 1 and (np.diff(codes.astype(int)) >= 0).all()
+
+
+@pytest.mark.parametrize("gamma", ["srgb", 1, 1.0, 2.2, 2.8])
+def test_a_film_says_the_curve_of_its_codes_if_there_is_a_tag_for_it(gamma):
+    spec = CisSpec(gamma=gamma)
+    said, light = parse_transfer(transfer_of(tag_of(spec.curve), "auto")), np.arange(1024) / 1023
+    np.testing.assert_array_equal(np.rint(255 * said.to_signal(light)), spec.picture_codes())
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,9 @@ class CisSpec(  # the order of the bases, last to first, is the order of the fie
     @property
     def curve(self) -> str:
         """The transfer curve of pictures of 8 bits."""
-        return "srgb" if self.gamma == "srgb" else f"gamma:{self.gamma}"
+        if self.gamma == "srgb":
+            return "srgb"
+        return "linear" if self.gamma == 1 else f"gamma:{self.gamma}"  # (by the name that films have a code for)
 
     def picture_codes(self) -> np.ndarray:
         """The code of 8 bits [uint8, 2**bits] of each code, by `gamma`."""
