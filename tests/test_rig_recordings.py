@@ -23,6 +23,7 @@ from vid2ev.rig.pose import IDENTITY
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.scenes.source import SceneSource
 from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import are_free
 from vid2ev.sources import open_source
 from vid2ev.sources.synthetic import MovingEdge
 
@@ -227,7 +228,8 @@ def test_a_camera_with_the_field_of_a_video_that_is_made_smaller_gets_its_very_f
         size = (width, width * 3 // 4)
         camera = Camera(name="left", kind="dvs", size=size, fov_deg=53.7)
         around = Rig(source=Source(fov_deg=53.7), cameras=(camera,))
-        assert Recipe.of(CLIP, rig=around, size=size).sight().free
+        recipe = Recipe.of(CLIP, rig=around, size=size)
+        assert are_free(recipe.rig.source, recipe.mounts)
 
 
 def test_a_part_brought_to_the_size_of_the_whole_has_a_longer_lens(tmp_path: Path) -> None:
@@ -274,6 +276,14 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any]
     with pytest.raises(UsageError, match=message):
         convert(CLIP, tmp_path / "out", **(OPTIONS | changed))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_camera_beside_the_video_is_refused_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However large it is: a look takes 16 bytes a pixel, and more."""
+    monkeypatch.setattr("vid2ev.seen.sight.Views", pytest.fail)
+    around = rig(size=(65535, 65535), translation_mm=(15.0, 0.0, 0.0))
+    with pytest.raises(UsageError, match=r"camera right stands beside .* add --depth"):
+        Recipe.of(CLIP, rig=around)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ import numpy as np
 from vid2ev.cost.rung import Rung
 from vid2ev.seen.instants import instants
 from vid2ev.seen.recipe import Recipe
+from vid2ev.seen.sight import are_free
 from vid2ev.sensors.cis_spec import NOISELESS, CisSpec
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.upsample import METHODS
@@ -170,7 +171,7 @@ def _frames(cis: list[CisSpec], given: Given) -> list[Rung]:
 
 def _views(recipe: Recipe) -> list[Rung]:
     """A plane in place of depth that differs from pixel to pixel."""
-    if recipe.depth is None or recipe.plane_m is not None or recipe.sight().free:
+    if recipe.depth is None or recipe.plane_m is not None or are_free(recipe.rig.source, recipe.mounts):
         return []
     depth = next(recipe.source.frames()).depth
     known = [] if depth is None else depth[np.isfinite(depth) & (depth > 0)]

@@ -111,7 +111,8 @@ def pictures(recipe: Recipe, mount: Mount) -> Iterator[Picture]:
 
 
 def _instants(recipe: Recipe, start: int, upload: Upload | None, threads: int | None) -> Generator[Instant]:
-    sight, wanted, before_ns = recipe.sight(threads or 1), recipe.truth, None
+    sight = Sight(recipe.rig.source, recipe.mounts, recipe.plane_m, recipe.bayer, threads or 1)
+    wanted, before_ns = recipe.truth, None
     if threads and (scene := scene_behind(recipe.source)):
         scene.world.threads = threads
     if recipe.rendered:

@@ -22,7 +22,7 @@ from vid2ev.rig.depth import plane_of
 from vid2ev.rig.intrinsics import Framing
 from vid2ev.rig.rig_file import read_rig
 from vid2ev.seen.mounts import Mount, Sensors, mounts_of
-from vid2ev.seen.sight import Sight, are_free, lens_of, scene_of, staged, taken_by
+from vid2ev.seen.sight import are_free, lens_of, scene_of, staged, taken_by
 from vid2ev.seen.truth import USUAL_HZ, Wanted
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import STEPS_OF_FLOW, Work
@@ -176,7 +176,7 @@ class Recipe:
                 f"depth '{self.depth}': all cameras stand where the video's does, and see the same at any depth; leave"
                 " --depth out, or add --rig with a camera beside it, or --truth depth"
             )
-        if self.depth is None and away is not None and self.sight().needs_depth:
+        if self.depth is None and away is not None:
             raise UsageError(
                 f"camera {away.name} stands beside the video's, and how far the scene is was not said; add --depth"
                 " plane:METRES, a depth map or a folder of them"
@@ -206,10 +206,6 @@ class Recipe:
         specs = [mount.sensor.spec for mount in self.mounts]
         events = [spec for spec in specs if isinstance(spec, DvsSpec)]
         return min((min(spec.threshold_on, spec.threshold_off) for spec in events), default=THRESHOLD)
-
-    def sight(self, threads: int = 1) -> Sight:
-        """What the cameras see, before the first frame."""
-        return Sight(self.rig.source, self.mounts, self.plane_m, self.bayer, threads)
 
     @property
     def rendered(self) -> bool:

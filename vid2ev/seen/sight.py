@@ -52,11 +52,6 @@ class Sight:
             if (places := [k for k, mount in enumerate(mounts) if sees_colour(mount, bayer) == coloured])
         ]
 
-    @property
-    def needs_depth(self) -> bool:
-        """Whether frames have to carry their depth."""
-        return any(views.needs_depth() for _, _, views in self._groups)
-
     def views(self, frame: Frame) -> list[View]:
         """The views of a frame, with their masks."""
         seen: dict[int, View] = {}
