@@ -253,6 +253,8 @@ def options_of(options: dict[str, Any]) -> dict[str, Any]:
     ("changed", "message"),
     [
         ({"rig": rig(translation_mm=(15.0, 0.0, 0.0))}, "camera right stands beside .* add --depth"),
+        ({"rig": rig(size=(65535, 65535))}, "size 65535x65535: expected 1x1 to 33554432 pixels in all"),
+        ({"rig": rig(size=(65535, 65535)), "effects": "auto"}, "size 65535x65535: expected 1x1 to"),
         ({"rig": rig(set={"threshold": 0.2})}, "threshold"),
         ({"rig": rig(sensor="davis3")}, "did you mean davis346"),
         ({"rig": rig(translation_mm=(15.0, 0.0, 0.0)), "depth": "plane:-1"}, "plane:-1"),
@@ -281,7 +283,7 @@ def test_what_cannot_be_meant_is_refused(tmp_path: Path, changed: dict[str, Any]
 def test_a_camera_beside_the_video_is_refused_without_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
     """However large it is: a look takes 16 bytes a pixel, and more."""
     monkeypatch.setattr("vid2ev.seen.sight.Views", pytest.fail)
-    around = rig(size=(65535, 65535), translation_mm=(15.0, 0.0, 0.0))
+    around = rig(size=(8192, 4096), translation_mm=(15.0, 0.0, 0.0))
     with pytest.raises(UsageError, match=r"camera right stands beside .* add --depth"):
         Recipe.of(CLIP, rig=around)
 

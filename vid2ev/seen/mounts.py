@@ -15,6 +15,7 @@ from vid2ev.sensors.cis import Cis
 from vid2ev.sensors.cis_spec import CisSpec
 from vid2ev.sensors.devices import CPU, Device
 from vid2ev.sensors.dvs import Dvs
+from vid2ev.sensors.limits import check_sensor
 from vid2ev.sensors.presets import check_overrides, load_cis, load_sensor
 from vid2ev.sensors.spec import DvsSpec
 from vid2ev.sensors.tiles import WHOLE, Part
@@ -185,7 +186,9 @@ class Mount:
 
 def mounts_of(rig: ResolvedRig, sensors: Sequence[Loaded], seed: int, alone: bool) -> tuple[Mount, ...]:
     """The cameras of a rig with their sensors; `seed` is of those that have none of their own.  `alone`: the only
-    camera, which has no name."""
+    camera, which has no name.  Raises UsageError for one that has more pixels than a sensor may have."""
+    for view in rig.viewpoints:
+        check_sensor(view.intrinsics.size, seed, 0, 1)
     return tuple(
         Mount(
             "" if alone else view.camera.name,
