@@ -7,6 +7,7 @@ import contextlib
 import graphlib
 import importlib
 import io
+import pkgutil
 import re
 import subprocess
 import sys
@@ -266,17 +267,23 @@ def test_the_readme_names_every_preset() -> None:
     assert all(f"`{name}`" in README for name in preset_names())
 
 
+DOCUMENTS = [
+    ROOT / "README.md",
+    *sorted(page for folder in ("docs", "vid2ev", "interp") for page in (ROOT / folder).rglob("*.md")),
+]
+
+
 def test_links_in_the_documents_lead_somewhere() -> None:
-    for page in (
-        ROOT / "README.md",
-        PACKAGE / "README.md",
-        PACKAGE / "HARD_CASES.md",
-        CLIENT / "README.md",
-        CLIENT / "HARD_CASES.md",
-    ):
+    for page in DOCUMENTS:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if not target.startswith("http"):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_python_names_in_the_documents_are_there(page: Path) -> None:
+    for name in re.findall(r"`((?:vid2ev|interp)(?:\.[A-Za-z_]\w*)+)", page.read_text(encoding="utf-8")):
+        pkgutil.resolve_name(name)  # (raises if it is not)
 
 
 @pytest.mark.parametrize(("package", "least"), [(PACKAGE, 30), (CLIENT, 15)])
