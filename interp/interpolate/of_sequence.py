@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from interp.data.layouts import open_sequence
-from interp.data.layouts.own import ROUNDED_US
+from interp.data.layouts.own import ROUNDED_US, Own
 from interp.data.layouts.sequence import matter_from_us
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
@@ -42,9 +42,10 @@ class OfSequence:
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.dead_time = options.dead_time(sequence.dead_time)
         self.remarks = sequence.remarks
+        self._times_us = sequence.slow_us if isinstance(sequence, Own) else sequence.times_us
+        self._picture = sequence.slow if isinstance(sequence, Own) else sequence.frame
         self._numbers = self._part(options)
-        times_us = sequence.times_us[self._numbers]
-        span_us = int(times_us[-1] - times_us[0])
+        span_us = int(self._times_us[self._numbers[-1]] - self._times_us[self._numbers[0]])
         self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
         self.channels = 1 if getattr(sequence, "grey", False) else 3
 
@@ -67,8 +68,8 @@ class OfSequence:
     def keys(self, start: int = 0) -> Iterator[Key]:
         """See `Take`."""
         for number in self._numbers[start:]:
-            codes = self._sequence.key(number)[..., : self.channels]
-            yield Key(int(self._sequence.times_us[number]), codes.astype(np.float32) / np.float32(255))
+            codes = self._picture(number)[..., : self.channels]
+            yield Key(int(self._times_us[number]), codes.astype(np.float32) / np.float32(255))
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
@@ -82,11 +83,10 @@ class OfSequence:
 
     def _part(self, options: Options) -> list[int]:
         """The frames to take, in order of time."""
-        times = self._sequence.times_us
-        numbers = list(getattr(self._sequence, "key_frames", range(len(times))))
-        latest = np.maximum.accumulate(times[numbers])
-        rising = [k for at, k in enumerate(numbers) if at == 0 or times[k] > latest[at - 1]]
-        if left_out := len(numbers) - len(rising):
+        times = self._times_us
+        latest = np.maximum.accumulate(times)
+        rising = [k for k in range(len(times)) if k == 0 or times[k] > latest[k - 1]]
+        if left_out := len(times) - len(rising):
             self.remarks.append(f"{left_out} frames left out, whose time is not after that of the frame before")
         start_us, stop_us = (
             None if second is None else int(times[rising[0]]) + round(second * 1e6)

@@ -362,6 +362,33 @@ def test_cameras_in_one_place_see_the_same_through_the_same_lens(tmp_path: Path,
     assert open_sequence(made).apart == apart
 
 
+@pytest.mark.parametrize("other", [(15, 1000, ""), (60, 1000, ""), (36, 0, ""), (60, 0, ", colour = false")])
+def test_key_frames_are_all_pictures_of_the_slower_camera_whenever_the_other_one_takes_its_own(
+    tmp_path: Path, other: tuple[int, int, str]
+) -> None:
+    """Which it may never do at the same instant, or at every other one, and without colours."""
+    exposure_us = 8000 if other[1] else 0
+    cameras = {
+        "a": f"frame_rate_hz = 15, exposure_us = {exposure_us}",
+        "b": "frame_rate_hz = {}, exposure_us = {}{}".format(*other),
+    }
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        '[[camera]]\nname = "dvs"\nkind = "dvs"\nsensor = "ideal"\n'
+        + "".join(
+            f'[[camera]]\nname = "{name}"\nkind = "cis"\nsensor = "ideal"\nset = {{ {numbers} }}\n'
+            for name, numbers in cameras.items()
+        )
+    )
+    made = tmp_path / "made"
+    convert(images(tmp_path / "in", moving(9)), made, rig=rig, pictures="png", preview=False, threads=1)
+    pictures = sorted((made / "a" / "frames").glob("*.png"))
+    told = interpolate(made, tmp_path / "out", multiple=2, method="linear")
+    assert told["key_frames"] == len(pictures) == 4
+    for k, picture in enumerate(pictures):
+        np.testing.assert_array_equal(read_codes(tmp_path / "out" / f"{2 * k:06d}.png"), read_codes(picture))
+
+
 def test_a_recording_that_cannot_be_interpolated_says_what_it_lacks(tmp_path: Path) -> None:
     source, rig = images(tmp_path / "in", moving(4)), tmp_path / "rig.toml"
     rig.write_text('[[camera]]\nname = "a"\nkind = "cis"\n')

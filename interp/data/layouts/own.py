@@ -33,6 +33,7 @@ class Own:
     """The recording in a folder.
 
     keys_folder     the pictures of the slow frame camera
+    grey            whether these have no colours
     events_folder   what the event camera wrote
     Where there are no pictures of 8 bits (`--cis-out png`), they are made of the codes of the ADC, as those would be.
     Raises DataError for a recording that has no events or no frames, or whose events cannot be read.
@@ -63,8 +64,7 @@ class Own:
             for number, t in enumerate(key_times)
             if abs(int(self.times_us[k := np.abs(self.times_us - t).argmin()]) - int(t)) <= ROUNDED_US
         }
-        first = self._frames.codes(0)
-        self.size, self.grey = first.shape[1::-1], first.ndim == 2
+        self.size, self.grey = self._frames.codes(0).shape[1::-1], self._keys.codes(0).ndim == 2
         self.event_size = tuple(sent["size"])
         self.contrast, self.dead_time = sent["contrast"], sent["dead_time"]
         self.apart = beside[sent["name"]]
@@ -86,6 +86,15 @@ class Own:
     def key_frames(self) -> list[int]:
         """Frames of which there is a key frame of the slow camera."""
         return sorted(self._key_of)
+
+    @property
+    def slow_us(self) -> np.ndarray:
+        """When the slow camera took its pictures, int64, whether or not there is a frame of that instant."""
+        return self._keys.times_us
+
+    def slow(self, number: int) -> np.ndarray:
+        """Its picture of a number."""
+        return self._keys.rgb(number)
 
     def frame(self, k: int) -> np.ndarray:
         """Frame k of the fast camera."""
