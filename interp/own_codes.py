@@ -38,6 +38,11 @@ def shown(codes: np.ndarray, curve: str) -> np.ndarray:
     return _shown(curve)[codes]
 
 
+def in_srgb(codes: np.ndarray, curve: str) -> np.ndarray:
+    """The sRGB codes [uint8] nearest to codes of a curve."""
+    return codes if curve == "srgb" else codes_of(light_of(curve), "srgb")[codes]
+
+
 def recoded(images: torch.Tensor, curve: str) -> torch.Tensor:
     """The signal [float32, 0 to 1] by a curve of images in sRGB."""
     if curve == "srgb":

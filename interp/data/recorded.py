@@ -14,6 +14,7 @@ from interp.data.layouts import Sequence, open_sequence, sequences_in, windows
 from interp.data.layouts.own import Own
 from interp.data.settings import MULTIPLES, ClipSettings
 from interp.data.simulate import kept_counts
+from interp.own_codes import in_srgb
 from interp.representation.carried import over
 from vid2ev.errors import DataError, UsageError
 
@@ -76,7 +77,8 @@ def clip_of(
     off, on = sequence.contrast or counted.contrast[0].tolist()  # (those that are known, to the last bit)
     about = {"source": "recording", "name": sequence.name, "first": first, "part": [left, top, width, height]}
     about |= {"coarser": coarser}
-    return Clip(truth, keys[:, rows, columns], kept_counts(counted), (off, on), times_us[1] - times_us[0], about)
+    truth, keys = (in_srgb(codes, sequence.curve) for codes in (truth, keys[:, rows, columns]))
+    return Clip(truth, keys, kept_counts(counted), (off, on), times_us[1] - times_us[0], about)
 
 
 def _edge_on_edge(sequence: Sequence) -> bool:

@@ -90,7 +90,7 @@ class Recording:
         known = cameras.at((start_us + stop_us) // 2, (first, last)) if cameras else Cameras()
         if events.places is not None:
             events = over(events, (keys.shape[1], keys.shape[2]))
-        return Group(number, first, keys, protocol.positions, truth, times_us, events, known)
+        return Group(number, first, keys, protocol.positions, truth, times_us, events, known, sequence.curve)
 
     def _remarks(self) -> list[str]:
         multiple, remarks = self.protocol.multiple, list[str]()

@@ -14,6 +14,7 @@ from interp.data.layouts.own import ROUNDED_US, Own
 from interp.data.layouts.sequence import matter_from_us
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
+from interp.own_codes import shown
 from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
@@ -30,7 +31,6 @@ class OfSequence:
     Raises UsageError where no frame lies in the part asked for.
     """
 
-    curve = coded = "srgb"
     bits = 8
     bright = False
 
@@ -38,6 +38,7 @@ class OfSequence:
         refuse_edits(folder, options)
         self._sequence = sequence = open_sequence(folder)
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
+        self.curve = self.coded = sequence.curve
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.dead_time = options.dead_time(sequence.dead_time)
@@ -69,7 +70,7 @@ class OfSequence:
         """See `Take`."""
         for number in self._numbers[start:]:
             codes = self._picture(number)[..., : self.channels]
-            yield Key(int(self._times_us[number]), codes.astype(np.float32) / np.float32(255))
+            yield Key(int(self._times_us[number]), shown(codes, self.coded))
 
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""

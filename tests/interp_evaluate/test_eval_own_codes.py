@@ -13,6 +13,11 @@ import pytest
 import torch
 from skimage.metrics import peak_signal_noise_ratio
 
+from interp.data.layouts import open_sequence
+from interp.data.layouts.writing import write_sequence
+from interp.data.recorded import clip_of
+from interp.evaluate.protocol import Protocol
+from interp.evaluate.recordings import Recording
 from interp.evaluate.remarks import notes
 from interp.evaluate.run import evaluate
 from interp.interpolate.whole import interpolate
@@ -80,6 +85,33 @@ def test_pictures_of_a_video_are_its_frames_and_can_be_used_again(film: Path, tm
         np.testing.assert_allclose(one.light, other.light, rtol=1e-6)
     assert convert(tmp_path / "made", tmp_path / "events", preview=False)["counts"]["frames"] == 2 * FRAMES - 1
     assert evaluate([str(tmp_path / "made")], tmp_path / "report", baselines=["linear"]).rows
+
+
+@pytest.mark.parametrize("kind", ["png", "raw"])
+@pytest.mark.parametrize("gammas", [("1.0", "1.0"), ("3.0", '"srgb"')])
+def test_frames_of_a_recording_are_of_the_light_of_its_pictures_by_whatever_curve(
+    film: Path, tmp_path: Path, gammas: tuple[str, str], kind: str
+) -> None:
+    """Those that are interpolated, scored, trained with and written for others; of two cameras of two curves, too."""
+    rig, made = tmp_path / "rig.toml", tmp_path / "made"
+    cameras = [f'"cis"\nset = {{ frame_rate_hz = {60 * 4**k}, gamma = {each} }}' for k, each in enumerate(gammas)]
+    named = ((f"c{k}", camera) for k, camera in enumerate([*cameras, '"dvs"']))
+    rig.write_text("".join(f'[[camera]]\nname = "{name}"\nsensor = "ideal"\nkind = {each}\n' for name, each in named))
+    convert(film, made, rig=rig, pictures=[kind], preview=False, threads=1)
+    sequence, exact = open_sequence(made), {"atol": 2e-3, "rtol": 0.05}
+    slow, fast = ([frame.light for frame in open_source(made / name / folder, colour="rgb").frames()]
+                  for folder in [{"png": "frames", "raw": "raw"}[kind]] for name in ("c0", "c1"))  # fmt: skip
+    (group, *_), clip = Recording(sequence, Protocol(3, 3), "made").groups(), clip_of(sequence, 0, 4)
+    write_sequence(sequence, tmp_path / "ergb", "hsergb")
+    for codes, curve, light in (
+        (group.keys[1], group.curve, slow[1]), (group.truth[1], group.curve, fast[2]),
+        (clip.keys[1], "srgb", slow[1]), (clip.truth[2], "srgb", fast[2]),
+        (open_sequence(tmp_path / "ergb").frame(2), "srgb", fast[2]),
+    ):  # fmt: skip
+        np.testing.assert_allclose(light_of(curve)[codes], light, **exact)
+    interpolate(made, tmp_path / "out", multiple=2, method="linear")
+    again = [frame.light for frame in open_source(tmp_path / "out", colour="rgb").frames()]
+    np.testing.assert_allclose(again[2], slow[1], **exact)
 
 
 @pytest.mark.parametrize("curve", ["srgb", "bt709", "smpte240m", "gamma:2.2", "gamma:2.6"])

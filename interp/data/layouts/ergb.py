@@ -53,6 +53,7 @@ class Ergb:
     Raises DataError for a folder that has no pictures, or no times for them.
     """
 
+    curve = "srgb"
     contrast: tuple[float, float] | None = None
     dead_time: DeadTime | None = None
     apart = True  # two cameras, brought together for one distance

@@ -16,6 +16,7 @@ import torch
 from interp.data.layouts.calibration import Calibration
 from interp.data.layouts.maps import Maps
 from interp.data.layouts.sequence import Placed
+from interp.own_codes import codes_of, light_of
 from interp.representation.carried import Look
 from interp.representation.dead_time import DeadTime
 from interp.representation.event_counts import contrast_of
@@ -36,6 +37,7 @@ class Own:
     grey            whether these have no colours
     events_folder   what the event camera wrote
     Where there are no pictures of 8 bits (`--cis-out png`), they are made of the codes of the ADC, as those would be.
+    Of frame cameras whose pictures have different curves (`cis.gamma`) both are brought to that of the slow one.
     Raises DataError for a recording that has no events or no frames, or whose events cannot be read.
     """
 
@@ -55,7 +57,8 @@ class Own:
             for each in frames
             if each not in alike
         ]
-        self._keys, self._frames = _Pictures(keys), _Pictures(alike[-1])
+        self.curve: str = keys["curve"]
+        self._keys, self._frames = _Pictures(keys, self.curve), _Pictures(alike[-1], self.curve)
         self.keys_folder, self.events_folder = keys["folder"], sent["folder"]
         _check_events(self.events_folder)
         self.times_us, key_times = self._frames.times_us, self._keys.times_us
@@ -164,7 +167,8 @@ def _facts(said: dict[str, Any], folder: Path) -> dict[str, Any] | None:
     width, height = (_whole(side, 1, MOST_PIXELS) for side in sensor["size"])
     facts = {"kind": sensor["kind"], "name": folder.name, "folder": folder, "size": (width, height)}
     if sensor["kind"] == "cis":
-        return facts | {"folder": _pictures_in(folder), "rate_hz": float(numbers["frame_rate_hz"]), "numbers": numbers}
+        rate_hz, curve = float(numbers["frame_rate_hz"]), CisSpec(**{"gamma": numbers.get("gamma", "srgb")}).curve
+        return facts | {"folder": _pictures_in(folder), "rate_hz": rate_hz, "curve": curve, "numbers": numbers}
     begin, length = (_whole(said[key], -LATEST_US, LATEST_US) for key in ("start_us", "duration_us"))
     known = {"contrast": contrast_of(numbers), "dead_time": DeadTime.of(numbers)}
     return facts | known | {"span_us": (begin, begin + length)}
@@ -178,14 +182,17 @@ def _whole(said: Any, least: int, most: int) -> int:
 
 
 class _Pictures:
-    """Pictures of 8 bits of a frame camera."""
+    """Pictures of 8 bits of a frame camera, by a transfer curve."""
 
-    def __init__(self, facts: dict[str, Any]):
+    def __init__(self, facts: dict[str, Any], curve: str):
         self._folder: Path = facts["folder"]
         self._size: tuple[int, int] = facts["size"]
         raw = self._folder.name == KINDS["raw"]
         with as_stated(self._folder.parent / MANIFEST):
             self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
+        if facts["curve"] != curve:
+            by_curve = codes_of(light_of(facts["curve"]), curve)
+            self._picture = by_curve if self._picture is None else by_curve[self._picture]
         opened = read_spans(self._folder / TIMESTAMPS)
         self.times_us = opened.sum(axis=1) // 2  # the middles of the exposures
         self.exposure_us = float(np.median(opened[:, 1] - opened[:, 0]))

@@ -45,6 +45,7 @@ class Sequence(Protocol):
     folder       where it is
     size         width and height of the frames [px]
     event_size   the same of the event camera
+    curve        the transfer curve of the codes of its frames
     times_us     when the frames were taken, int64; not always increasing in files of the field
     contrast     what an OFF and an ON event stand for [nat]; None where nobody knows
     dead_time    how long a pixel is blind after an event; None where nobody knows
@@ -56,6 +57,7 @@ class Sequence(Protocol):
     folder: Path
     size: tuple[int, int]
     event_size: tuple[int, int]
+    curve: str
     times_us: np.ndarray
     contrast: tuple[float, float] | None
     dead_time: DeadTime | None
@@ -71,7 +73,7 @@ class Sequence(Protocol):
         """Stretches of that time of which events are not known, as their file is missing or cannot be read."""
 
     def frame(self, k: int) -> np.ndarray:
-        """Frame k, sRGB codes uint8 [H, W, 3].  Raises DataError."""
+        """Frame k, codes uint8 [H, W, 3].  Raises DataError."""
 
     def key(self, k: int) -> np.ndarray:
         """Frame k as a frame camera gave it that is not as fast as the frames; frame k where there is no such camera.

@@ -15,6 +15,7 @@ import numpy as np
 from interp.data.layouts.ergb import LAYOUTS, STAMPS
 from interp.data.layouts.event_parts import SCALE
 from interp.data.layouts.sequence import Sequence
+from interp.own_codes import in_srgb
 from vid2ev.errors import UsageError
 from vid2ev.recording.disk import whole, write_npz, writing
 from vid2ev.recording.exposures import write_codes
@@ -39,7 +40,7 @@ def write_sequence(sequence: Sequence, folder: Path, layout: str) -> None:
         images.mkdir(parents=True)
         parts.mkdir()
         for k in range(len(sequence.times_us)):
-            write_codes(images / f"{k:06d}.png", sequence.frame(k))
+            write_codes(images / f"{k:06d}.png", in_srgb(sequence.frame(k), sequence.curve))
         (images / STAMPS[0]).write_text("".join(f"{t}\n" for t in sequence.times_us), encoding="utf-8")
         edges = [int(t) for t in sequence.times_us]
         gaps = list(pairwise(edges))
