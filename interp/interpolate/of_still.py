@@ -22,12 +22,14 @@ from interp.interpolate.take import Key, Options
 from interp.light import to_codes
 from interp.representation.dead_time import look_back_us, stated
 from interp.representation.event_counts import USUAL_NATS
-from vid2ev import Events, read_events
+from vid2ev import Events
 from vid2ev.errors import DataError, UsageError
+from vid2ev.formats import open_events, survey
 from vid2ev.formats.matlab import is_mat
 from vid2ev.light.netpbm import white_in
 from vid2ev.light.picture_files import read_picture, remarks_on_tags
 from vid2ev.light.pictures import PictureReader
+from vid2ev.pictures.brightest import MOST_OF_HALF_FLOATS
 from vid2ev.recording.exposures import LATEST_US
 from vid2ev.recording.manifest import identity
 
@@ -56,21 +58,24 @@ class OfStill:
         pixels, primaries, tagged = read_picture(picture)
         self.size = pixels.shape[1], pixels.shape[0]
         self.channels, self.bits = (1 if pixels.ndim == 2 else 3), (8 if pixels.dtype == np.uint8 else 16)
-        transfer = tagged or "srgb" if options.transfer == "auto" else options.transfer
+        usual = "linear" if pixels.dtype.kind == "f" else tagged or "srgb"
+        transfer = usual if options.transfer == "auto" else options.transfer
         self._transfer, reader = transfer, PictureReader(transfer, "rgb", white_in(picture))
         said = reader.remarks_on(pixels)
-        light = torch.from_numpy(reader.light(pixels, primaries))[..., : self.channels]
-        self._codes = to_codes(light, "srgb").numpy()
-        self._events = table_of(events) if is_mat(events) else Events.concatenate(read_events(events))
+        light = np.nan_to_num(reader.light(pixels, primaries), nan=0.0, posinf=MOST_OF_HALF_FLOATS)
+        self._codes = to_codes(torch.from_numpy(light)[..., : self.channels], "srgb").numpy()
+        self._events, stated, warnings = (table_of(events), None, []) if is_mat(events) else _events_in(events)
         if len(self._events) < 2:
             raise DataError(f"{events} holds {len(self._events)} events; expected those of the exposure of a frame")
         corner = int(self._events.x.max()) + 1, int(self._events.y.max()) + 1
-        self.event_size: tuple[int, int] = self.size if all(np.less_equal(corner, self.size)) else corner
+        guess = self.size if all(np.less_equal(corner, self.size)) else corner
+        self.event_size: tuple[int, int] = stated or guess
         self.contrast, self.dead_time = options.contrast or (USUAL_NATS, USUAL_NATS), options.dead_time()
         self.gaps_expected = 1
         self.remarks = [
             f"a single frame, taken for the mean of the light while its events came: {self._span_us / 1e3:g} ms"
         ]
+        self.remarks += [f"{events}: {text}" for text in warnings]
         self.remarks += [*said, *(remarks_on_tags(picture, pixels) if options.transfer == "auto" else ())]
         if options.transfer == "auto" and is_mat(events):
             self.remarks.append("its codes are taken for sRGB; of raw frames, --transfer linear says what they are")
@@ -107,6 +112,14 @@ class OfStill:
     @property
     def _span_us(self) -> int:
         return max(1, int(self._events.t[-1] - self._events.t[0]))
+
+
+def _events_in(path: Path) -> tuple[Events, tuple[int, int] | None, list[str]]:
+    """The events of an event file, in order of time; the size of their sensor if it states that, and what is to be
+    known of it."""
+    file = open_events(path)
+    events = Events.concatenate(survey(file).blocks())
+    return events, file.size, file.warnings
 
 
 def picture_beside(path: Path) -> Path:

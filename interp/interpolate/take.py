@@ -178,7 +178,7 @@ def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
     from interp.interpolate.of_still import OfStill, picture_beside
     from vid2ev.formats import recognise as recognise_events
     from vid2ev.formats.matlab import is_mat
-    from vid2ev.light.recognise import recognise
+    from vid2ev.sources import is_single_picture
 
     path = Path(path)
     has_both = is_sequence(path) or is_mat(path) or (path.is_file() and recognise_events(path) is not None)
@@ -190,7 +190,7 @@ def open_take(path: str | Path, options: Options = AS_IT_IS) -> Take:
         return OfStill(picture_beside(path), path, options)
     if has_both:
         return OfEventFile(path, options)
-    if path.is_file() and recognise(path) == "picture":
+    if is_single_picture(path):
         events = options.events or path.with_suffix(".mat")
         if options.events or is_mat(events):
             return OfStill(path, events, options)

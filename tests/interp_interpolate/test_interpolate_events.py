@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 import pytest
 import torch
@@ -559,6 +560,55 @@ def test_a_single_frame_with_events_makes_frames_of_its_exposure(tmp_path: Path,
     with pytest.raises(UsageError, match="'any' takes two frames"):
         interpolate(source, tmp_path / "flow", method="deblur", network="any", options=options)
     assert not (tmp_path / "flow").exists()
+
+
+@pytest.mark.parametrize("stated", [(32, 24), (128, 96)])
+def test_events_of_a_sensor_that_states_its_size_lie_over_all_of_a_single_frame(
+    tmp_path: Path, stated: tuple[int, int]
+) -> None:
+    write_codes(tmp_path / "a.png", np.full(SIZE[::-1], 99, np.uint8))
+    some, reach = drawn(), np.array([[20], [15]])
+    x, y = (np.stack([some.x, some.y]) % reach).astype(np.uint16)
+    blocks = [Events(some.t, x, y, some.p)]
+    write = format_named("npz").write
+    assert write is not None
+    write(tmp_path / "e.npz", Recording(stated, 0, int(some.t[-1]), len(some), lambda: iter(blocks)))
+    options = Options(events=tmp_path / "e.npz")
+    assert open_take(tmp_path / "a.png", options).event_size == stated
+    (first, *_) = frames(tmp_path / "a.png", multiple=2, options=options)
+    seen = np.argwhere(np.abs(first.codes[..., 0] - 99 / 255) > 1e-3).max(0)
+    np.testing.assert_allclose(seen + 1, reach[::-1, 0] * SIZE[0] / stated[0], atol=1.5)
+
+
+def test_events_of_a_single_frame_are_put_in_order_of_time(tmp_path: Path) -> None:
+    write_codes(tmp_path / "a.png", np.full(SIZE[::-1], 99, np.uint8))
+    some, takes = drawn(), []
+    for name, shift in (("in-order", 0), ("not", 1000)):
+        each = Events(*(np.roll(getattr(some, column), shift) for column in "txyp"))
+        lines = (",".join(map(str, event)) for event in zip(each.t, each.x, each.y, each.p, strict=True))
+        (tmp_path / f"{name}.csv").write_text("t,x,y,p\n" + "\n".join(lines) + "\n")
+        takes.append(open_take(tmp_path / "a.png", Options(events=tmp_path / f"{name}.csv")))
+    times = [[key.t_us for key in take.keys(0)] for take in takes]
+    assert times[0] == times[1] == [int(some.t[0]), int(some.t[-1])]
+    same(*(take.events(*times[0]) for take in takes))
+    assert ["put in order" in " ".join(take.remarks) for take in takes] == [False, True]
+
+
+def test_a_single_frame_of_floating_point_is_light(tmp_path: Path) -> None:
+    light = np.full(SIZE[::-1], 0.5, np.float32)
+    light[0, :3] = np.nan, np.inf, 3
+    cv2.imwrite(str(tmp_path / "a.tiff"), light)
+    (key, _) = open_take(tmp_path / "a.tiff", Options(events=written(tmp_path / "e.npz", drawn()))).keys()
+    found = to_light(torch.from_numpy(key.codes[..., 0]), "srgb").numpy()
+    np.testing.assert_allclose(found[1:], 0.5, rtol=1e-5)
+    np.testing.assert_allclose(found[0, :3], [0, 65504, 3], rtol=1e-4)
+
+
+def test_a_tiff_of_pages_with_events_is_no_single_frame(tmp_path: Path) -> None:
+    cv2.imwritemulti(str(tmp_path / "a.tif"), moving(4))
+    np.save(tmp_path / "a_timestamps.npy", 1e-6 * STEP_US * np.arange(4))
+    take = open_take(tmp_path / "a.tif", Options(events=written(tmp_path / "e.npz", drawn())))
+    assert take.gaps_expected == 3 and [key.t_us for key in take.keys(0)] == [STEP_US * k for k in range(4)]
 
 
 @pytest.mark.parametrize(
