@@ -16,7 +16,7 @@ from interp.interpolate.of_source import OfSource
 from interp.interpolate.take import Key, Options, refuse_edits
 from interp.representation.dead_time import look_back_us, stated
 from vid2ev import Events
-from vid2ev.errors import UsageError
+from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.manifest import identity
 from vid2ev.sources.framing import framing_of
 
@@ -99,7 +99,8 @@ class FramesBesideEvents(OfSource):
 class OfEventFile:
     """An event file with frames, such as AEDAT4 or a bag of ROS.
 
-    Raises UsageError where it has no frames, or none in the part asked for.
+    Where it does not state the size of its sensor, that is the frames', if all events are within.  Raises UsageError
+    where it has no frames, or none in the part asked for, DataError where those of it differ in size.
     """
 
     curve = coded = "srgb"
@@ -112,21 +113,27 @@ class OfEventFile:
         self._cursor, self._path = EventCursor(path, look_back_us(self.dead_time)), path
         if not self._cursor.file.has_frames:
             raise UsageError(f"{path} holds no frames; give their video, with --events {path}, or `vid2ev reconstruct`")
-        times, first = list[int](), None
+        times, shapes = list[int](), dict[int, tuple[int, ...]]()
         for picture in self._cursor.file.frames():
-            first = picture if first is None else first
             if not times or picture.t_us > times[-1]:
                 times.append(picture.t_us)
+                shapes[picture.t_us] = picture.pixels.shape
         begin_us = times[0] if times else 0
         start_us = begin_us if options.start_s is None else begin_us + round(options.start_s * 1e6)
         stop_us = times[-1] if times and options.stop_s is None else begin_us + round((options.stop_s or 0) * 1e6)
         inside = [t_us for t_us in times if start_us <= t_us <= stop_us]
-        if first is None or not inside:
+        if not inside:
             raise UsageError(f"{path}: no frame in the part asked for; choose another")
+        shape = shapes[inside[0]]
+        if other := next((t_us for t_us in inside if shapes[t_us] != shape), None):
+            raise DataError(
+                f"{path}: frames of {_said(shape)} up to {(other - begin_us) / 1e6:.6g} s, and then of"
+                f" {_said(shapes[other])}; take one or the other with --stop or --start"
+            )
         self._first_us, self._last_us, self.gaps_expected = inside[0], inside[-1], len(inside) - 1
-        self.name, self.size = path.stem, (first.pixels.shape[1], first.pixels.shape[0])
-        self.channels = 1 if first.pixels.ndim == 2 else 3
-        self.event_size = self._cursor.size
+        self.name, self.size, self.channels = path.stem, (shape[1], shape[0]), 1 if len(shape) == 2 else 3
+        guessed = self._cursor.file.size is None and all(np.less_equal(self._cursor.size, self.size))
+        self.event_size = self.size if guessed else self._cursor.size
         span_us = self._last_us - self._first_us
         self.rate = rate_of(Fraction(10**6 * self.gaps_expected, span_us)) if span_us else Fraction(30)
 
@@ -164,6 +171,11 @@ class OfEventFile:
     def events(self, start_us: int, stop_us: int) -> Events | None:
         """See `Take`."""
         return _within(self._cursor, start_us, stop_us)
+
+
+def _said(shape: tuple[int, ...]) -> str:
+    """The shape of a picture, for people."""
+    return f"{shape[1]}x{shape[0]} {'gray' if len(shape) == 2 else 'coloured'} pixels"
 
 
 def _within(cursor: EventCursor, start_us: int, stop_us: int) -> Events | None:

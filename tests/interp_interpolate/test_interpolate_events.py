@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -200,6 +200,35 @@ def test_events_in_a_file_of_their_own_are_those_of_a_recording(tmp_path: Path) 
             np.testing.assert_array_equal(one, moving(4)[k // 3])
     part = interpolate(both, tmp_path / "part", multiple=1, options=Options(start_s=0.03, stop_s=0.07))
     assert part["key_frames"] == 2 and part["start_us"] == STEP_US
+
+
+@pytest.mark.parametrize("other", [lambda frame: frame[:40], lambda frame: frame[..., 0]])
+def test_frames_of_an_event_file_that_change_their_size_are_taken_as_far_as_they_do_not(
+    tmp_path: Path, other: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    """As of a camera of which only a part is read out from then on, or in gray."""
+    shown = [frame if k < 2 else other(frame).copy() for k, frame in enumerate(moving(4))]
+    pictures = [Picture(STEP_US * k, frame) for k, frame in enumerate(shown)]
+    path = written(tmp_path / "a.aedat4", drawn(), "aedat4", lambda: iter(pictures))
+    with pytest.raises(DataError, match=r"64x48 coloured pixels up to 0.066666 s, and then of .* --stop or --start"):
+        interpolate(path, tmp_path / "out", multiple=2, method="bridge")
+    for part in ({"stop_s": 0.05}, {"start_s": 0.05}):
+        for k, frame in enumerate(frames(path, multiple=1, method="bridge", options=Options(**part))):
+            expected = shown[k + 2 * ("start_s" in part)]
+            np.testing.assert_array_equal(np.rint(255 * frame.codes), expected.reshape(*expected.shape[:2], -1))
+
+
+def test_events_of_a_camera_nobody_knows_are_those_of_the_pixels_of_its_frames(tmp_path: Path) -> None:
+    """Also where none came from its last column or row."""
+    some, pictures = drawn(), [Picture(STEP_US * k, frame) for k, frame in enumerate(moving(4))]
+    inside = some.select((some.x < 50) & (some.y < 30))
+    path = written(tmp_path / "a.aedat4", inside, "aedat4", lambda: iter(pictures))
+    known = open_take(path)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b'"sizeX"', b'"sizeA"').replace(b'"sizeY"', b'"sizeB"'))
+    assert path.read_bytes() != content
+    take = open_take(path)
+    assert known.event_size == take.event_size == take.size == SIZE
 
 
 @pytest.mark.parametrize("grid", [{"multiple": "1/2"}, {"multiple": "2/3"}, {"multiple": 2}, {"fps": "7"}])
