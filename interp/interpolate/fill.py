@@ -2,7 +2,7 @@
 
     a cut                        the nearer key frame
     unrelated pictures           the same, unless the method has events to go by
-    events that are not known    `fallback`, which needs none
+    events that are not known    `fallback`, which needs none; what remembers begins anew after them
 
 Events are read gap by gap, so that memory does not grow with the length of a recording.
 """
@@ -100,10 +100,11 @@ class Fill:
             return Work(self._held(stretch, shot), stretch.first, shot, remark)
         gap = self._gap(stretch, stretch.second)
         events = gap.events if self.events else None
-        if held:
-            return Work(self._held(stretch, shot), stretch.first, shot, remark, events)
         unknown = self.method.needs_events and gap.events is None
+        if held or (unknown and stretch.between == UNRELATED):
+            return Work(self._held(stretch, shot), stretch.first, shot, stretch.between * asked, events)
         method = self.fallback if unknown else self.method
+        self.method = self.method.begin() if unknown else self.method
         made = self._made(stretch, gap, method, shot)
         return Work(made, stretch.first, shot, NO_EVENTS * (asked and unknown), events)
 

@@ -126,6 +126,30 @@ def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
     np.testing.assert_array_equal(made(tmp_path / "out")[5], made(tmp_path / "flow")[5])
 
 
+def test_pictures_that_have_nothing_in_common_are_held_where_their_events_are_not_known(tmp_path: Path) -> None:
+    """There is nothing to go by: neither motion nor events."""
+    blocks = np.random.default_rng(1).integers(0, 256, (10, 8, 11, 1, 1, 3), np.int64)[4:8]
+    whole = np.broadcast_to(blocks, (4, 8, 11, 6, 6, 3)).swapaxes(2, 3).reshape(4, 48, 66, 3)
+    strange = [*whole[:, :, : SIZE[0]].astype(np.uint8)]
+    told = interpolate(recording(tmp_path / "in", strange, until=1), tmp_path / "out", multiple=4, method="bridge")
+    seconds = [STEP_US * k / 1e6 for k in range(4)]
+    assert told["gaps_s"] == {"pictures that have nothing in common": [seconds[1:3], seconds[2:]]}
+    for k, found in enumerate(made(tmp_path / "out")[4:], 4):
+        np.testing.assert_array_equal(found, strange[k // 4 + (k % 4 == 3)])
+
+
+def test_what_remembers_begins_anew_after_events_that_are_not_known(tmp_path: Path) -> None:
+    save(tmp_path / "net.safetensors", "firenet", make("firenet"))
+    source = recording(tmp_path / "in", moving(6))
+    (source / "events_aligned" / "000002.npz").unlink()
+    whole, part = (
+        [*frames(source, multiple=2, network=tmp_path / "net.safetensors", options=Options(start_s=start_s))]
+        for start_s in (None, 4 * STEP_US / 1e6)
+    )
+    for one, other in zip(whole[8:], part, strict=True):
+        np.testing.assert_array_equal(one.codes, other.codes)
+
+
 def test_a_part_begins_and_ends_at_frames(tmp_path: Path) -> None:
     frames = moving(6)
     for name, source in (("a", images(tmp_path / "a", frames)), ("b", recording(tmp_path / "b", frames))):
