@@ -3,7 +3,8 @@
 What the network remembers goes from key frame to key frame, with all events between them; frames in between are seen
 from the key frame before, with the events since.  So key frames do not depend on how many are made between them, which
 no sensor took: where a key frame is clipped, these are near the top of its range, and would be believed there.
-Weights for frames alone are told of the frame before processing.  All starts afresh after a cut.
+A key frame that is held stays what it becomes.  Weights for frames alone are told of the frame before processing.  All
+starts afresh after a cut.
 
 Light above white, of curves that go on there, is no end of a range: it is never made darker than it came.
 
@@ -24,6 +25,7 @@ import torch
 from interp.blocks.recurrent import State
 from interp.interpolate.fill import Filled, Work
 from interp.interpolate.memory import as_arrays, nested
+from interp.interpolate.stretches import CUT, UNRELATED
 from interp.light import to_codes, to_light
 from interp.methods.running import finite
 from interp.methods.tiling import Tile, parse_tiling, strips
@@ -68,12 +70,13 @@ class After:
         first, state = None, None
         if work.first.known:
             first, state = self._processed(work.first.codes, self._rest, self._state)
+        held = work.remark in (CUT, UNRELATED)
         for frame in work.frames:
-            before = state if frame.shot == work.shot else None
-            if frame.key and before and first is not None:
+            if first is not None and frame.codes is work.first.codes:
                 yield replace(frame, key=False, codes=first)
                 continue
-            since = self._voxels(work, frame.instant.share) if before else None
+            before = state if frame.shot == work.shot else None
+            since = self._voxels(work, 1 if held else frame.instant.share) if before else None
             codes, _ = self._processed(frame.codes, since, before)
             yield replace(frame, key=False, codes=codes)
         self._state, self._rest = state, self._voxels(work, 1)

@@ -27,6 +27,13 @@ def moving(count: int = 4, pixels: int = 3, seed: int = 0) -> list[np.ndarray]:
     return [whole[:, pixels * k : pixels * k + SIZE[0]].copy() for k in range(count)]
 
 
+def strange() -> list[np.ndarray]:
+    """Four frames of which none has anything in common with the next one."""
+    blocks = np.random.default_rng(1).integers(0, 256, (10, 8, 11, 1, 1, 3), np.int64)[4:8]
+    whole = np.broadcast_to(blocks, (4, 8, 11, 6, 6, 3)).swapaxes(2, 3).reshape(4, 48, 66, 3)
+    return [*whole[:, :, : SIZE[0]].astype(np.uint8)]
+
+
 def images(folder: Path, frames: list[np.ndarray], step_us: int = STEP_US, start_us: int = 0) -> Path:
     folder.mkdir(parents=True)
     for k, frame in enumerate(frames):

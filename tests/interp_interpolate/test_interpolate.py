@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
-from small_takes import SIZE, STEP_US, images, moving, recording, texture, times_of
+from small_takes import SIZE, STEP_US, images, moving, recording, strange, texture, times_of
 
 from interp import pretrained
 from interp.commands.interpolate import interpolate as command
@@ -128,14 +128,11 @@ def test_gaps_of_which_no_events_are_known_are_named(tmp_path: Path) -> None:
 
 def test_pictures_that_have_nothing_in_common_are_held_where_their_events_are_not_known(tmp_path: Path) -> None:
     """There is nothing to go by: neither motion nor events."""
-    blocks = np.random.default_rng(1).integers(0, 256, (10, 8, 11, 1, 1, 3), np.int64)[4:8]
-    whole = np.broadcast_to(blocks, (4, 8, 11, 6, 6, 3)).swapaxes(2, 3).reshape(4, 48, 66, 3)
-    strange = [*whole[:, :, : SIZE[0]].astype(np.uint8)]
-    told = interpolate(recording(tmp_path / "in", strange, until=1), tmp_path / "out", multiple=4, method="bridge")
+    told = interpolate(recording(tmp_path / "in", strange(), until=1), tmp_path / "out", multiple=4, method="bridge")
     seconds = [STEP_US * k / 1e6 for k in range(4)]
     assert told["gaps_s"] == {"pictures that have nothing in common": [seconds[1:3], seconds[2:]]}
     for k, found in enumerate(made(tmp_path / "out")[4:], 4):
-        np.testing.assert_array_equal(found, strange[k // 4 + (k % 4 == 3)])
+        np.testing.assert_array_equal(found, strange()[k // 4 + (k % 4 == 3)])
 
 
 def test_what_remembers_begins_anew_after_events_that_are_not_known(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.io import savemat
-from small_takes import SIZE, STEP_US, images, moving, recording
+from small_takes import SIZE, STEP_US, images, moving, recording, strange
 
 from interp.data.layouts import open_sequence
 from interp.interpolate.after import After
@@ -334,6 +334,25 @@ def test_hdr_makes_the_same_of_key_frames_however_many_are_between(tmp_path: Pat
         for k in range(5):
             np.testing.assert_allclose(made[multiple, STEP_US * k], made[1, STEP_US * k], atol=1e-4)  # (other sums)
     assert not np.array_equal(made[2, STEP_US], made[2, 0])
+
+
+@pytest.mark.parametrize("second", ["events", "frames"])
+@pytest.mark.parametrize("between", ["a cut", "pictures that have nothing in common"])
+def test_hdr_of_frames_that_are_held_is_that_of_their_key_frames(tmp_path: Path, between: str, second: str) -> None:
+    network = make("hdr", second=second)
+    torch.nn.init.normal_(network.out.weight, std=0.05)
+    save(tmp_path / "hdr.safetensors", "hdr", network)
+    shown = [*moving(4, seed=1), *moving(4, seed=2)] if between == "a cut" else strange()
+    source = recording(tmp_path / "in", [np.clip(1.25 * frame - 20.0, 0, 255).astype(np.uint8) for frame in shown])
+    given = {"method": "flow", "hdr": tmp_path / "hdr.safetensors", "options": Options(contrast=(0.15, 0.3))}
+    told = interpolate(source, tmp_path / "out", multiple=4, **given)
+    keys = [frame.codes for frame in frames(source, multiple=1, **given)]
+    (held,) = told["gaps_s"].values()
+    assert list(told["gaps_s"]) == [between] and len(held) == (1 if between == "a cut" else 3)
+    for frame in frames(source, multiple=4, **given):
+        if any(since <= frame.instant.t_us / 1e6 <= until for since, until in held):
+            nearer = frame.instant.number // 4 + (frame.instant.number % 4 == 3)
+            np.testing.assert_allclose(frame.codes, keys[nearer], atol=1e-5)
 
 
 def test_a_recording_of_convert_is_interpolated_whatever_it_has_of_its_frames(tmp_path: Path) -> None:
