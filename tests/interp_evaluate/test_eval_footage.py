@@ -143,9 +143,12 @@ def test_an_own_recording_whose_events_are_torn_is_named_before_any_are_asked_fo
     )
 
 
-def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Path) -> None:
-    write_film(tmp_path / "film.npz", pictures(12))
-    here = Camera(name="cis", kind="cis", sensor="paper", set={"frame_rate_hz": 250.0, "exposure_us": 400.0})
+@pytest.mark.parametrize("line_us", [0.0, 20.0])
+def test_where_cameras_stand_and_how_late_their_clocks_are_is_known(tmp_path: Path, line_us: float) -> None:
+    """And for how long a row is exposed, however much later the last one opens than the first."""
+    write_film(tmp_path / "film.npz", pictures(14))
+    shutter = {"frame_rate_hz": 250.0, "exposure_us": 400.0, "line_us": line_us}
+    here = Camera(name="cis", kind="cis", sensor="paper", set=shutter)
     there = Camera(name="dvs", kind="dvs", translation_mm=(12.0, 5.0, 0.0), clock_offset_us=500)
     rig = Rig(cameras=(there, here))
     convert(tmp_path / "film.npz", tmp_path / "own", rig=rig, depth="plane:2", pictures="png", preview=False)

@@ -190,12 +190,12 @@ class _Pictures:
         raw = self._folder.name == KINDS["raw"]
         with as_stated(self._folder.parent / MANIFEST):
             self._picture = CisSpec(**facts["numbers"]).picture_codes() if raw else None
+            self.exposure_us = float(facts["numbers"]["exposure_us"])  # (of a row; all of them may take longer)
         if facts["curve"] != curve:
             by_curve = codes_of(light_of(facts["curve"]), curve)
             self._picture = by_curve if self._picture is None else by_curve[self._picture]
         opened = read_spans(self._folder / TIMESTAMPS)
         self.times_us = opened.sum(axis=1) // 2  # the middles of the exposures
-        self.exposure_us = float(np.median(opened[:, 1] - opened[:, 0]))
 
     def codes(self, number: int) -> np.ndarray:
         """Codes uint8, [H, W] or [H, W, 3]."""
