@@ -17,7 +17,8 @@ from lightning.pytorch import LightningModule, Trainer
 from lightning.pytorch.callbacks import Checkpoint
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
-from interp.train.run_folder import MAKE_ROOM, MOST_STEPS
+from interp.train.run_folder import MAKE_ROOM
+from interp.train.schedule import MOST_STEPS
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import whole_file, writing
 from vid2ev.untrusted import check_bytes

@@ -30,7 +30,7 @@ from types import MappingProxyType
 from typing import Any
 
 from interp.pretrained import OF_RUN
-from interp.train.schedule import Steps
+from interp.train.schedule import MOST_STEPS, Steps
 from interp.train.scores import Scores
 from vid2ev.errors import DataError, UsageError
 from vid2ev.recording.disk import whole_file, writing
@@ -40,7 +40,6 @@ from vid2ev.untrusted import json_of, read_text
 
 LIBRARIES = ("torch", "lightning")
 FINISHED, WENT_ON = "finished.json", "went_on_with"
-MOST_STEPS = 1 << 40
 MAKE_ROOM = "make room or access there, then --resume"
 LEFT = re.compile(r"lock|run\.json\.new|start\.(\w+\.)?safetensors(\.new)?")
 OF_CLIPS = re.compile(r"[0-9a-f]+-\d+-\d+|validation")  # folders in `clips`, which is removed in the end

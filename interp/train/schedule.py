@@ -16,6 +16,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
+MOST_STEPS = 1 << 40  # of a run
 Plans = tuple[tuple[int, int], ...]  # (step at which steps were planned, how many there are in all), one after another
 
 

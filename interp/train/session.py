@@ -14,7 +14,7 @@ from typing import Any
 
 from lightning.pytorch import Callback, LightningModule, Trainer
 
-from interp.train.schedule import Steps
+from interp.train.schedule import MOST_STEPS, Steps
 
 MEASURE_SHARE, MEASURE_S = 0.05, 90.0  # of the time that training may take, but no longer: workers start, caches fill
 FEWEST_STEPS = 20
@@ -100,7 +100,7 @@ class Session(Callback):
         left_s, each_s = max(allowed_s - self.seconds, 0.0), max(self.validation_s(), SHORTEST_S)
         validations = min(self.limits.validations, max(1, int(VALIDATING * left_s / each_s)))
         left_s = max(left_s - validations * each_s, 0.0)
-        more = int(left_s * SAFETY * measured / measured_s) if measured else 0
+        more = _steps_in(left_s, measured_s / measured, step) if measured else 0
         known, steps, every = trainer.strategy.broadcast(
             (enough or late, step + more, validate_every(step + more, validations))
         )
@@ -119,7 +119,7 @@ class Session(Callback):
         each_s = max(measured_s - validated * validation_s, SHORTEST_S) / max(measured, 1) + validation_s / every
         self._first_s, self._first_step = now, step
         kept = KEPT[0] * allowed_s <= gone_s + (steps - step) * each_s <= KEPT[1] * allowed_s
-        more = int(max(allowed_s - gone_s, 0.0) * SAFETY / each_s)
+        more = _steps_in(max(allowed_s - gone_s, 0.0), each_s, step)
         kept, more = trainer.strategy.broadcast((kept, more))
         if not kept:
             self._take_up(trainer, Steps((*known.plans, (step, step + more)), every))
@@ -128,6 +128,11 @@ class Session(Callback):
         self.steps = steps
         self.planned(steps)
         last_step(trainer, steps.last)
+
+
+def _steps_in(left_s: float, each_s: float, step: int) -> int:
+    """How many more steps after this one the time that is left is worth; as many as a run may have at most."""
+    return int(min(left_s * SAFETY / each_s, MOST_STEPS - 1 - step))
 
 
 def validate_every(steps: int, validations: int) -> int:

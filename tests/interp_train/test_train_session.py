@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from interp.train.schedule import Steps
+from interp.train.run_folder import RunFolder
+from interp.train.schedule import MOST_STEPS, Steps
 from interp.train.session import Limits, Session, validate_every
 
 
@@ -83,6 +85,23 @@ def test_plans_of_an_earlier_session_hold_where_it_is_gone_through_again() -> No
     done = trained(100, lambda _: 0.1, steps=known)
     assert done.steps.plans[:2] == known.plans
     assert all(at > 900 for at, _ in done.steps.plans[2:])
+
+
+@pytest.mark.parametrize("training_s", [1e13, 1e308])
+def test_a_time_without_end_is_worth_as_many_steps_as_a_run_may_have(training_s: float, tmp_path: Path) -> None:
+    """So that it goes on from what its folder says of them."""
+    planned = list[Steps]()
+    trainer: Any = SimpleNamespace(
+        strategy=SimpleNamespace(broadcast=lambda value: value),
+        fit_loop=SimpleNamespace(epoch_loop=SimpleNamespace(max_steps=-1)), val_check_batch=1 << 62, global_step=0,
+    )  # fmt: skip
+    session = Session(Limits(training_s, 10), None, planned.append, lambda: 3.0, 0.0, lambda: 0.1 * trainer.global_step)
+    for trainer.global_step in range(1, 2000):
+        session.on_train_batch_end(trainer, None)  # type: ignore[arg-type]
+    folder = RunFolder(tmp_path / "run", {}, resume=False)
+    folder.plan(planned[-1])
+    assert folder.steps() == planned[-1] and planned[-1].last == MOST_STEPS - 1
+    folder.close()
 
 
 def test_a_machine_too_slow_ends_where_it_is() -> None:
