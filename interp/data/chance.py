@@ -41,8 +41,9 @@ def has_some(shares: Sequence[float]) -> bool:
 
 
 def chance(seed: int, *name: object) -> np.random.Generator:
-    """A generator of its own (Philox) for a seed and a name, such as chance(0, "clip", 17)."""
-    digest = hashlib.sha256(repr((seed, *name)).encode()).digest()
+    """A generator of its own (Philox) for a seed and a name, such as chance(0, "clip", 17); numbers of any type."""
+    plain = tuple(int(part) if isinstance(part, np.integer) else part for part in (seed, *name))
+    digest = hashlib.sha256(repr(plain).encode()).digest()
     return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "big")))
 
 

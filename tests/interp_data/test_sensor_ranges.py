@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from interp.data.chance import log_uniform, one_of, uniform
+from interp.data.chance import chance, log_uniform, one_of, uniform
 from interp.data.sensor_ranges import SENSORS, SensorRanges
 from vid2ev.sensors.spec import DvsSpec
 
@@ -80,6 +80,12 @@ def test_only_kinds_with_a_share_are_drawn(kind: tuple[float, float, float]) -> 
 @given(st.floats(1e-9, 1), st.floats(1, 1e9), st.floats(0, 1, exclude_max=True))
 def test_what_is_drawn_in_the_logarithm_lies_in_its_range(low: float, high: float, at: float) -> None:
     assert low <= log_uniform(Ends(at), (low, high)) <= high
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.int32, np.uint8])
+def test_draws_are_those_of_a_number_whatever_its_type(kind: type) -> None:
+    assert chance(kind(5), "sample", kind(3)).random() == chance(5, "sample", 3).random()
+    assert chance(5, "sample", 3).random() != chance(5, "sample", "3").random()
 
 
 @pytest.mark.parametrize("name", SENSORS)
