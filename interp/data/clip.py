@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from interp.representation.event_counts import MOST_NATS
 from vid2ev.errors import DataError
 from vid2ev.recording.disk import write_npy
 from vid2ev.untrusted import first_line, json_of
@@ -123,7 +124,7 @@ def _check(clip: Clip) -> None:
         raise ValueError(f"{list(truth.shape)}, {list(keys.shape)}, {list(off_on.shape)}, {clip.gap_us} us")
     if not (_finite(truth) and _finite(off_on)):
         raise ValueError("values that are no numbers")
-    if len(clip.contrast) != 2 or not all(0 < value < 100 for value in clip.contrast):
+    if len(clip.contrast) != 2 or not all(0 < value <= MOST_NATS for value in clip.contrast):
         raise ValueError(f"contrasts {clip.contrast}")
 
 

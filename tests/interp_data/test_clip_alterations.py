@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
 from interp.candidates.bridge import bridge
 from interp.data import alter
-from interp.data.clip import Clip
+from interp.data.clip import Clip, read_clip, write_clip
 from interp.data.samples import SampleSettings, altered
 from interp.data.settings import ClipSettings
 from interp.data.tensors import as_tensor, tensors
@@ -24,6 +27,12 @@ def clip_of(seed: int = 0, coarser: int = 1, light: str = "srgb") -> Clip:
     keys = draw.integers(0, 256, (2, 24, 24, 3)).astype(np.uint8)
     off_on = 1.25 * draw.integers(0, 4, (2, 32, 24 // coarser, 24 // coarser))  # (with what dead time hid)
     return Clip(truth, keys, off_on.astype(np.float16), (0.2, 0.3), 32_000, {})
+
+
+@pytest.mark.parametrize("contrast", [(1e-6, 0.2), (0.3, 100.0)])
+def test_clips_of_all_thresholds_that_sensors_may_have_are_kept(tmp_path: Path, contrast: tuple[float, float]) -> None:
+    write_clip(tmp_path / "clip.npy", replace(clip_of(), contrast=contrast))
+    assert read_clip(tmp_path / "clip.npy").contrast == contrast
 
 
 def as_bytes(clip: Clip) -> tuple[bytes, ...]:
