@@ -81,7 +81,8 @@ class Frames:
         if not 0 <= j <= steps or j % self._each:
             return
         if self._linear:
-            self.truth.append(np.clip(as_array(frame), 0, MOST_OF_HALF_FLOATS).astype(np.float16))
+            light = np.nan_to_num(as_array(frame), nan=0.0)  # (as sensors take it)
+            self.truth.append(np.clip(light, 0, MOST_OF_HALF_FLOATS).astype(np.float16))
         else:
             self.truth += [self._codes[each.codes] for each in self._sampler.step(frame, t_ns)]
 

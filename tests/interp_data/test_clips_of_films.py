@@ -80,6 +80,17 @@ def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:
     assert made(settings, 0, 0).gap_us == 40_000
 
 
+@pytest.mark.parametrize(("light", "seen"), [(np.nan, 0.0), (-np.inf, 0.0), (-1.0, 0.0), (np.inf, 65504.0)])
+def test_light_that_is_none_is_to_networks_what_it_is_to_sensors(tmp_path: Path, light: float, seen: float) -> None:
+    """In one pixel of a film of linear light; the others stay what they are."""
+    frames = np.full((20, 24, 32, 3), 0.4, np.float32)
+    frames[:, 5, 6] = light
+    np.savez(tmp_path / "film.npz", frames=frames, fps=50)
+    clip = made(ClipSettings(**FILMS, light="linear", video_files=(str(tmp_path / "film.npz"),)), 0, 0)
+    assert (clip.truth[:, 5, 6] == seen).all() and np.isfinite(clip.truth).all()
+    assert (clip.truth[:, :5] == np.float16(0.4)).all()
+
+
 @pytest.mark.parametrize(("count", "size", "said"), [(11, "64x48", "at least 12"), (40, "24x48", "at least 32x24")])
 def test_films_that_are_too_short_or_small_are_refused(tmp_path: Path, count: int, size: str, said: str) -> None:
     settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz", count, size),))
