@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from interp.data.chance import chance, uniform
 from interp.data.sensor_ranges import SENSORS, SensorRanges
+from interp.data.video_shots import length_of
 from vid2ev import CisSpec, DataError, DvsSpec, UsageError, load_cis, load_sensor, open_source
 from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
@@ -128,8 +129,8 @@ def _parts(spec: DatasetSpec, place: int, video: str) -> Iterator[Scene]:
     if is_single_picture(Path(video)):
         raise UsageError(f"{video}: a single picture; give a video, or a folder that holds a sequence of pictures")
     source = open_source(video)
-    seconds = source.duration_expected_s or 0.0
-    frame_s = seconds / max(source.frames_expected or 1, 1)
+    count, seconds = length_of(source, video)
+    frame_s = seconds / max(count, 1)
     rig, exposure_s = _rig(spec, place)
     length_s = ((spec.frames - 1) / spec.cis_fps + exposure_s) * spec.slowdown + EDGES * frame_s
     if seconds < length_s:

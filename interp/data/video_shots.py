@@ -96,6 +96,17 @@ def check_film(name: str, size: tuple[int, int], multiple: int) -> None:
     _fitting(_opened(name)[0], name, size, multiple)
 
 
+def length_of(source: Source, name: str) -> tuple[int, float]:
+    """Frames and seconds of a film, by its header.  Raises UsageError where that says neither."""
+    count, seconds = source.frames_expected, source.duration_expected_s
+    if count is None or seconds is None:
+        raise UsageError(
+            f"{name} does not say how long it is, and parts are drawn from all of it; bring it into a container that"
+            " does, as ffmpeg -i IN -c copy OUT.mkv does"
+        )
+    return count, seconds
+
+
 @lru_cache(maxsize=16)
 def _opened(name: str) -> tuple[Source, float]:
     """A film, and where it begins by its own clock [s]."""
@@ -116,9 +127,9 @@ def _place(
 
 def _fitting(source: Source, name: str, size: tuple[int, int], multiple: int) -> tuple[int, float, list[int]]:
     """Frames and seconds of a film, and by how much clips of it can be made smaller."""
-    count, seconds = source.frames_expected, source.duration_expected_s
+    count, seconds = length_of(source, name)
     least = _wanted(multiple) + 1
-    if not count or not seconds or count < least:
+    if not seconds or count < least:
         raise UsageError(f"{name}: {count} frames; expected at least {least} for clips of {multiple}")
     fits = [each for each in SMALLER if all(each * want <= have for want, have in zip(size, source.size, strict=True))]
     if not fits:

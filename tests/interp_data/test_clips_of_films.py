@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
+from interp.data.dataset_spec import DatasetSpec, scenes_of
 from interp.data.making import made
 from interp.data.sensor_ranges import SENSORS
 from interp.data.settings import HELD_OUT, TRAINED_ON, ClipSettings
 from interp.data.shot import AHEAD, SAME
 from interp.data.validation import SEED, held_out, validation_clips
-from interp.data.video_shots import VideoShot
+from interp.data.video_shots import VideoShot, check_film
 from vid2ev import UsageError, open_source
 from vid2ev.light.eight_bits import srgb_codes
 
@@ -96,6 +98,22 @@ def test_films_that_are_too_short_or_small_are_refused(tmp_path: Path, count: in
     settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz", count, size),))
     with pytest.raises(UsageError, match=said):
         made(settings, 0, 0)
+
+
+def test_a_film_that_does_not_say_how_long_it_is_is_not_called_short(tmp_path: Path) -> None:
+    """As a stream without a container: a data set has no parts of it, either."""
+    name = str(tmp_path / "film.h264")
+    with av.open(name, "w", format="h264") as container:
+        stream = container.add_stream("libx264", rate=50)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for k in range(40):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((48, 64, 3), 5 * k, np.uint8))))
+        container.mux(stream.encode())
+    said = r"film\.h264 does not say how long it is, and .*; bring it into a container that does"
+    with pytest.raises(UsageError, match=said):
+        check_film(name, (32, 24), 8)
+    with pytest.raises(UsageError, match=said):
+        scenes_of(DatasetSpec(videos=(name,), frames=2))
 
 
 @pytest.mark.skipif(not REAL.exists(), reason="no ../shared/data")
