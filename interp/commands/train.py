@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,7 +65,10 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
 )  # fmt: skip
 @click.option("--nodes", type=click.IntRange(1), default=1, show_default=True, help="Machines; start it on each.")
 @click.option("--cpu", is_flag=True, help="Train on the CPU though there is a GPU.")
-@click.option("--workers", type=click.IntRange(0), metavar="N", help="Processes that make samples.  [default: cores]")
+@click.option(
+    "--workers", type=click.IntRange(0), metavar="N",
+    help="Processes that make samples, for each that trains.  [default: the cores that are left, at least 1]",
+)  # fmt: skip
 @click.option(
     "--clips-on", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True,
     help="Where clips are simulated: by those processes, or on a GPU of NVIDIA's.",
@@ -112,8 +115,7 @@ def train(
     check_samples(job)
     films = job.validation.videos
     notes = [f"not used: {reason}" for reason in unusable(job.clips, films)] + trained_with(job.clips, films)
-    for note in notes if machines.first else ():
-        click.echo(f"note: {note}", err=True)
+    _note(notes, machines, quiet)
     if dry_run:
         from interp.train.made_of import learner_of
         from interp.train.starts import begin
@@ -123,8 +125,8 @@ def train(
         click.echo(json.dumps(job.model_dump(mode="json"), indent=2) if as_json else described(job, path))
         return
     if resume and machines.first and (changed := with_others(path)):
-        click.echo(f"note: trained until now with {changed}: it goes on, but not to the same bits", err=True)
-    device = _device(clips_on, machines)
+        _note([f"trained until now with {changed}: it goes on, but not to the same bits"], machines, quiet)
+    device = _device(clips_on, machines, quiet)
     outcome = _run(job, path, resume, machines, session_s, workers, quiet or as_json, starts, device)
     if machines.first:
         _tell(outcome, path, job.network, as_json, quiet)
@@ -156,13 +158,18 @@ def _run(
         sys.exit(INTERRUPTED)
 
 
-def _device(asked: str, machines: Machines) -> Device:
+def _note(notes: Sequence[str], machines: Machines, quiet: bool) -> None:
+    """What a person should know, said once."""
+    for note in notes if machines.first and not quiet else ():
+        click.echo(f"note: {note}", err=True)
+
+
+def _device(asked: str, machines: Machines, quiet: bool) -> Device:
     """Where clips are made; without a GPU on the CPU, which is said."""
     from vid2ev.sensors.devices import Device, missing_for_cuda
 
     if asked == "cuda" and (missing := missing_for_cuda()):
-        if machines.first:
-            click.echo(f"note: clips are made on the CPU: {missing}", err=True)
+        _note([f"clips are made on the CPU: {missing}"], machines, quiet)
         return Device("cpu", asked, missing)
     return Device(asked, asked)
 
