@@ -64,7 +64,7 @@ def test_the_size_that_is_said_is_that_of_the_film(tmp_path: Path) -> None:
     assert interpolate(source, tmp_path / "b", multiple=2, method="linear")["size"] == [63, 48]
 
 
-@pytest.mark.parametrize("curve", ["srgb", "bt709", "gamma:2.2", "gamma:2.8", "gamma:10"])
+@pytest.mark.parametrize("curve", ["srgb", "bt709", "gamma:0.5", "gamma:1.0", "gamma:2.2", "gamma:2.8", "gamma:10"])
 @pytest.mark.parametrize("kind", ["png", "mp4"])
 def test_codes_of_key_frames_are_those_of_their_curve(kind: str, curve: str) -> None:
     codes = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, 2)
