@@ -90,13 +90,24 @@ def test_the_command_is_what_the_page_converts(change: Any, tmp_path: Path, monk
         assert said["cameras"][camera.name]["parameters"] == setup.spec(number).model_dump(mode="json")
 
 
-@pytest.mark.parametrize("output", ["spinning-shapes_events", "scene_events", "elsewhere"])
+@pytest.mark.parametrize("output", ["spinning-shapes_events", "scene_events", "elsewhere", "elsewhere/", "./a/./b//"])
 @pytest.mark.parametrize("change", [lambda setup: setup, moved_camera, other_scene])
 def test_the_command_records_where_the_page_does(change: Any, output: str) -> None:
     words = shlex.split(str(command_of(change(setup_of(SMALL)), output)))[2:]
     options = convert.make_context("convert", words).params
     usual = str(default_directory(options["videos"][0]))
-    assert (options["output"] is None) == (output == usual) and str(options["output"] or usual) == output
+    assert (options["output"] is None) == (output == usual)
+    assert options["output"] in (None, str(Path(output))) and Path(options["output"] or usual) == Path(output)
+
+
+def test_the_command_converts_the_source_whatever_it_is_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("-o.npy", "--json.npy", "a b.npy", "'.npy"):
+        np.save(tmp_path / name, np.zeros((3, 24, 32), np.float32))
+        setup = setup_of(name).with_option("fps", 50.0)
+        options = convert.make_context("convert", shlex.split(str(command_of(setup)))[2:]).params
+        (video,) = options["videos"]
+        assert Path(video) == Path(name) and default_directory(video) == default_directory(name)
 
 
 def test_a_value_that_cannot_be_is_refused_and_one_that_is_the_presets_is_no_change() -> None:

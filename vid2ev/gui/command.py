@@ -55,7 +55,8 @@ class Command:
 def command_of(setup: Setup, output: str | None = None) -> Command:
     """The command of a setup, whose recording goes to `output`, which is said where the command would not do so."""
     files = {} if setup.scene is None else {SCENE: scene_text(setup)}
-    words = [SCENE if setup.scene is not None else setup.source]
+    source = f"./{setup.source}" if setup.source.startswith("-") else setup.source  # (which is no option)
+    words = [SCENE if setup.scene is not None else source]
     if is_plain(setup):
         words += _sensor_words(setup)
     else:
@@ -63,8 +64,8 @@ def command_of(setup: Setup, output: str | None = None) -> Command:
         words += ["--rig", RIG]
     for name, value in setup.options.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
-    if output and output != str(default_directory(words[0])):
-        words += ["-o", output]
+    if output and Path(output) != default_directory(words[0]):
+        words += ["-o", str(Path(output))]  # (with a slash at its end it would be the folder for the recording's)
     return Command(tuple(words), files, setup)
 
 
