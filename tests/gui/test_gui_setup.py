@@ -23,7 +23,7 @@ from vid2ev.compare.recordings import compare_recordings
 from vid2ev.errors import DataError, UsageError
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.hdf5 import write_events
-from vid2ev.gui.boards import SceneBoard
+from vid2ev.gui.boards import CameraBoard, SceneBoard
 from vid2ev.gui.command import command_of, options_of, sensor_text, write_scene
 from vid2ev.gui.guard import Guard, is_loopback
 from vid2ev.gui.light import duration_s
@@ -37,6 +37,7 @@ from vid2ev.gui.why import why_not
 from vid2ev.making.conversion import default_directory
 from vid2ev.reformat import reformat
 from vid2ev.rig.camera import Camera
+from vid2ev.rig.pose import Pose
 from vid2ev.scenes.scene_file import read_scene, scene_names
 from vid2ev.seen.recipe import Recipe
 from vid2ev.stream.events import Events
@@ -215,6 +216,24 @@ def test_each_control_of_a_scene_takes_what_it_shows_and_is_brought_back(name: s
                 board.put(control.key, value)
                 board.put(control.key, before)
                 assert board.value(control.key) == before and session.setup.scene is None
+    session.close()
+
+
+def test_a_camera_whose_rotation_is_a_matrix_is_turned_by_its_vector() -> None:
+    turned = Pose.of((10.0, -20.0, 30.0)).rotation
+    rows = {"rotation": tuple(tuple(row) for row in turned.tolist())}
+    session = Session(setup_of(SMALL).with_camera_values(0, rows))
+    board = CameraBoard(session, 0)
+    assert board.value("rotation_deg") == pytest.approx((10, -20, 30))
+    board.put("fov_deg", 50.0)
+    camera = session.setup.rig.cameras[0]
+    assert camera.fov_deg == 50 and camera.rotation == rows["rotation"]
+    board.put("rotation_deg", board.value("rotation_deg"))
+    np.testing.assert_allclose(session.setup.rig.cameras[0].pose.rotation, turned, atol=1e-8)
+    for wanted in ((10.0, -20.0, 31.0), None):
+        board.put("rotation_deg", wanted)
+        assert board.value("rotation_deg") == wanted
+    assert np.array_equal(session.setup.rig.cameras[0].pose.rotation, np.eye(3))
     session.close()
 
 

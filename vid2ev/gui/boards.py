@@ -12,6 +12,7 @@ from vid2ev.gui.scene_edit import PLACE, Thing, thing_named, value_of, with_valu
 from vid2ev.gui.session import Session
 from vid2ev.gui.setup import Setup
 from vid2ev.rig.camera import Camera, Source
+from vid2ev.rig.pose import rotation_vector_deg
 from vid2ev.sensors.presets import Kind, load
 
 BARE = ("name", "kind", "sensor", "set", "rotation")  # of a camera: elsewhere on the page, or another way to say it
@@ -117,9 +118,12 @@ class CameraBoard(_Board):
         return controls_of(Source if self.camera is None else Camera, without=BARE)
 
     def value(self, key: str) -> Any:
-        """The value in use."""
+        """The value in use; of a camera whose rotation is said by a matrix, the vector that says the same."""
         rig = self.session.setup.rig
-        return getattr(rig.source if self.camera is None else rig.cameras[self.camera], key)
+        camera = rig.source if self.camera is None else rig.cameras[self.camera]
+        if key == "rotation_deg" and isinstance(camera, Camera) and camera.rotation is not None:
+            return tuple(float(f"{angle:.9g}") for angle in rotation_vector_deg(camera.pose.rotation))
+        return getattr(camera, key)
 
     def base(self, key: str) -> Any:
         """The default."""
@@ -128,7 +132,10 @@ class CameraBoard(_Board):
     def changed(self, values: Mapping[str, Any]) -> Setup:
         """The setup with these values."""
         setup = self.session.setup
-        return setup.with_video_camera(values) if self.camera is None else setup.with_camera_values(self.camera, values)
+        if self.camera is None:
+            return setup.with_video_camera(values)
+        matrix = {"rotation": None} if "rotation_deg" in values else {}
+        return setup.with_camera_values(self.camera, {**values, **matrix})
 
 
 class SceneBoard(_Board):
