@@ -27,7 +27,7 @@ from numba import njit
 
 from vid2ev import UsageError
 from vid2ev.commands import main
-from vid2ev.commands.summary import file_facts, of_the_clip, result_facts
+from vid2ev.commands.summary import file_facts, of_the_clip, result_facts, short
 from vid2ev.interrupts import heard, never_lost
 from vid2ev.making import conversion
 from vid2ev.recording.manifest import difference
@@ -664,6 +664,15 @@ def test_a_terminal_shows_progress() -> None:
 )
 def test_times_are_multiples_of_the_clip_without_powers_of_ten(seconds: float, text: str) -> None:
     assert of_the_clip(2 * seconds, 2.0) == f"{text} x the length of the clip"
+
+
+@pytest.mark.parametrize("digits", [1.0, 1.5, 9.99, 9.994, 9.996, 9.9999])
+def test_numbers_have_three_digits_and_a_unit_without_powers_of_ten(digits: float) -> None:
+    for exponent in range(-2, 14):
+        number = digits * 10**exponent
+        said, _, unit = short(number).partition(" ")
+        value = float(said) * {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}[unit]
+        assert "e" not in said and value == pytest.approx(number, rel=0.005) and (value < 1000 or float(said) < 1000)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")

@@ -189,8 +189,9 @@ def _parts(upsampling: Mapping[str, Any], auto: str) -> str:
 
 
 def short(number: float) -> str:
-    """A number to three digits, in thousands, millions or billions, with a space before the unit to come."""
-    for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+    """A number to three digits, in thousands, millions and so on, with a space before the unit to come."""
+    number = float(f"{number:.3g}")  # (of 999.9 that is a thousand)
+    for unit, size in (("T", 1e12), ("G", 1e9), ("M", 1e6), ("k", 1e3)):
         if number >= size:
             return f"{number / size:.3g} {unit}"
     return f"{number:.3g} "
