@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from vid2ev import Events, read_events
+from vid2ev.cluster.workers import Workers
 from vid2ev.commands import batch, main
 from vid2ev.formats.event_file import Recording
 from vid2ev.formats.frame_index import write_frame_index
@@ -140,6 +141,19 @@ def test_json_for_programs() -> None:
     assert one["counts"]["events"] == found[0]["events"]
     plan = json.loads(vid2ev("clips/a9.npy", "-o", "none", "--json", "--dry-run").stdout)
     assert plan["outputs"]["formats"] == ["hdf5"] and not Path("none").exists()
+
+
+def test_memory_of_a_process_is_limited_for_one_video_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = []
+
+    def shared(directories: dict[str, Path], task: object, check: object, workers: Workers, quiet: bool) -> list[dict]:
+        limits.append(workers.memory)
+        return [{"video": video, "directory": str(place), "state": "done"} for video, place in directories.items()]
+
+    monkeypatch.setattr(batch, "convert_shared", shared)
+    for videos in (["clips/a9.npy"], ["clips/a9.npy", "clips/a10.npy"]):
+        assert vid2ev(*videos, "-o", "out", "--jobs", "2", "--memory", "2GiB").exit_code == 0
+    assert limits == ["2GiB"] * 2 and not Path("out").exists()
 
 
 def test_a_mistake_of_the_program_stops_one_video_only(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -198,7 +198,7 @@ def convert(
     found = [source for video in videos for source in sources_in(video)]
     single = len(videos) == 1 and found == [videos[0]] and not (output or "").endswith("/")
     directory = Path(output) if output and single else conversion.default_directory(videos[0])
-    if single and workers.scheduler is None and split is None:
+    if single and workers.scheduler is None and workers.memory is None and split is None:
         made = convert_one(videos[0], directory, dry_run, verbose, quiet, options)
         if as_json:
             click.echo(json.dumps(made, indent=2))
