@@ -9,10 +9,10 @@ there may be more to come, the recording begins again, and light is not measured
 What is kept once is kept, and a camera of which all is kept is not looked at any more.  What is kept although it would
 be within the tolerance, for the sake of what is still to come, says so in the plan.
 
-**Cost**: the plan is what was asked for, whether it pays or not, and mostly it does not.  To look takes 3 to 5 ns per
-pixel and frame, and up to 35 where all of it moves in every frame, what can be left out 1 to 2, and to begin again what
-was recorded so far: CPU time of a conversion was 0.9 to 1.1 times that of all effects, and 1.2 times where motion
-picked up and it began again (README).  Where the first plans keep all, no more than what is held is looked at.
+**Cost**: the plan is what was asked for, whether it pays or not, and mostly it does not.  To look takes 5 to 10 ns per
+pixel and frame, and several times that where all of it moves in every frame, what can be left out 1 to 2, and to begin
+again what was recorded so far: CPU time of a conversion was 1.0 to 1.2 times that of all effects, and 1.3 times where
+motion picked up and it began again (README).  Where the first plans keep all, no more than what is held is looked at.
 
 **It is sound**: a recording is made by one plan from its beginning to its end, and in the end that plan's bounds hold
 for the scene of the whole clip, as if it had been looked at first.
