@@ -21,7 +21,7 @@ import click
 
 from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.plot import plot
-from vid2ev.cost.table import cells, recommendation
+from vid2ev.cost.table import cells, recommendation, stretch_in_words
 from vid2ev.recording.manifest import machine
 
 CLIP = Path(__file__).with_name("demo.mp4")
@@ -44,8 +44,7 @@ def in_markdown(cost: Cost) -> str:
 
 def in_words(cost: Cost, cpu: bool) -> str:
     """What was measured, and the recommendation."""
-    begin, end = cost.stretch_s
-    part = "" if begin is None or end is None else f" from {begin:g} to {end:g} s"
+    part = "" if cost.stretch_s == (None, None) else f" {stretch_in_words(cost.stretch_s)}"
     width, height = cost.size
     computer = f"{machine()['processor']}, {cost.threads} threads"
     kind = "; times are those of all processors together" * cpu

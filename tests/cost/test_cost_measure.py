@@ -20,8 +20,8 @@ from vid2ev.cost.measure import Cost, measured
 from vid2ev.cost.passes import Float64Dvs, run
 from vid2ev.cost.plot import plot
 from vid2ev.cost.rung import Rung
-from vid2ev.cost.stretch import stretch_of
-from vid2ev.cost.table import cells, recommendation, table
+from vid2ev.cost.stretch import beginning_of, stretch_of
+from vid2ev.cost.table import cells, recommendation, stretch_in_words, table
 from vid2ev.errors import UsageError
 from vid2ev.seen.recipe import Recipe
 from vid2ev.stream import Events
@@ -162,6 +162,20 @@ def test_the_stretch_is_the_middle(options: dict, frames: int, stretch: tuple[fl
     assert stretch_of(recipe, options, frames=frames) == pytest.approx(stretch, abs=0.05)
     begin, end = stretch_of(recipe, options, duration_s=0.2)
     assert begin is not None and end == pytest.approx(begin + 0.2)
+
+
+@pytest.mark.parametrize(("stop", "duration_s"), [(None, None), (3.0, None), (0.1, None), (3.0, 9.0), (0.1, 0.05)])
+def test_no_stretch_goes_on_beyond_what_is_asked_for(stop: float | None, duration_s: float | None) -> None:
+    options = {} if stop is None else {"stop": stop}
+    recipe = Recipe.of("synthetic:sine,size=64x48,fps=30,duration_s=9.5", "ideal", **options)
+    for begin, end in (stretch_of(recipe, options, duration_s), beginning_of(recipe, options, duration_s)):
+        assert stop is None or (end is not None and (begin or 0) < end <= stop)
+
+
+def test_which_part_of_a_clip_was_tried_is_said_by_its_ends() -> None:
+    for stretch, words in (((None, None), "all of it"), ((1.0, None), "from 1 s on"), ((None, 2.5), "from 0 to 2.5 s"),
+                           ((1.0, 2.5), "from 1 to 2.5 s")):  # fmt: skip
+        assert stretch_in_words(stretch) == words
 
 
 def test_larger_pictures_are_given_less_time() -> None:

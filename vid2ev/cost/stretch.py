@@ -38,7 +38,8 @@ def beginning_of(
     slowdown = float(options.get("slowdown") or 1)
     wanted = max(FEWEST, round(frames * _share(recipe.source.size))) + 1
     times = [float(frame.t_ns) / 1e9 * slowdown for frame in islice(recipe.source.frames(), wanted)]
-    return times[0], times[-1] if duration_s is None else times[0] + duration_s
+    end, stop = times[-1] if duration_s is None else times[0] + duration_s, options.get("stop")
+    return times[0], end if stop is None else min(end, float(stop))
 
 
 def _share(size: tuple[int, int]) -> float:

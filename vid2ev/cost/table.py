@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from vid2ev.cost.front import Row, refusal
 from vid2ev.cost.measure import Cost
 from vid2ev.cost.quality import Quality
+from vid2ev.cost.stretch import Stretch
 
 
 def table(cost: Cost, *, recommending: bool = True) -> str:
@@ -48,14 +49,21 @@ def cells(cost: Cost) -> list[list[str]]:
 
 def _headed(cost: Cost) -> list[str]:
     width, height = cost.size
-    begin, end = cost.stretch_s
-    part = "all of it" if begin is None or end is None else f"{begin:g} ... {end:g} s"
+    part = stretch_in_words(cost.stretch_s)
     threads = f"{cost.threads} thread{'s' * (cost.threads > 1)}"
     return [
         f"{cost.clip}, {part}, {width}x{height}, {threads}; errors against the reference",
         "",
         *columns(cells(cost)),
     ]
+
+
+def stretch_in_words(stretch_s: Stretch) -> str:
+    """Which part of a clip that is."""
+    begin, end = stretch_s
+    if begin is None and end is None:
+        return "all of it"
+    return f"from {begin:g} s on" if end is None else f"from {begin or 0:g} to {end:g} s"
 
 
 def columns(lines: Sequence[Sequence[str]]) -> list[str]:
