@@ -206,6 +206,29 @@ def test_a_full_disk_leaves_what_was_there(recording: Path, monkeypatch: pytest.
     }
 
 
+def test_two_do_not_write_to_one_place_at_a_time(recording: Path) -> None:
+    said: list[Result] = []
+
+    def meanwhile(_: object, __: object) -> None:
+        if not said:
+            said.append(run(str(recording), "out.csv", "--start", "1", "--overwrite"))
+            assert run(str(recording), "other.csv").exit_code == 0
+
+    assert reformat(recording, "out.csv", report=meanwhile)["events"] == 5000
+    assert columns(Path("out.csv")) == columns(recording)
+    assert said[0].exit_code == 2 and said[0].stderr.startswith("error: another vid2ev is writing .out.csv.new")
+    assert {path.name for path in Path().iterdir()} == {"whole.h5", "out.csv", "other.csv"}
+
+
+def test_what_a_killed_one_left_is_not_in_the_way(recording: Path) -> None:
+    Path(".out.csv.new/made").mkdir(parents=True)
+    for name in ("made/out.csv", "made/further.csv", "lock"):
+        Path(".out.csv.new", name).write_text("half")
+    reformat(recording, "out.csv")
+    assert columns(Path("out.csv")) == columns(recording)
+    assert {path.name for path in Path().iterdir()} == {"whole.h5", "out.csv"}
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are text")
 def test_names_that_are_no_text_are_printed_as_they_are(recording: Path) -> None:
     target = b"\xff.npz"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from vid2ev.formats import (
 )
 from vid2ev.formats.event_file import Format, Recording
 from vid2ev.recording.disk import sync, writing
+from vid2ev.recording.held import Held
 from vid2ev.stream.events import Events
 from vid2ev.views.window import beginning_us, window
 
@@ -49,7 +51,7 @@ def reformat(
     report           called with the recording and the number of events done
 
     Returns what was made, ready for JSON.  Raises UsageError for what a format cannot hold and for a target that is
-    taken, DataError for a source that cannot be read and a target that cannot be written.
+    taken, or being written by another, DataError for a source that cannot be read and a target that cannot be written.
     """
     target = Path(target)
     kind = format_named(name) if name else format_of_suffix(target)
@@ -110,15 +112,18 @@ def _part(file: Any, start_s: float | None, stop_s: float | None) -> Recording:
 
 
 def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) -> list[Path]:
-    """The files of a recording, made beside their place and moved there when they are whole."""
+    """The files of a recording, made beside their place, where no other process makes them meanwhile, and moved there
+    when they are whole."""
     assert kind.write is not None
     beside = target.with_name(f".{target.name}.new")
+    held, work = Held(beside), beside / "made"
     try:
         with writing(target):
-            shutil.rmtree(beside, ignore_errors=True)
-            beside.mkdir(parents=True)
-            kind.write(beside / target.name, recording)
-            made = sorted(beside.iterdir())
+            held.take()
+            shutil.rmtree(work, ignore_errors=True)  # (of one that was killed)
+            work.mkdir()
+            kind.write(work / target.name, recording)
+            made = sorted(work.iterdir())
             taken = [path.name for path in made if (target.parent / path.name).exists()]
             if taken and not overwrite:
                 raise UsageError(f"{target.parent / taken[0]} exists; --overwrite replaces it")
@@ -130,7 +135,11 @@ def _write(target: Path, kind: Format, recording: Recording, overwrite: bool) ->
                 path.unlink()
             sync(target.absolute().parent)
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        if held:
+            shutil.rmtree(work, ignore_errors=True)
+        held.close()
+        with suppress(OSError):  # (another one is writing there)
+            beside.rmdir()
     return places
 
 
