@@ -120,6 +120,15 @@ def test_of_a_conversion_that_cannot_be_taken_up_nothing_is_left(pipe, tmp_path:
     assert made.read_bytes() == whole.read_bytes() and {*tmp_path.iterdir()} == {made.parent, whole.parent}
 
 
+def test_event_files_of_a_pipe_are_said_to_have_no_frames(pipe, tmp_path: Path) -> None:
+    for formats, said in (("aedat4,hdf5", ["aedat4: without the frames beside the events"]), ("hdf5", [])):
+        pipe(y4m(noise(3)))
+        warnings = convert("-", tmp_path / formats, "ideal", formats=formats, upsample="none", preview=False)[
+            "warnings"
+        ]
+        assert [text.partition(", as")[0] for text in warnings if "frames beside" in text] == said
+
+
 def test_a_second_time_is_refused(pipe) -> None:
     pipe(y4m(noise(3)))
     source = open_source("-")

@@ -147,6 +147,8 @@ class DvsTrack:
                 f"{key} = {getattr(self.dvs.spec, key):g} nat is more than the thresholds have room for; their spread"
                 f" is {on:.3g} nat (ON) and {off:.3g} nat (OFF)"
             )
+        if self._pictures is None and (kinds := [kind.name for kind in self.outputs.kinds() if "frames" in kind.keeps]):
+            remarks.append(f"{', '.join(kinds)}: without the frames beside the events, as the source passes once")
         if self.outputs.frames == "mp4":
             remarks += remarks_on_size(KINDS["mp4"], self.dvs.size)
         return remarks
