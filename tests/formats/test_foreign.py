@@ -330,10 +330,16 @@ def test_arrays_of_others(tmp_path: Path) -> None:
     path = tmp_path / "others.npz"
     np.savez(path, ts=events.t, xs=events.x.astype(float), ys=events.y, ps=events.p.astype(np.int8) * 2 - 1)
     files = {"names": path.read_bytes()}
-    for name, content in {"events": {"events": table}, "fields": {"data": events.x, "events": structured}}.items():
+    by_column = {"events": np.asfortranarray(table)}
+    for name, content in {
+        "events": {"events": table},
+        "by column": by_column,
+        "fields": {"data": events.x, "events": structured},
+    }.items():
         np.savez_compressed(path, **content)
         files[name] = path.read_bytes()
-    for name, array in {"npy": table, "structured npy": structured, "floats": table.astype(float)}.items():
+    arrays = {"npy": table, "structured npy": structured, "floats": table.astype(float), "column npy": table.T.copy().T}
+    for name, array in arrays.items():
         np.save(tmp_path / "others.npy", array)
         files[name] = (tmp_path / "others.npy").read_bytes()
     for name, content in files.items():

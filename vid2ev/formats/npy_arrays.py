@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any, BinaryIO, cast
 
 import numpy as np
@@ -48,13 +49,30 @@ def open_array(file: Any) -> Array:
     Raises ValueError and others for what is none, for Python objects, which could do anything when they are read, for
     arrays stored column by column, and for rows so large that they cannot be events.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # (of headers that Python 2 wrote)
-        shape, fortran, dtype = header_of(file)
+    shape, fortran, dtype = _header(file)
     row = int(np.prod([1, *shape[1:]], dtype=object)) * dtype.itemsize
     if dtype.hasobject or not 0 < row <= LARGEST_ROW or (fortran and len(shape) > 1):
         raise ValueError(f"{shape}, {dtype}")
     return Array(cast(BinaryIO, file), shape, dtype)
+
+
+def open_columns(opened: Callable[[], Any], count: int) -> list[Array]:
+    """The columns of a table of `count`, if it is one of numbers that is stored column by column, each in a file of its
+    own that is `opened`; otherwise none.  Raises ValueError and others for what is no array."""
+    shape, fortran, dtype = _header(opened())
+    if not fortran or shape[1:] != (count,) or dtype.kind not in "iufb":
+        return []
+    files = [opened() for _ in range(count)]
+    for number, file in enumerate(files):
+        _header(file)
+        file.seek(number * shape[0] * dtype.itemsize, io.SEEK_CUR)
+    return [Array(file, shape[:1], dtype) for file in files]
+
+
+def _header(file: Any) -> tuple[tuple[int, ...], bool, np.dtype]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # (of headers that Python 2 wrote)
+        return header_of(file)
 
 
 def array_header(shape: tuple[int, ...], dtype: Any) -> bytes:

@@ -17,9 +17,9 @@ Times that are fractions are seconds.  Source: https://numpy.org/doc/stable/refe
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ import numpy as np
 from vid2ev.errors import DataError, read_as
 from vid2ev.formats.columns import labels, pixels, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
-from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array
+from vid2ev.formats.npy_arrays import MOST_OF_A_PART, PART, Array, array_header, open_array, open_columns
 from vid2ev.formats.sequential import Sequential, reading
 from vid2ev.stream.events import Events
 
@@ -39,7 +39,7 @@ NAMES = {
     "p": ("p", "ps", "pol", "pols", "polarity", "polarities"),
     "label": ("label", "labels"),
 }
-TABLES = ("events", "arr_0")
+COLUMNS, TABLES = "txyp", ("events", "arr_0")
 ZIP_MAGIC, NPY_MAGIC = b"PK\x03\x04", b"\x93NUMPY"
 TIME = (1980, 1, 1, 0, 0, 0)  # of every member: the earliest that a zip file can say
 
@@ -134,15 +134,26 @@ def _recognises(head: bytes, path: Path) -> bool:
 
 
 def _arrays(stack: ExitStack, path: Path) -> dict[str, Array]:
-    """The arrays of a .npz or .npy file."""
+    """The arrays of a .npz or .npy file; of a table that is stored column by column these."""
     file = stack.enter_context(reading(path))
     if file.read(len(NPY_MAGIC)) == NPY_MAGIC:
-        file.seek(0)
-        return {"events": open_array(file)}
+        return _table(TABLES[0], lambda: stack.enter_context(reading(path)))
     whole = stack.enter_context(zipfile.ZipFile(file))
-    wanted = {"size", "start_us", *TABLES, *(name for names in NAMES.values() for name in names)}
     found = {info.filename.removesuffix(".npy"): info for info in whole.infolist() if info.filename.endswith(".npy")}
-    return {name: open_array(stack.enter_context(whole.open(found[name]))) for name in found if name in wanted}
+
+    def opened(name: str) -> Any:
+        return stack.enter_context(whole.open(found[name]))
+
+    wanted = {"size", "start_us", *(name for names in NAMES.values() for name in names)}
+    tables = [_table(name, partial(opened, name)) for name in TABLES if name in found]
+    arrays = {name: open_array(opened(name)) for name in found if name in wanted}
+    return {name: array for each in (*tables, arrays) for name, array in each.items()}
+
+
+def _table(name: str, opened: Callable[[], Any]) -> dict[str, Array]:
+    """The array of this name, or its columns."""
+    columns = open_columns(opened, len(COLUMNS))
+    return dict(zip(COLUMNS, columns, strict=True)) if columns else {name: open_array(opened())}
 
 
 def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
@@ -156,7 +167,7 @@ def _columns(arrays: dict[str, Array]) -> dict[str, tuple[Array, Any]] | None:
         elif table and (field := next((name for name in names if name in fields), None)):
             found[ours] = (table, field)
     if table and not found and len(table.shape) == 2 and table.shape[1] == 4 and not table.dtype.names:
-        found = {name: (table, (slice(None), column)) for column, name in enumerate("txyp")}
+        found = {name: (table, (slice(None), column)) for column, name in enumerate(COLUMNS)}
     kinds = [(array.dtype[key] if isinstance(key, str) else array.dtype).kind for array, key in found.values()]
     return found if set("txyp") <= set(found) and all(kind in "iufb" for kind in kinds) else None
 
