@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +143,23 @@ def test_times_that_a_format_does_not_have_are_refused_before_converting(tmp_pat
         convert(CLIP, tmp_path / "out", rig=early, formats=kind, report=pytest.fail, **OPTIONS)
     assert not list(tmp_path.iterdir())
     convert(CLIP, tmp_path / "out", rig=rig(clock_offset_us=5000), formats=kind, preview=False, **OPTIONS)
+
+
+def test_what_a_format_can_hold_to_the_end_it_holds_when_a_recording_is_taken_up(tmp_path: Path) -> None:
+    light = np.random.default_rng(0).uniform(0.1, 1, (5, 8, 8)).astype(np.float32)
+    options: dict[str, Any] = {"formats": "ros1", "preview": False, "piece": 1, **OPTIONS}
+    for late_us in (0, 1):  # (times of ROS go to 2**31 s)
+        times_us = np.linspace(-400_000, 0, 5).astype(np.int64) + 2**31 * 10**6 - 1 + late_us
+        np.savez(tmp_path / f"{late_us}.npz", frames=light, times_us=times_us)
+    manifest = convert(tmp_path / "0.npz", tmp_path / "whole", **options)
+    links = 0
+    while not (tmp_path / "out").exists():
+        with suppress(Paused):
+            again = convert(tmp_path / "0.npz", tmp_path / "out", resume=True, pause=lambda: True, **options)
+        links += 1
+    assert manifest.pop("run") and again.pop("run") and again == manifest and links > 2
+    with pytest.raises(UsageError, match="cannot hold times"):
+        convert(tmp_path / "1.npz", tmp_path / "late", **options)
 
 
 def test_a_clip_that_passes_once_is_refused_for_its_times_at_its_first_frame(

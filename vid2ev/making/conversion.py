@@ -265,7 +265,7 @@ def _record(recorder: Recorder, planner: Planner | None, course: _Course, began:
             first = next(seen, None)
         if first is None:
             raise DataError(f"{recipe.video} has no frames; give a source that has some")
-        _check_cameras(recipe, recorder.outputs, first.t_ns)
+        _check_cameras(recipe, recorder.outputs, done.start_ns if done.frames else first.t_ns)
         recorder.begin(first)
         limited_before -= first.limited
         for instant in seen:
