@@ -8,7 +8,7 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -255,6 +255,27 @@ def test_starting_again_removes_the_parts_that_were_begun(clip: str, tmp_path: P
         convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
     convert_split(clip, tmp_path / "made", "tiles", 2, look, overwrite=True, **options)
     assert {path.name for path in tmp_path.iterdir()} == {"made"}
+
+
+@pytest.mark.parametrize("begun", ["parts", "whole"])
+def test_with_other_options_it_begins_again_where_it_may(clip: str, tmp_path: Path, begun: str) -> None:
+    """As what is not split does, with both --resume and --overwrite; with --resume alone it is refused."""
+    options: dict[str, Any] = {"fps": 50, "upsample": "none", "threads": 1, "preview": False}
+
+    def only_one(tasks: Sequence[Task]) -> None:
+        tasks[0].call(lambda _: None)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) if begun == "parts" else nullcontext():
+        convert_split(clip, tmp_path / "made", "tiles", 2, only_one if begun == "parts" else here, **options)
+    with pytest.raises(UsageError, match="seed = 0, not 1"):
+        convert_split(clip, tmp_path / "made", "tiles", 2, here, resume=True, seed=1, **options)
+    seen: list[int] = []
+    again: dict[str, Any] = {"resume": True, "overwrite": True, "report": lambda _, done: seen.append(done.frames)}
+    made = convert_split(clip, tmp_path / "made", "tiles", 2, here, seed=1, **again, **options)
+    assert made["seed"] == 1 and seen and {path.name for path in tmp_path.iterdir()} == {"made"}
+    convert(clip, tmp_path / "whole", seed=1, **options)
+    assert (tmp_path / "made/events.h5").read_bytes() == (tmp_path / "whole/events.h5").read_bytes()
 
 
 @pytest.mark.parametrize("kind", ["tiles", "cuts"])

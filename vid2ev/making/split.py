@@ -65,7 +65,8 @@ def convert_split(
     """
     check_parts_free(directory, overwrite, resume, video)
     if resume and directory.exists() and not begun_parts(parts_of(directory)):
-        return convert(video, directory, resume=True, **options)  # (it is finished, or was made with other options)
+        # (it is finished, or was made with other options)
+        return convert(video, directory, overwrite=overwrite, resume=True, report=report, **options)
     parts, notes = _parts(video, kind, count, options | {"seed": options.get("seed") or 0}, look)
     with _held(directory) as beside:
         check_parts_free(directory, overwrite, resume, video)  # (once more: another may have written there until now)
@@ -74,7 +75,7 @@ def convert_split(
         if options.get("seed", 0) is None:
             options["seed"] = begun_part(directory).get("seed", secrets.randbits(32))
         folders = tuple(beside / f"{number}-of-{len(parts)}" for number in range(len(parts)))
-        share_out(_tasks(video, parts, folders, options))
+        share_out(_tasks(video, parts, folders, options | {"overwrite": overwrite}))
         options |= {"notes": {**(options.get("notes") or {}), **notes}} if notes else {}
         made = Made(folders, in_time=kind != "tiles")
         manifest = convert(video, directory, overwrite=overwrite, resume=resume, report=report, made=made, **options)
