@@ -376,11 +376,17 @@ def test_what_was_put_beside_a_rendered_scene_is_not_replaced_with_it(frames: st
     arguments = ["close-object", "-o", "out", "--truth", "depth:png,flow:png,poses", *QUICK[:-1], "--frames", frames]
     for more in ([], ["--overwrite"]):  # (with a folder of each camera of its rig)
         assert vid2ev("scene", *arguments, *more).exit_code == 0
-    for name in ("notes.txt", "events/manifest.json"):
+    for name, said in (
+        ("notes.txt", "notes.txt"),
+        ("events/manifest.json", "events"),
+        ("depth/notes.txt", "depth/notes.txt"),
+        ("dvs/flow/mine.png", "dvs/flow/mine.png"),
+        ("cis/events/manifest.json", "cis/events"),
+    ):
         Path("out", name).parent.mkdir(exist_ok=True)
         Path("out", name).write_text("mine")
-        refused(2, f"no rendered scene ({name.partition('/')[0]})", *arguments, "--overwrite")
-        Path("out", name).unlink()
+        refused(2, f"no rendered scene ({said})", *arguments, "--overwrite")
+        shutil.rmtree(Path("out", name).parent) if "manifest" in name else Path("out", name).unlink()
 
 
 @pytest.mark.parametrize("seed", ["0", "4"])

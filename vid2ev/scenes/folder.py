@@ -29,6 +29,7 @@ Report = Callable[[int, int], object]  # frames written, of how many
 FILES = re.compile(  # what a rendered scene holds, beside the folders of cameras
     r"scene\.toml|files|\d{6,}\.(png|tiff|exr)|(timestamps|poses)\.txt|intrinsics\.json|preview\.mp4|depth|flow"
 )
+WITHIN = re.compile(r"\d{6,}\.(npy|exr|png|npz|flo)|(depth|flow)\.txt")  # what depth and flow are held in
 MADE = "# vid2ev "  # how scene.toml begins in a folder that was rendered; a person's own does not
 
 
@@ -97,12 +98,15 @@ def _has_copies(directory: Path, files: Mapping[str, Path]) -> bool:
 
 
 def _check_replaceable(directory: Path) -> None:
-    """Raise UsageError for a rendered scene beside which something else was put, which would be gone with it."""
-    held = (path for path in directory.iterdir() if not FILES.fullmatch(path.name))
-    if others := [path.name for path in held if not (path / "intrinsics.json").is_file()]:
-        raise UsageError(
-            f"{directory} holds files that are no rendered scene ({min(others)}); choose another folder with -o"
-        )
+    """Raise UsageError for a rendered scene in which something else was put, which would be gone with it."""
+    cameras = [path for path in directory.iterdir() if (path / "intrinsics.json").is_file()]
+    held = [path for folder in (directory, *cameras) for path in folder.iterdir() if path not in cameras]
+    others = [path for path in held if not FILES.fullmatch(path.name)]
+    truth = (path for path in held if path.name in ("depth", "flow") and path.is_dir())
+    others += [path for folder in truth for path in folder.iterdir() if not WITHIN.fullmatch(path.name)]
+    if others:
+        first = min(path.relative_to(directory).as_posix() for path in others)
+        raise UsageError(f"{directory} holds files that are no rendered scene ({first}); choose another folder with -o")
 
 
 def _write_all(folder: Path, source: SceneSource, contents: Contents, report: Report | None) -> None:
