@@ -105,6 +105,22 @@ def test_a_lens_that_does_not_see_the_field_that_is_assumed_is_refused(model: st
     assert rig.around(taker).resolved((64, 48)).source.focal_px == (50, 50)
 
 
+@pytest.mark.parametrize(
+    ("source", "camera", "whose"),
+    [
+        ({"size": (32, 24), "focal_px": (9e11, 9e11)}, {}, "the source's"),
+        ({"size": (128, 96), "focal_px": (1e-12, 1e-12)}, {}, "the source's"),
+        ({"focal_px": (9e11, 9e11)}, {"size": (128, 96)}, "camera a's"),
+        ({"focal_px": (5.0, 5.0), "centre_px": (-9e11, 0.0)}, {"size": (128, 96)}, "camera a's"),
+    ],
+)
+def test_a_lens_that_no_rig_file_can_state_at_its_size_is_refused(source: dict, camera: dict, whose: str) -> None:
+    """The recording could not write its rig.toml in the end, or nobody could read it."""
+    rig = Rig(source=Source(**source), cameras=(Camera(name="a", kind="dvs", **camera),))
+    with pytest.raises(UsageError, match=f"{whose} lens.* 1e-12 to 1e\\+12 px"):
+        rig.resolved((64, 48))
+
+
 def test_a_lens_of_another_shape_than_the_video_is_refused() -> None:
     rig = Rig(source=Source(size=(1280, 720), fov_deg=80.0), cameras=(Camera(name="a", kind="dvs"),))
     assert rig.resolved((641, 360)).source.size == (641, 360)  # (rounded off)

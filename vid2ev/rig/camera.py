@@ -22,9 +22,10 @@ from vid2ev.errors import UsageError
 from vid2ev.rig.intrinsics import COUNTS, SHORTEST_PX, DistortionModel, Framing, Intrinsics
 from vid2ev.rig.pose import Pose, rotation_of
 
-Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12)]  # (what is made of it stays finite)
+FARTHEST = 1e12  # of numbers: what is made of them stays finite
+Number = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
 Side = Annotated[int, Field(strict=True, ge=1, le=65535)]
-Focal = Annotated[float, Field(strict=True, ge=SHORTEST_PX, le=1e12)]
+Focal = Annotated[float, Field(strict=True, ge=SHORTEST_PX, le=FARTHEST)]
 Angle = Annotated[float, Field(strict=True, ge=0.01, le=179)]
 Row = tuple[Number, Number, Number]
 Value = bool | int | float | str
@@ -255,12 +256,12 @@ class Rig(BaseModel):
         """The rig around a video of this size, which may be framed out of larger pictures, with every number known; or
         around a camera that is `known`, such as that of a scene, whatever the rig says of it.  Raises UsageError where
         they do not fit."""
-        source = known or self.source.intrinsics(source_size, framing)
-        return ResolvedRig(
-            source,
-            known is None and self.source.assumed,
-            tuple(Viewpoint(camera, camera.intrinsics(source), camera.pose) for camera in self.cameras),
-        )
+        source = _statable("the source's", known or self.source.intrinsics(source_size, framing))
+        viewpoints = [
+            Viewpoint(camera, _statable(f"camera {camera.name}'s", camera.intrinsics(source)), camera.pose)
+            for camera in self.cameras
+        ]
+        return ResolvedRig(source, known is None and self.source.assumed, tuple(viewpoints))
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,6 +301,19 @@ class ResolvedRig:
                 for view in self.viewpoints
             ],
         }
+
+
+def _statable(whose: str, lens: Intrinsics) -> Intrinsics:
+    """The lens, which a rig file can state, so that a recording's says what was seen through; raises UsageError."""
+    try:
+        Source.of(lens)
+    except ValueError as error:
+        focal, centre = (f"{across:g}, {down:g} px" for across, down in (lens.focal_px, lens.centre_px))
+        raise UsageError(
+            f"{whose} lens at {lens.size[0]}x{lens.size[1]} has the focal lengths {focal} and the centre {centre}; rigs"
+            f" have focal lengths of {SHORTEST_PX:g} to {FARTHEST:g} px, and centres within {FARTHEST:g} px"
+        ) from error
+    return lens
 
 
 def _stated(lens: Intrinsics) -> dict[str, Any]:
