@@ -29,7 +29,7 @@ ACROSS_PX = 80  # of the small picture
 
 
 class CamerasOf:
-    """The cameras of a recording, at any time of it."""
+    """The cameras of a recording, at any time of it by the clock of its frames."""
 
     def __init__(self, recording: Own):
         self._path = recording.folder / MANIFEST
@@ -76,7 +76,8 @@ class CamerasOf:
             return math.nan
         width, height = self._world.intrinsics.size
         small = self._world.intrinsics.scaled_to((ACROSS_PX, max(1, round(ACROSS_PX * height / width))))
-        depth_m = self._world.render(1000 * t_us, small).depth
+        seen_us = t_us - frames["clock_offset_us"]  # (scenes go by the clock of the rig)
+        depth_m = self._world.render(1000 * seen_us, small).depth
         return focal_px * self._apart_m * float((1 / depth_m).mean())
 
 

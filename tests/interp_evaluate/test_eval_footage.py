@@ -169,15 +169,18 @@ def test_a_lens_without_a_size_is_one_sentence(tmp_path: Path) -> None:
         open_sequence(tmp_path / "own")
 
 
-def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path) -> None:
-    camera = Camera(name="dvs", kind="dvs", translation_mm=(15.0, 0.0, 0.0))
-    still = Camera(name="cis", kind="cis", sensor="paper", set={"frame_rate_hz": 200.0, "exposure_us": 0.0})
+@pytest.mark.parametrize("late_us", [0, 400_000])
+def test_disparity_in_a_scene_is_that_of_its_depth(tmp_path: Path, late_us: int) -> None:
+    """When the frames were taken, whatever the clock of the cameras says."""
+    camera = Camera(name="dvs", kind="dvs", translation_mm=(15.0, 0.0, 0.0), clock_offset_us=late_us)
+    shutter = {"frame_rate_hz": 200.0, "exposure_us": 0.0}
+    still = Camera(name="cis", kind="cis", sensor="paper", set=shutter, clock_offset_us=late_us)
     scene = "scene:close-object,size=32x24"
     convert(scene, tmp_path / "own", rig=Rig(cameras=(camera, still)), stop=0.03, pictures="png", preview=False)
     source = open_source(scene)
     assert isinstance(source, SceneSource)
     (group,) = Recording(open_sequence(tmp_path / "own"), Protocol(3, 3), "own", limit=1).groups()
-    depth_m = source.world.render(500 * int(group.times_us[[0, -1]].sum())).depth
+    depth_m = source.world.render(500 * int((group.times_us[[0, -1]] - late_us).sum())).depth
     expected_px = float((source.world.intrinsics.focal_px[0] * 0.015 / depth_m).mean())
     assert expected_px > 0.1 and group.cameras.disparity_px == pytest.approx(expected_px, rel=0.1)
 
