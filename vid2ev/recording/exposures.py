@@ -11,7 +11,7 @@ Each of the two folders has a `timestamps.txt`, by which it can be opened as a s
     0 5000
     33333 38333
 
-when the first row of each picture opens and the last closes, in whole microseconds on the clock of the source.
+when the first row of each picture opens and the last closes, in whole microseconds on the clock of the camera.
 
 Colour in 16 bits is read as it is by OpenCV and FFmpeg; Pillow, and what reads with it, makes 8 bits of it.
 

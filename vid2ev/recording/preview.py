@@ -1,6 +1,6 @@
 """preview.mp4: the video on the left, its events on the right, in real time, for a browser.
 
-Frame k shows the instant t_k = t_0 + (k + 1/4) / rate on the clock of the source: the newest source frame that is not
+Frame k shows the instant t_k = t_0 + (k + 1/4) / rate on the clock of the camera: the newest source frame that is not
 after it, and the events since t_(k-1); none is lost, and one that is sent late is shown late.  The quarter lets source
 times that are rounded, or that drift as 29.97 Hz does, be shown in step.  Where nothing changes, a frame is left out
 and the one before it stays.

@@ -2,7 +2,7 @@
 
 probe.csv has a line for every frame, sub-frames too, and every event of each pixel, in order of time:
 
-    t_us           microseconds on the clock of the source, to the nanosecond for frames
+    t_us           microseconds on the clock of the camera, to the nanosecond for frames
     x, y           the pixel
     what           frame, ON or OFF
     light          linear light of the frame

@@ -54,7 +54,8 @@ def places_on_plane(
 
 
 def samples_for(places: Places, samples: int = 1, every: int = 1) -> int:
-    """How many places across a pixel it takes for none of the source to be skipped.
+    """How many places across a pixel it takes for none of the source to be skipped, by the median distance of pixels
+    there; where a wide lens or a turn has pixels further apart than that, some are.
 
     places   `samples` across each pixel; of their rows and columns one in `every` is looked at, the middle ones too
     """

@@ -10,10 +10,11 @@ made depends on what is between the two:
 
 A view is light and a mask of what is really seen.  Where the source has nothing to show, light is made up: outside its
 picture, what is nearest; in a hole, the background around it.  A camera of fewer pixels gets means over its pixels'
-area (as many places in each as no two skip a pixel of the source), one of more pixels a smooth curve.
+area (as many places in each as no two skip a pixel of the source, by the median distance of its pixels there), one of
+more pixels a smooth curve.
 
 Depth that is zero, negative or NaN is unknown: it is taken from the background around for warping, and what is seen
-there is not in the mask.  Infinite depth is infinitely far.
+there is not in the mask, but of cameras for which depth is not asked.  Infinite depth is infinitely far.
 """
 
 from __future__ import annotations
