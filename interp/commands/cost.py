@@ -39,7 +39,7 @@ def rebuild(
     if strange := sorted({*given} - OF_BOTH - OF_OUTPUT):
         raise UsageError(f"{option(strange[0])} is of conversions; leave it out, or --rebuild")
     edits = {key: value for key in OPTIONS if (value := options.get(key)) not in (None, "auto")}
-    asked = {*given} & {"sensor", "overrides", "seed", *OPTIONS}
+    asked = edits or {*given} & {"sensor", "overrides", "seed"}
     simulated = Simulated.of(sensor if "sensor" in given else "clean", overrides, seed, **edits) if asked else None
     found = rebuilding(
         source,

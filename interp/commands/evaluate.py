@@ -109,8 +109,8 @@ def evaluate(
     from vid2ev.terminal import counted, counting
 
     workers = workers_of(options)
-    asked = given() & {"sensor", "overrides", "seed", *OPTIONS}
     edits = {key: value for key in OPTIONS if (value := options.pop(key, None)) not in (None, "auto")}
+    asked = edits or given() & {"sensor", "overrides", "seed"}
     folder = Path(output or f"{_name(datasets[0])}_eval")
     with kept(folder), heard() as check, counting(quiet or as_json, GROUPS) as shown:
 

@@ -267,6 +267,12 @@ def test_what_is_said_of_films_is_refused_where_there_are_recordings_alone(
     assert run(tmp_path / "set", tmp_path / "film.npz", *options, "--seed", "1", "-q").exit_code == 0
 
 
+def test_the_curve_that_is_taken_anyway_may_be_asked_for_of_recordings_too(tmp_path: Path) -> None:
+    write_hsergb(tmp_path / "set" / "seq", pictures(5))
+    options = ["--skip", 3, "--baseline", "linear", "-o", tmp_path / "out", "-q"]
+    assert run(tmp_path / "set", *options, "--transfer", "auto").exit_code == 0
+
+
 def test_the_report_says_how_films_were_read(tmp_path: Path) -> None:
     """That decides the scores, and whether it can be gone on with."""
     write_film(tmp_path / "film.npz", pictures(9))
