@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -182,7 +183,7 @@ def _on_worker(tell: Tell, video: str, directory: Path, taken: Options, options:
 
 
 def _default(source: str, options: dict[str, Any]) -> Path:
-    path = Path(source).absolute()
+    path = Path(os.path.abspath(source))
     many = f"{options['fps']}fps" if options["fps"] else f"x{options['multiple'] or 8}"
     name = f"{path.name if path.is_dir() else path.stem}_{many}".replace("/", "_")
     return Path(name if options["format"] in ("png", "exr") else f"{name}.mp4")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ def keep_memory() -> bool:
 
 
 def _default(events: str, kind: str | None) -> Path:
-    path = Path(events).absolute()
+    path = Path(os.path.abspath(events))
     name = f"{path.name if path.is_dir() else path.stem}_seen"
     return Path(name if kind in ("png", "exr") else f"{name}.mp4")
 

@@ -374,6 +374,15 @@ def test_a_folder_is_called_by_its_source_and_the_multiple_whatever_dots_these_h
     assert sorted(path.name for path in tmp_path.iterdir()) == ["v1.2", "v1.2_x2.5"]
 
 
+def test_a_film_is_called_after_its_source_wherever_one_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    below = images(tmp_path / "clip", moving(2)) / "below"
+    below.mkdir()
+    monkeypatch.chdir(below)
+    for source in ("..", "../below/.."):
+        assert CliRunner().invoke(command, [source, "-x", "2", "--method", "nearest", "--overwrite"]).exit_code == 0
+        assert {path.name for path in below.iterdir()} == {"clip_x2.mp4", "clip_x2.json"}
+
+
 def test_frames_hours_apart_are_interpolated_and_a_film_of_them_plays_as_long(tmp_path: Path) -> None:
     hour_us = 3600 * 10**6
     source = images(tmp_path / "in", moving(3), step_us=hour_us)

@@ -410,6 +410,17 @@ def test_the_command_says_what_it_made(tmp_path: Path, monkeypatch: pytest.Monke
     assert json.loads(again.output)["events"] == 5000
 
 
+def test_a_film_is_called_after_its_recording_wherever_one_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    below = tmp_path / "recording" / "below"
+    below.mkdir(parents=True)
+    written(tmp_path / "recording" / "events.npz", drawn())
+    monkeypatch.chdir(below)
+    assert CliRunner().invoke(command, ["..", "--cutoff", "1", "--fps", "5"]).exit_code == 0
+    assert {path.name for path in below.iterdir()} == {"recording_seen.mp4", "recording_seen.json"}
+
+
 @pytest.mark.parametrize("output", [".", "..", "/"])
 def test_where_no_folder_can_be_put_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: str) -> None:
     monkeypatch.chdir(tmp_path)
