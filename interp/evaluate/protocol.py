@@ -30,6 +30,7 @@ from vid2ev.requests import is_whole
 Times = Literal["frames", "even"]
 Rounding = Literal["round", "truncate"]
 LEAST_STEPS = 32  # sub-intervals that events of a gap are counted in
+WHOLE = 1e-3  # codes: what is as near to a whole one is that, but for rounding of float32
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Protocol:
     def coded(self, images: torch.Tensor) -> np.ndarray:
         """Images [N, C, H, W] as codes of 8 bits, uint8 [N, H, W, C]."""
         codes = images.float().clamp(0, 1) * 255
-        codes = codes.round() if self.rounding == "round" else codes.floor()
+        codes = codes.round() if self.rounding == "round" else (codes + WHOLE).floor()
         return codes.to(torch.uint8).movedim(1, -1).contiguous().cpu().numpy()
 
 

@@ -118,8 +118,10 @@ def test_frames_of_a_recording_are_of_the_light_of_its_pictures_by_whatever_curv
 def test_codes_are_what_they_were(curve: str) -> None:
     codes = np.arange(256, dtype=np.uint8)
     np.testing.assert_array_equal(codes_of(light_of(curve), curve), codes)
-    signal = recoded(torch.from_numpy(shown(codes, curve)), curve).numpy()
-    np.testing.assert_array_equal(np.rint(255 * signal), codes)
+    signal = recoded(torch.from_numpy(shown(codes, curve)), curve)
+    for rounding in ("round", "truncate"):
+        coded = Protocol(7, 7, rounding=rounding).coded(signal.expand(1, 3, 1, -1))
+        np.testing.assert_array_equal(coded[0, 0, :, 2], codes)
     assert codes_of(np.array([np.nan, -1.0, 7.0]), curve).tolist() == [0, 0, 255]
 
 
