@@ -15,6 +15,7 @@ import torch
 
 from interp.light import to_light
 from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.light.tags import TRANSFERS
 from vid2ev.light.transfer import parse_transfer
 
 BRIGHT = ("pq", "hlg", "log100", "log316", "st428", "linear")  # curves of more light than white
@@ -24,6 +25,11 @@ def curve_of(about: dict[str, Any]) -> str:
     """The transfer curve of the codes that pictures of a source have, of which `Source.describe` says so much."""
     said, resized = str(about.get("transfer", "srgb")), about.get("edits", {}).get("resized", False)
     return "srgb" if resized or said in BRIGHT else said
+
+
+def curve_of_film(said: str) -> str:
+    """That of a film that looks as its source does: the source's, where films can say that it is theirs."""
+    return said if said in TRANSFERS.values() and said not in BRIGHT else "bt709"
 
 
 def codes_of(light: np.ndarray, curve: str) -> np.ndarray:

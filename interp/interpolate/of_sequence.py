@@ -14,7 +14,7 @@ from interp.data.layouts.own import ROUNDED_US, Own
 from interp.data.layouts.sequence import matter_from_us
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options, refuse_edits
-from interp.own_codes import shown
+from interp.own_codes import curve_of_film, shown
 from interp.representation.dead_time import stated
 from vid2ev import Events
 from vid2ev.errors import UsageError
@@ -38,7 +38,7 @@ class OfSequence:
         refuse_edits(folder, options)
         self._sequence = sequence = open_sequence(folder)
         self.folder, self.name, self.size = folder, sequence.name, sequence.size
-        self.curve = self.coded = sequence.curve
+        self.curve, self.coded = curve_of_film(sequence.curve), sequence.curve
         self.event_size: tuple[int, int] | None = sequence.event_size
         self.contrast, self.apart = options.contrast or sequence.contrast, sequence.apart
         self.dead_time = options.dead_time(sequence.dead_time)

@@ -14,7 +14,7 @@ import torch
 from interp.interpolate.instants import rate_of
 from interp.interpolate.take import Key, Options
 from interp.light import to_codes
-from interp.own_codes import BRIGHT, curve_of
+from interp.own_codes import BRIGHT, curve_of, curve_of_film
 from interp.representation.dead_time import DeadTime
 from vid2ev import Events, open_source
 from vid2ev.errors import DataError, UsageError
@@ -58,7 +58,7 @@ class OfSource:
         whole = said == "srgb" and "edits" not in self._about
         self._top = np.float32({"uint8": 255, "uint16": 65535}.get(str(self._about.get("type")), 0) * whole)
         self.bright = said in BRIGHT
-        self.curve, self.coded = "bt709" if self.bright else said, curve_of(self._about)
+        self.curve, self.coded = curve_of_film(said), curve_of(self._about)
         rate = self._about.get("fps") or self._about.get("rate")
         self.rate = Fraction(rate) if rate else self._mean_rate()
 

@@ -2,7 +2,8 @@
 
 png    codes of 8 bits, or 16 where the source has more than 8, by the source's own curve (`interp.own_codes`): those of
        key frames are the source's own
-mp4    codes of 8 bits by the source's own curve, so that the film is as bright as the source
+mp4    codes of 8 bits by the source's own curve, so that the film is as bright as the source; by that of BT.709 where
+       films have no name for it
 exr    float32, linear light, white at 1.0 and no upper end; needs the package OpenEXR
 """
 

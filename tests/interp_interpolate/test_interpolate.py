@@ -191,6 +191,17 @@ def test_a_film_shows_the_frames_and_exr_their_light(tmp_path: Path) -> None:
         np.testing.assert_allclose(key, light, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("curve", ["srgb", "bt709", "gamma:2.2", "gamma:1.5", "gamma:4", "linear"])
+def test_a_film_is_as_bright_as_its_source_by_whatever_curve(tmp_path: Path, curve: str) -> None:
+    """Also by one that no film can say it has."""
+    source = images(tmp_path / "in", [np.full_like(frame, 90 + 60 * k) for k, frame in enumerate(moving(2))])
+    interpolate(source, tmp_path / "film.mp4", multiple=1, method="nearest", options=Options(transfer=curve))
+    for made, first in zip(*(open_source(path, **of).frames() for path, of in (
+        (tmp_path / "film.mp4", {}), (source, {"transfer": curve})
+    )), strict=True):  # fmt: skip
+        np.testing.assert_allclose(made.light, first.light, rtol=0.05)
+
+
 @pytest.mark.parametrize("uneven", [False, True])
 def test_a_film_that_plays_frames_evenly_which_are_not_says_so(tmp_path: Path, uneven: bool) -> None:
     source = images(tmp_path / "in", moving(4))
