@@ -165,10 +165,12 @@ class Film:
 
 
 def _identity(video: str, about: Mapping[str, Any], besides: Collection[Path]) -> dict[str, Any]:
-    """What tells a film from another: what is in its files, or of a scene every number of it."""
+    """What tells a film from another: what is in its files, and times that lie beside them, or of a scene every number
+    of it, and its photographs and meshes."""
     path = Path(video)
-    if os.path.exists(path):  # (settings of a scene may be longer than any name of a file)
-        return {"video": path.name, **identity(path, copies=True, deep=True, besides=besides)}
+    if os.path.exists(path) and not is_scene(video):
+        times = {"times": of_times} if (of_times := about.get("timestamps_sha256")) else {}
+        return {"video": path.name, **identity(path, copies=True, deep=True, besides=besides), **times}
     return {"video": video, "sha256": hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Iterable
 from dataclasses import replace
@@ -244,6 +245,31 @@ def test_a_scene_that_was_edited_is_another(tmp_path: Path) -> None:
     scene = f"scene:{tmp_path / 'mine.toml'},seed=0"
     known.append(Film(scene, Protocol(3, 3), "mine", Simulated.of("clean", size="32x24"), 1).identity["sha256"])
     assert known[0] == known[1] and len(set(known)) == 3
+
+
+@pytest.mark.parametrize("prefix", ["", "scene:"])
+def test_a_scene_with_another_photograph_of_the_same_name_is_another(tmp_path: Path, prefix: str) -> None:
+    predefined = Path(vid2ev.__file__).parent / "scenes" / "predefined" / "low-light.toml"
+    assert 'texture = "gravel"' in predefined.read_text()
+    scene = tmp_path / "mine.toml"
+    scene.write_text(predefined.read_text().replace('texture = "gravel"', 'texture = "mine.png"'))
+    known = []
+    for seed in (0, 0, 1):
+        write_codes(tmp_path / "mine.png", pictures(1, seed)[0])
+        os.utime(tmp_path / "mine.png", (0, 0))
+        film = Film(f"{prefix}{scene}", Protocol(3, 3), "mine", Simulated.of("clean", size="32x24"), 1)
+        known.append(film.identity)
+    assert known[0] == known[1] != known[2]
+
+
+def test_a_film_whose_times_lie_beside_it_is_another_with_others(tmp_path: Path) -> None:
+    np.save(tmp_path / "stack.npy", pictures(5))
+    known = []
+    for rate in (240, 240, 100):
+        np.save(tmp_path / "stack_timestamps.npy", np.arange(5) / rate)
+        film = Film(str(tmp_path / "stack.npy"), Protocol(3, 3), "stack", Simulated.of("clean", transfer="srgb"))
+        known.append(film.identity)
+    assert known[0] == known[1] != known[2]
 
 
 def test_films_are_gone_through_a_group_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
