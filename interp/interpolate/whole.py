@@ -269,6 +269,13 @@ def _brought(ready: Ready) -> list[str]:
     return ["its cameras stand apart: events are brought to where the frames saw the same change"]
 
 
+def _clipped(shelf: Shelf, ready: Ready) -> list[str]:
+    """That what HDR post-processing makes above white is not in what is made, if it is not."""
+    if ready.after is None or shelf.kind == "exr" or ready.take.bright:  # (of which the take says it)
+        return []
+    return ["light above white, which HDR post-processing makes, is kept in EXR only: --format exr"]
+
+
 def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:
     """What the manifest says of what was made."""
     take = ready.take
@@ -284,6 +291,12 @@ def _result(shelf: Shelf, ready: Ready) -> dict[str, Any]:
         "start_us": shelf.done[0]["key_us"],
         "stop_us": max([shelf.done[-1]["key_us"], *shelf.done[-1]["t_us"]]),
         "gaps_s": named,
-        "remarks": [*take.remarks, *_brought(ready), *_unevenly(shelf, ready.grid), *shelf.remarks_on(take.size)],
+        "remarks": [
+            *take.remarks,
+            *_brought(ready),
+            *_clipped(shelf, ready),
+            *_unevenly(shelf, ready.grid),
+            *shelf.remarks_on(take.size),
+        ],
         "manifest": str(manifest_of(shelf.output, shelf.kind)),
     }

@@ -435,6 +435,22 @@ def test_hdr_that_makes_no_numbers_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("kind", ["mp4", "png", "exr"])
+def test_what_hdr_makes_above_white_is_said_to_be_in_exr_only(tmp_path: Path, kind: str) -> None:
+    if kind == "exr":
+        pytest.importorskip("OpenEXR")
+    shown = [np.clip(1.4 * frame.astype(int), 0, 255).astype(np.uint8) for frame in moving(2)]
+    source, output = recording(tmp_path / "in", shown), tmp_path / f"out{'.mp4' * (kind == 'mp4')}"
+    given: dict[str, Any] = {"multiple": 1, "method": "nearest", "format": kind, "overwrite": True}
+    told = [
+        interpolate(source, output, hdr=hdr, **given)["remarks"] for hdr in (None, pretrained.first(pretrained.HDR))
+    ]
+    said = [any("above white" in remark for remark in remarks) for remarks in told]
+    assert said == [False, kind != "exr"]
+    if kind == "exr":
+        assert max(frame.light.max() for frame in open_source(output).frames()) > 1.05
+
+
 def test_hdr_makes_no_light_above_white_darker(tmp_path: Path) -> None:
     pytest.importorskip("OpenEXR")
     from vid2ev.scenes.picture_writing import writer_of
