@@ -89,7 +89,8 @@ FRAMES = "{percentage:3.0f}% {bar} {n_fmt}/{total_fmt} frames, {rate_fmt}, {elap
 def interpolate(sources: tuple[str, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> None:
     """Make the frames of each SOURCE at more instants: a recording of `vid2ev convert`, in the layout of HS-ERGB or
     BS-ERGB, an event file with frames, a video, or a folder of images; also a single frame with its events (--events,
-    or NAME.mat beside NAME.png); or all that is in a folder, or in a list of them, NAME.txt.
+    or NAME.mat beside NAME.png); or all recordings in a folder, or where there are none its videos and folders of
+    images; or all of these in a list, NAME.txt.
 
     Frames of the source stay as they are, and nothing is interpolated across a cut.  Instants are whole microseconds on
     an exact grid.  A folder has timestamps.txt, so that `vid2ev convert` reads it again.

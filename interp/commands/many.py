@@ -7,8 +7,9 @@ from pathlib import Path
 
 
 def sources_in(source: str, goes_to: Path) -> list[str]:
-    """What an argument stands for: itself, the recordings in a folder, its videos and folders of images, or what the
-    lines of a list NAME.txt stand for; of the folder that frames go to not those that were made before.
+    """What an argument stands for: itself, the recordings in a folder, or where there are none its videos and folders
+    of images, or what the lines of a list NAME.txt stand for; of the folder that frames go to not those that were made
+    before.
 
     Raises UsageError, DataError."""
     from interp.data.layouts import is_sequence, sequences_in
