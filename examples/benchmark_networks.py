@@ -57,7 +57,7 @@ def frames_per_second(name: str, network_size: str, precision: str, size: tuple[
     """A line of the table."""
     torch.manual_seed(0)
     first = torch.nn.functional.interpolate(torch.rand(1, 3, 90, 160), size[::-1], mode="bilinear")[0].to(device)
-    gap = Gap(first, first.roll(5, 2), counts(1, size).to(device), 33_333)
+    gap = Gap(first, first.roll(5, 2), counts(1, size).to(device))
     running = Running(precision)
     method = OfFrames(name, running.ready(make(name, network_size).to(device).eval()), True, running)
     times = torch.arange(1, TARGETS + 1, device=device) / (TARGETS + 1)

@@ -66,7 +66,7 @@ class NetUpsampling:
     def _made(self, a: Frame, b: Frame, times_ns: list[int]) -> Iterator[Frame]:
         shares = self._upload.tensor(np.array([(t_ns - a.t_ns) / (b.t_ns - a.t_ns) for t_ns in times_ns], np.float32))
         first, last = (self._upload.light(frame.light) for frame in (a, b))
-        gap = Gap(_codes(first), _codes(last), None, round((b.t_ns - a.t_ns) / 1000))
+        gap = Gap(_codes(first), _codes(last), None)
         height, width = a.light.shape[:2]
         made = self._method.images(gap, shares, tiling_of(self._method, (width, height)))
         endless = first.isposinf() & last.isposinf()  # (of which a sensor sees the greatest light there is)

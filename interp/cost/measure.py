@@ -205,7 +205,7 @@ def _brought_to(group: Group, size: Size, protocol: Protocol, device: str) -> tu
     across = max(1, round(across * size[0] / wide)) if across > 1 else 1  # (of those that are not laid over frames)
     events = replace(group.events, off_on=off_on, footprint=across)
     times = torch.from_numpy(protocol.targets(group.times_us)).float()
-    return Gap(keys[0].to(device), keys[1].to(device), events.to(device), group.gap_us), times.to(device)
+    return Gap(keys[0].to(device), keys[1].to(device), events.to(device)), times.to(device)
 
 
 def _timed(

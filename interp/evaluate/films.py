@@ -81,7 +81,7 @@ class Film:
     ):
         self.name, self.video, self.protocol, self.limit = name, video, protocol, limit
         self.called = called or (name,)
-        self.multiple, self.begin, self._simulated, self._told = protocol.multiple, 0, simulated, Told()
+        self.begin, self._simulated, self._told = 0, simulated, Told()
         source = simulated.opened(video)
         if not source.rewindable:
             raise UsageError(f"{video} can be read once only; save it as a file to score methods on it")
@@ -117,7 +117,7 @@ class Film:
                         break
                     told.see(seen.t_us)
                     part.append(seen)
-                    if len(part) <= self.multiple:
+                    if len(part) <= self.protocol.multiple:
                         continue
                     events = Events.concatenate([known, *(each.events for each in part[1:])])
                     if reason := _unfit(part):
@@ -131,7 +131,7 @@ class Film:
         told.remarks += source.warnings
         if left := len(part) - 1:
             told.remarks.append(
-                f"not rebuilt: {counted(left, 'frame')} after the last complete group of {self.multiple}"
+                f"not rebuilt: {counted(left, 'frame')} after the last complete group of {self.protocol.multiple}"
             )
 
     def about(self) -> dict[str, Any]:
@@ -160,7 +160,7 @@ class Film:
         truth = np.stack([part[k].codes for k in protocol.positions])
         times_us = np.array([each.t_us for each in part])
         cameras = Cameras(disparity_px=0.0, offset_us=0.0)  # (one place, one clock; how it was exposed, nobody knows)
-        first, positions = number * self.multiple, protocol.positions
+        first, positions = number * protocol.multiple, protocol.positions
         return Group(number, first, keys, positions, truth, times_us, counts, cameras, self.curve)
 
 

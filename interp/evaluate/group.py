@@ -63,7 +63,6 @@ class Footage(Protocol):
     name        by which it is called, and its files
     called      what folders of others' pictures of it may be called, the likeliest first
     expected    number of groups, for progress; may be an estimate
-    multiple    frames per key frame
     begin       the first key frame
     protocol    which frames are rebuilt
     limit       gaps that are scored, from the first on; None for all
@@ -73,7 +72,6 @@ class Footage(Protocol):
     name: str
     called: tuple[str, ...]
     expected: int
-    multiple: int
     begin: int
     protocol: protocols.Protocol
     limit: int | None

@@ -88,7 +88,7 @@ class OfMethod:
             self.method = self.method.begin()
         self._next = group.number + 1
         keys = as_tensor(shown(group.keys, group.curve)).to(self.device)
-        gap = Gap(keys[0], keys[1], group.events.to(self.device), group.gap_us)
+        gap = Gap(keys[0], keys[1], group.events.to(self.device))
         targets = torch.from_numpy(self.protocol.targets(group.times_us)).float().to(self.device)
         height, width = keys.shape[-2:]
         images = self.method.images(gap, targets, tiling_of(self.method, (width, height)))

@@ -40,11 +40,10 @@ class Recording:
     ):
         self.name, self._sequence, self.protocol, self.limit = name, sequence, protocol, limit
         self.called = called or (name,)
-        self.multiple = multiple = protocol.multiple
         self._own_keys = self._sequence.key_frames if isinstance(self._sequence, Own) else []
         self.begin = self._own_keys[0] if self._own_keys else 0
         self.frames = len(self._sequence.times_us)
-        found = windows(self._sequence, multiple, multiple, self.begin)
+        found = windows(self._sequence, protocol.multiple, protocol.multiple, self.begin)
         self._not_scored = dict(found.unusable)
         self._firsts = [int(first) for first in found.first][:limit]
         if left := len(found.first) - len(self._firsts):

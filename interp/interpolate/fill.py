@@ -138,8 +138,7 @@ class Fill:
 
     def _gap(self, stretch: Stretch, second: Key) -> Gap:
         frames = [_tensor(key).to(self.device) for key in (stretch.first, second)]
-        gap_us = second.t_us - stretch.first.t_us
-        return Gap(frames[0], frames[1], self._counts(stretch.first, second, frames), gap_us)
+        return Gap(frames[0], frames[1], self._counts(stretch.first, second, frames))
 
     def _counts(self, first: Key, second: Key, frames: list[torch.Tensor]) -> EventCounts | None:
         """What the events between two key frames say; None where they are not needed, or not known."""

@@ -27,13 +27,11 @@ CUT, UNRELATED = "a cut", "pictures that have nothing in common"
 class Stretch:
     """A key frame and what comes after it, before the next.
 
-    number     of the key frame
     second     the next key frame; None after the last one
     instants   of the frames to make, the key frame's own included
     between    what lies between both, if that is not just time: `CUT` or `UNRELATED`, or nothing
     """
 
-    number: int
     first: Key
     second: Key | None
     instants: list[Instant]
@@ -57,10 +55,10 @@ def stretches(take: Take, grid: Grid, zero_us: int | None, start: int = 0, look:
             if number > start:
                 instants = grid.between(number - 1, earlier.t_us, key.t_us, zero_us)
                 kind = CUT if cut else UNRELATED if cuts.unrelated else ""
-                yield Stretch(number - 1, earlier, key, instants, kind)
+                yield Stretch(earlier, key, instants, kind)
         before = key, frame
     if before is not None and before[0].known and zero_us is not None and number >= start:
-        yield Stretch(number, before[0], None, grid.at(number, before[0].t_us, zero_us))
+        yield Stretch(before[0], None, grid.at(number, before[0].t_us, zero_us))
 
 
 def _light(key: Key) -> Frame:

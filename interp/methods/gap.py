@@ -21,13 +21,11 @@ class Gap:
     frame_0, frame_1   [C, H, W] sRGB codes, 0 ... 1, float32; C is 1 or 3
     events             between them, B = 1; of any resolution, laid over the frames edge on edge; those of a camera
                        that stands elsewhere are brought there before (`candidates.calibrated`); None where unknown
-    gap_us             from the one to the other [us]
     """
 
     frame_0: torch.Tensor
     frame_1: torch.Tensor
     events: EventCounts | None
-    gap_us: int
 
 
 class Method(Protocol):

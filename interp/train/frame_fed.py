@@ -93,4 +93,4 @@ def events_of(batch: Batch) -> EventCounts:
 def gap_of(clip: Batch) -> Gap:
     """The only pair of frames of a batch."""
     first, last = clip["frames"][0]
-    return Gap(first, last, events_of(clip), 0)
+    return Gap(first, last, events_of(clip))

@@ -281,7 +281,7 @@ def test_a_fresh_guided_network_is_the_closed_form() -> None:
     times = torch.tensor([0.25, 0.5])
     with torch.no_grad():
         images = make("rrin_events_guided")(first, last, times, events).images[0]
-    expected = open_method("guided").between(Gap(first[0], last[0], events, 33_333), times)
+    expected = open_method("guided").between(Gap(first[0], last[0], events), times)
     torch.testing.assert_close(images, expected, atol=1e-5, rtol=0)
 
 
@@ -317,7 +317,7 @@ def test_coarse_events_do_not_blur_what_moves_as_a_whole() -> None:
     fine = moving(path)
     coarse = EventCounts(fine.off_on[..., :side, :side], fine.contrast).pooled(3)
     error = {
-        name: float((open_method(name).between(Gap(*gap, coarse, 33_333), torch.tensor([0.25, 0.5, 0.75]))
+        name: float((open_method(name).between(Gap(*gap, coarse), torch.tensor([0.25, 0.5, 0.75]))
                      - truth[..., :side, :side])[..., 8:-8, 8:-8].square().mean())
         for name in ("bridge", "guided")
     }  # fmt: skip
@@ -328,7 +328,7 @@ def test_the_combined_system_starts_from_what_is_guided() -> None:
     """Heads that are zero leave the closed form as it is, with the UNet of the residue or without it."""
     first, second, seen = shifted(0), shifted(3), moving([0, 1, 2, 3])
     times = torch.tensor([1 / 3, 2 / 3])
-    wanted = open_method("guided").between(Gap(first[0], second[0], seen, 1), times)
+    wanted = open_method("guided").between(Gap(first[0], second[0], seen), times)
     torch.manual_seed(0)
     for refine in ("unet", "none"):
         made = make("rrin_slomo_events", flow="guided", refine=refine)(first, second, times, seen)

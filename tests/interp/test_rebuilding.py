@@ -28,7 +28,7 @@ NOTHING = EventCounts.none(1, (48, 48), steps=8)
 
 
 def made_by(method: str | Path, frame_0: torch.Tensor, frame_1: torch.Tensor) -> torch.Tensor:
-    return open_method(str(method)).begin().between(Gap(frame_0, frame_1, NOTHING, 33_333), TIMES)
+    return open_method(str(method)).begin().between(Gap(frame_0, frame_1, NOTHING), TIMES)
 
 
 def test_between_two_frames_that_are_alike_all_give_that_frame() -> None:
@@ -45,7 +45,7 @@ def test_of_no_times_there_are_no_images(tmp_path: Path, method: str) -> None:
     if method not in METHODS:
         save(tmp_path / "a.safetensors", method, make(method))
     opened = open_method(method if method in METHODS else str(tmp_path / "a.safetensors"))
-    gap = Gap(*torch.rand(2, 3, 48, 96), EventCounts.none(1, (48, 96), steps=8), 33_333)
+    gap = Gap(*torch.rand(2, 3, 48, 96), EventCounts.none(1, (48, 96), steps=8))
     for tiling in (None, parse_tiling("64x64", (96, 48), 32)):
         assert not [*opened.begin().images(gap, torch.zeros(0), tiling)]
 
@@ -75,12 +75,12 @@ def test_flow_at_even_times_is_that_of_the_upsampler(steps: int) -> None:
     )
     even = [torch.from_numpy(each.light) for each in make_upsampler("flow", steps).between(before, after)]
     times = torch.from_numpy(np.linspace(0, 1, steps + 1)[1:]).float()
-    made = open_method("flow").between(Gap(*frames, None, 33_333), times)
+    made = open_method("flow").between(Gap(*frames, None), times)
     assert torch.equal(made, to_codes(torch.stack(even).permute(0, 3, 1, 2), "srgb"))
 
 
 def test_flow_makes_the_instants_asked_for_and_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    gap = Gap(*torch.rand(2, 3, 48, 64), None, 33_333)
+    gap = Gap(*torch.rand(2, 3, 48, 64), None)
     times = torch.tensor([0.0, 0.12501, 0.2493, 0.2493, 0.9, 1.0])  # as stamps of a real camera are
     flow = open_method("flow").between
     alone = torch.cat([flow(gap, time[None]) for time in times])
@@ -115,7 +115,7 @@ def test_networks_of_files_are_methods(
     assert (method.name, method.needs_events) == (name, needs_events)
     frames = torch.rand(2, 3, 48, 40)
     assert made_by(path, *frames).shape == (3, 3, 48, 40)
-    without = Gap(*frames, None, 33_333)
+    without = Gap(*frames, None)
     if needs_events:
         with pytest.raises(UsageError, match="events"):
             method.between(without, TIMES)
@@ -127,7 +127,7 @@ def test_a_network_of_events_remembers_until_it_begins_again(tmp_path: Path) -> 
     path = tmp_path / "firenet.safetensors"
     save(path, "firenet", make("firenet", "tiny"))
     frame = torch.rand(3, 16, 16)
-    gap = Gap(frame, frame, EventCounts(torch.randint(0, 2, (1, 2, 8, 16, 16)), torch.full((1, 2), 0.15)), 33_333)
+    gap = Gap(frame, frame, EventCounts(torch.randint(0, 2, (1, 2, 8, 16, 16)), torch.full((1, 2), 0.15)))
     method = open_method(str(path))
     once, again = (method.between(gap, TIMES) for _ in range(2))
     assert method.sequential and not torch.equal(once, again)
@@ -171,7 +171,7 @@ def test_weights_that_make_no_numbers_are_said(tmp_path: Path) -> None:
     save(tmp_path / "broken.safetensors", "rrin", network)
     frame = torch.rand(3, 32, 32)
     with pytest.raises(DataError, match="'broken' made values that are no numbers"):
-        of_weights(tmp_path / "broken.safetensors").between(Gap(frame, frame, None, 1000), torch.tensor([0.5]))
+        of_weights(tmp_path / "broken.safetensors").between(Gap(frame, frame, None), torch.tensor([0.5]))
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
@@ -181,7 +181,7 @@ def test_where_few_bits_make_no_numbers_more_are_advised(precision: str) -> None
         for layer, factor in (("flow.down.0.0", 3e5), ("flow.down.1.0", 1 / 3e5)):
             network.get_submodule(layer).weight.mul_(factor)  # type: ignore[union-attr, operator]
     method = OfFrames("loud", network, False, Running(precision))  # type: ignore[arg-type]
-    gap = Gap(frame, frame.flip(2), None, 1000)
+    gap = Gap(frame, frame.flip(2), None)
     if precision == "float16":
         with pytest.raises(DataError, match=r"take other weights or --precision float32$"):
             method.between(gap, torch.tensor([0.5]))

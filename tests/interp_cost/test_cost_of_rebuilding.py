@@ -46,7 +46,7 @@ def gap(width: int = 64, height: int = 48) -> Gap:
     draw = np.random.default_rng(5)
     frame_0, frame_1 = (torch.from_numpy(draw.random((3, height, width), np.float32)) for _ in range(2))
     off_on = torch.from_numpy(draw.poisson(0.1, (1, 2, 32, height, width)).astype(np.uint8))
-    return Gap(frame_0, frame_1, EventCounts(off_on, torch.full((1, 2), 0.15)), 40_000)
+    return Gap(frame_0, frame_1, EventCounts(off_on, torch.full((1, 2), 0.15)))
 
 
 def test_the_scores_are_those_of_an_evaluation(quick: None, tmp_path: Path) -> None:

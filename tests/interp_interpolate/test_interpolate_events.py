@@ -538,16 +538,16 @@ def test_a_blurred_frame_and_its_events_give_back_the_light_of_each_instant() ->
     frame = to_codes(torch.from_numpy(mean[None].astype(np.float32)), "srgb")
     counts = count_events(events, SIZE, 0, 32_000, 32, (0.2, 0.2))
     times = torch.tensor([1.5, 10.5, 31.5]) / 32
-    found = to_light(OneFrame("deblur").between(Gap(frame, frame, counts, 32_000), times), "srgb")
+    found = to_light(OneFrame("deblur").between(Gap(frame, frame, counts), times), "srgb")
     # (counts say in which thirty-second of the exposure an event came: half of its step has been made in the middle)
     for image, k in zip(found, (1, 10, 31), strict=True):
         quiet = light[k] == light[k - 1]
         assert np.abs(np.log((image[0].numpy() + 1e-3) / (light[k] + 1e-3)))[quiet].max() < 0.03
-    sharp = OneFrame("integration").between(Gap(frame, frame, counts, 32_000), torch.tensor([0.5]))
+    sharp = OneFrame("integration").between(Gap(frame, frame, counts), torch.tensor([0.5]))
     torch.testing.assert_close(sharp[0], frame, atol=1e-5, rtol=0)
     none = EventCounts.none(1, SIZE[::-1])
     for name in ("deblur", "integration"):
-        same_frame = OneFrame(name).between(Gap(frame, frame, none, 32_000), times)
+        same_frame = OneFrame(name).between(Gap(frame, frame, none), times)
         torch.testing.assert_close(same_frame, frame.expand(3, -1, -1, -1), atol=1e-5, rtol=0)
 
 
@@ -563,7 +563,7 @@ def test_a_single_frame_is_the_same_whichever_way_time_goes(name: Literal["deblu
     times = torch.tensor([0.0, 0.25, 0.5, 1.0])
     events, with_stuck = EventCounts(off_on, contrast), EventCounts(stuck, contrast)
     back = EventCounts(stuck.flip(1, 2), contrast.flip(1))
-    gaps = [Gap(frame, frame, each, 32_000) for each in (with_stuck, back, events)]
+    gaps = [Gap(frame, frame, each) for each in (with_stuck, back, events)]
     forth, reverse, plain = (
         OneFrame(name).between(gap, when) for gap, when in zip(gaps, (times, 1 - times, times), strict=True)
     )

@@ -33,7 +33,7 @@ def gap(event_size: tuple[int, int] = SIZE) -> Gap:
     coarse = torch.rand(2, 3, 26, 34)
     frames = torch.nn.functional.interpolate(coarse, SIZE[::-1], mode="bilinear", align_corners=False)
     counts = torch.poisson(torch.full((1, 2, 8, *event_size[::-1]), 0.05))
-    return Gap(frames[0], frames[1], EventCounts(counts, torch.tensor([[0.15, 0.2]])), 33_333)
+    return Gap(frames[0], frames[1], EventCounts(counts, torch.tensor([[0.15, 0.2]])))
 
 
 @pytest.mark.parametrize("multiple", [2, 16, 32, 128])
