@@ -56,7 +56,9 @@ SAYS = {  # what an option says of a job: the part of it, if it is in one, and t
     "--set", "settings", multiple=True, metavar="KEY=VALUE",
     help="Change a number of the recipe, of network., clips., samples., window. or validation.; may be repeated.",
 )  # fmt: skip
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Another seed is another run.")
+@click.option(
+    "--seed", type=click.IntRange(0, (1 << 63) - 1), default=0, show_default=True, help="Another seed is another run."
+)
 @click.option("--resume", is_flag=True, help="Go on where a run stands.")
 @click.option("--session", metavar="TIME", help="Stop after this time, such as 5m, to go on another time.")
 @click.option(

@@ -25,7 +25,7 @@ class Recipe(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    seed: int = Field(0, ge=0, description="of first weights, samples and whatever else is random")
+    seed: int = Field(0, ge=0, lt=1 << 63, description="of first weights, samples and whatever else is random")
     steps: int | None = Field(None, ge=1, description="steps; without them training takes `time_s`")
     time_s: float = Field(
         3300.0, gt=0, description="how long training may take [s]; 55 minutes, so that an hour is kept"

@@ -151,6 +151,7 @@ def test_the_help_names_every_network_that_can_be_trained() -> None:
         (["--resume"], "error: rrin_events_guided_tiny holds no run to go on with"),
         (["--devices", "0"], "0 is less than 1"),
         (["--size", "huge"], "'huge' is not one of"),
+        (["--seed", "9223372036854775808"], "9223372036854775808 is not in the range"),
         (["--dry-run", "--start", "features=firenet-paper"], "the loss of this network looks at no features"),
         (["--dry-run", "--start", "foo=firenet-paper"], "RrinEventsGuided has no part 'foo'; it has"),
         (["--dry-run", "--cpu", "--set", "batch=3"], "batches of 3 cannot be shared out evenly among 2 processes"),

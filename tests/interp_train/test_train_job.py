@@ -90,6 +90,8 @@ def test_every_number_of_the_recipe_says_what_it_is_and_stays() -> None:
     assert all(field.description for field in Recipe.model_fields.values())
     with pytest.raises(ValidationError):
         Recipe().rate = 1.0  # type: ignore[misc]
+    with pytest.raises(ValidationError, match="less than"):
+        Recipe(seed=1 << 63)  # (TOML has no greater ones)
 
 
 def test_a_job_is_known_by_what_is_in_the_files_that_it_names(tmp_path: Path) -> None:
