@@ -23,6 +23,7 @@ from interp.data.settings import ClipSettings
 from interp.data.shot import Beside, coarse
 from vid2ev.scenes.textures import pixels_of
 from vid2ev.sensors.devices import Device
+from vid2ev.stamps import Stamp, stamp
 from vid2ev.stream.frames import luminance_of
 
 MOST_BEFORE = 3  # layers before the background
@@ -120,7 +121,7 @@ def _layer(
     draw: np.random.Generator, name: str, size: tuple[int, int], distance_m: float, camera: np.ndarray, behind_all: bool
 ) -> Layer:
     """A layer at an arbitrary speed."""
-    light = _enlarged(name, round(4 * log_uniform(draw, CLOSENESS)))
+    light = _enlarged(name, stamp(name), round(4 * log_uniform(draw, CLOSENESS)))
     own = _way(draw) * (0.3 if behind_all else 1.0)
     near = NEAREST_M / distance_m
     if behind_all:
@@ -191,7 +192,7 @@ def _cut_out(draw: np.random.Generator, light: np.ndarray, side: int) -> np.ndar
 
 
 @lru_cache(maxsize=48)
-def _enlarged(name: str, quarters: int) -> np.ndarray:
+def _enlarged(name: str, written: Stamp, quarters: int) -> np.ndarray:
     """A photograph at about quarters/4 times its size, linear light [h, w, 3], no larger than 768 pixels."""
     import cv2
 

@@ -23,6 +23,7 @@ from vid2ev.scenes.scene import Scene
 from vid2ev.scenes.scene_file import SceneFile, read_scene
 from vid2ev.scenes.world import World
 from vid2ev.sensors.devices import Device
+from vid2ev.stamps import Stamp, stamp
 from vid2ev.stream.frames import luminance_of
 
 WHOLE_PX: Range = (160.0, 640.0)  # width of the picture of which a part is seen; scenes are made for 640
@@ -44,7 +45,7 @@ class SceneShot:
         draw = chance(seed, "scene", number)
         name = settings.scene_names[int(draw.integers(len(settings.scene_names)))]
         scene_seed = int(draw.integers(1 << 62))
-        self._world = World(_dressed(_file(name).resolved(scene_seed), settings, draw))
+        self._world = World(_dressed(_file(name, stamp(name)).resolved(scene_seed), settings, draw))
         self._world.threads = 1
         self._lens = _part(self._world.intrinsics, settings.size, draw)
         middle_s = uniform(draw, (SPAN_S[1] / 2, 1e-9 * self._world.duration_ns - SPAN_S[1] / 2))
@@ -96,7 +97,7 @@ def _there(lens: Intrinsics, size: tuple[int, int], beside: Beside) -> tuple[Int
 
 
 @lru_cache(maxsize=16)
-def _file(name: str) -> SceneFile:
+def _file(name: str, written: Stamp) -> SceneFile:
     return read_scene(name)
 
 

@@ -21,6 +21,7 @@ from interp.data.shot import AHEAD, Beside, coarse
 from vid2ev import Frame, UsageError, open_source
 from vid2ev.sensors.devices import Device
 from vid2ev.sources import Source, begins_s, is_single_picture
+from vid2ev.stamps import Stamp, stamp
 from vid2ev.upsample import make_upsampler
 from vid2ev.upsample.cuts import CutDetector
 
@@ -107,9 +108,13 @@ def length_of(source: Source, name: str) -> tuple[int, float]:
     return count, seconds
 
 
-@lru_cache(maxsize=16)
 def _opened(name: str) -> tuple[Source, float]:
     """A film, and where it begins by its own clock [s]."""
+    return _opened_once(name, stamp(name))
+
+
+@lru_cache(maxsize=16)
+def _opened_once(name: str, written: Stamp) -> tuple[Source, float]:
     source = open_source(name, colour="rgb")
     return source, begins_s(source)
 

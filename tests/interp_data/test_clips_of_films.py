@@ -17,8 +17,22 @@ from interp.data.validation import SEED, held_out, validation_clips
 from interp.data.video_shots import VideoShot, check_film
 from vid2ev import UsageError, open_source
 from vid2ev.light.eight_bits import srgb_codes
+from vid2ev.recording.exposures import write_codes
 
 REAL = Path(__file__).parents[3] / "shared" / "data" / "videos" / "nasa_13013.mp4"
+SCENE = """
+[scene]
+duration_s = 0.5
+ambient = 0.8
+[camera]
+size = [64, 48]
+[[objects]]
+name = "wall"
+kind = "plane"
+size_m = [2, 2, 0]
+texture = "brick"
+trajectory = { kind = "fixed", position_m = [0, 0, %g] }
+"""
 FILMS = {"scenes": 0.0, "photographs": 0.0, "videos": 1.0, "size": (32, 24), "sensors": SENSORS["clean"]}
 
 
@@ -80,6 +94,39 @@ def test_cameras_see_a_film_in_its_order_from_before_the_gap_on(tmp_path: Path, 
 def test_a_slower_film_has_a_shorter_gap(tmp_path: Path) -> None:
     settings = ClipSettings(**FILMS, video_files=(film(tmp_path / "film.npz"),), slowdown=4)
     assert made(settings, 0, 0).gap_us == 40_000
+
+
+@pytest.mark.parametrize("source", ["film", "picture", "scene"])
+def test_what_is_written_again_is_read_again(tmp_path: Path, source: str) -> None:
+    """By one process, under its own name: its clips are those of what is there."""
+    files = {"film": tmp_path / "film.npz", "picture": tmp_path / "brick.png", "scene": tmp_path / "mine.toml"}
+    said = FILMS | {"videos": 0.0, "video_files": (str(files["film"]),), "textures": (str(files["picture"]),)}
+    said |= {"scene_names": (str(files["scene"]),)}
+    said |= {"film": {"videos": 1.0}, "picture": {"photographs": 1.0}, "scene": {"scenes": 1.0}}[source]
+
+    def write(path: Path, number: int) -> None:
+        np.savez(
+            path / "film.npz", frames=np.random.default_rng(0).random((20, 24, 32, 3), np.float32), fps=50 * number
+        )
+        draw = np.random.default_rng(number)
+        write_codes(path / "brick.png", draw.integers(0, 256, (64, 64, 3)).astype(np.uint8))
+        (path / "mine.toml").write_text(SCENE % (0.3 * number))
+
+    write(tmp_path, 1)
+    first = made(ClipSettings(**said), 0, 0)
+    (tmp_path / "other").mkdir()
+    for path in (tmp_path, tmp_path / "other"):
+        write(path, 2)
+    again = made(ClipSettings(**said), 0, 0)
+    elsewhere = {
+        key: tuple(str(tmp_path / "other" / Path(name).name) for name in said[key])
+        for key in ("video_files", "textures", "scene_names")
+    }
+    other = made(ClipSettings(**said | elsewhere), 0, 0)
+    np.testing.assert_array_equal(again.truth, other.truth)
+    np.testing.assert_array_equal(again.off_on, other.off_on)
+    assert again.gap_us == other.gap_us
+    assert (again.truth != first.truth).any() or again.gap_us != first.gap_us
 
 
 @pytest.mark.parametrize(("light", "seen"), [(np.nan, 0.0), (-np.inf, 0.0), (-1.0, 0.0), (np.inf, 65504.0)])
