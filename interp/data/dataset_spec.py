@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -25,7 +25,10 @@ from vid2ev.errors import Vid2evError
 from vid2ev.rig.camera import Camera, Rig
 from vid2ev.scenes.scene_file import scene_names
 from vid2ev.sources import begins_s, is_single_picture
+from vid2ev.sources.cut import FASTEST, SLOWEST
+from vid2ev.sources.source import LARGEST
 
+Side = Annotated[int, Field(ge=1, le=LARGEST)]
 Layout = Literal["own", "hsergb", "bsergb"]
 EDGES_S = 0.022  # of a scene's light more than its exposures take: instants may be 10 ms apart, at both ends
 EDGES = 2.2  # the same of films, in frames
@@ -40,11 +43,13 @@ class DatasetSpec(BaseModel):
     preset: Literal["varied", "paper"] = Field(default="varied", description="of the sensors and rates")
     count: int | None = Field(default=None, ge=1, le=10**6, description="scenes; left out, of videos all they have")
     seed: int = Field(default=0, ge=0, lt=1 << 62, description="which of all such data sets")
-    size: tuple[int, int] = Field(default=(640, 480), description="of the frames of rendered scenes [px]")
+    size: tuple[Side, Side] = Field(default=(640, 480), description="of the frames of rendered scenes [px]")
     videos: tuple[str, ...] = Field(default=(), description="real videos, in place of rendered scenes")
-    slowdown: float = Field(default=1.0, gt=0, description="how many times slower than the world these play")
-    frames: int = Field(default=7, ge=2, description="of the frame camera, in a scene")
-    cis_fps: float = Field(default=30.0, gt=0, description="of the frame camera [Hz]")
+    slowdown: float = Field(
+        default=1.0, ge=FASTEST, le=SLOWEST, description="how many times slower than the world these play"
+    )
+    frames: int = Field(default=7, ge=2, le=10**6, description="of the frame camera, in a scene")
+    cis_fps: float = Field(default=30.0, ge=0.01, le=30_000, description="of the frame camera [Hz]")
 
     @model_validator(mode="after")
     def _fits(self) -> DatasetSpec:

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from pydantic import ValidationError
 
 from interp.commands.dataset import dataset
 from interp.data.card import card_text
 from interp.data.dataset import make_scene, write_dataset
-from interp.data.dataset_spec import DatasetSpec, scenes_of
+from interp.data.dataset_spec import DatasetSpec, _rig, scenes_of
 from interp.data.layouts import open_sequence, windows
 from interp.data.layouts.ergb import LAYOUTS
 from interp.data.layouts.own import Own
@@ -377,6 +378,33 @@ def test_what_cannot_be_meant_is_one_sentence_and_exit_code_2(tmp_path: Path, ar
     said = result.exception if isinstance(result.exception, UsageError) else result
     assert said is not None and said.exit_code == 2, result.output
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--size", "1000000x480"], "--size 1000000: it must be less than or equal to 65535"),
+        (["--slowdown", "5000", "--from"], "--slowdown 5000.0: it must be less than or equal to 1000"),
+        (["--slowdown", "1e-9", "--from"], "--slowdown 1e-09: it must be greater than or equal to 0.000001"),
+    ],
+)
+def test_numbers_that_no_scene_can_have_are_refused_before_any_is_made(
+    tmp_path: Path, film: Path, arguments: list[str], said: str
+) -> None:
+    result = run(tmp_path / "set", *arguments, *[film] * (arguments[-1] == "--from"))
+    assert isinstance(result.exception, UsageError) and str(result.exception) == said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("fps", [0.01, 30_000.0])
+def test_rates_that_a_data_set_may_have_give_cameras(fps: float) -> None:
+    spec = DatasetSpec(cis_fps=fps, frames=2, videos=("none.mp4",), preset="paper")
+    for number in range(4):
+        assert _rig(spec, number)[0].cameras[2].set["frame_rate_hz"] == pytest.approx(32 * fps)
+    for wrong in (fps / 10, fps * 10):
+        if not 0.01 <= wrong <= 30_000:
+            with pytest.raises(ValidationError, match="cis_fps"):
+                DatasetSpec(cis_fps=wrong)
 
 
 @pytest.mark.parametrize("size", ["64x48", "640x480"])
