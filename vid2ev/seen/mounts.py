@@ -148,11 +148,8 @@ class Mount:
     ) -> Dvs:
         """The event sensor, before its first frame; on a CPU of a part of its pixels, or of another kind."""
         assert isinstance(self.sensor.spec, DvsSpec)
-        spec, number, origin_ns = (
-            self.sensor.spec,
-            self.number,
-            1000 * self.clock_offset_us,
-        )  # (0 of the source's clock)
+        spec, number = self.sensor.spec, self.number
+        origin_ns = 1000 * self.clock_offset_us  # 0 of the source's clock
         if device.name != "cpu":
             from vid2ev.sensors.dvs_on_card import DvsOnCard
 
