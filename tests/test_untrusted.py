@@ -10,6 +10,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +158,34 @@ def test_hdf5_cannot_fill_the_memory_or_reach_into_other_files(tmp_path: Path) -
                 file.create_virtual_dataset("events/t", layout)
         with pytest.raises(DataError, match="is in another file"):
             open_events(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes here")
+@pytest.mark.parametrize("name", ["events", "events/t", "events/label", "frames/t", "t_offset"])
+@pytest.mark.parametrize("within", [0, 1, 3])
+def test_hdf5_does_not_wait_for_a_pipe_that_it_names(tmp_path: Path, name: str, within: int) -> None:
+    """Nor for the terminal, by whatever links within the file it leads there."""
+    os.mkfifo(tmp_path / "pipe")
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "r+") as file:
+        if name in file:
+            del file[name]
+        names = [name, *(f"other{k}/t" for k in range(within))]
+        for here, there in pairwise(names):
+            file[here] = h5py.SoftLink(f"/{there}")
+        file[names[-1]] = h5py.ExternalLink("pipe", "t")
+    with pytest.raises(DataError, match=rf"{name}(/t)? is in another file"):
+        open_events(path)
+
+
+def test_hdf5_may_have_links_within(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5")
+    expected = events_in(path)
+    with h5py.File(path, "r+") as file:
+        file.move("events", "prophesee/left")
+        file["left"] = h5py.SoftLink("prophesee/left")
+        file["events"] = h5py.SoftLink("./left")
+    assert events_in(path) == expected
 
 
 def event_stream(path: Path, size: tuple[int, int]) -> Path:

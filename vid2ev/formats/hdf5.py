@@ -32,7 +32,16 @@ from vid2ev.errors import DataError
 from vid2ev.formats.columns import labels, pixels, whole_us
 from vid2ev.formats.event_file import BLOCK, Format, Picture, Recording, promised, regrouped, within
 from vid2ev.formats.frame_index import FrameIndex
-from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
+from vid2ev.formats.hdf5_file import (
+    MAGIC,
+    WholeFile,
+    check_chunks,
+    check_links,
+    holds_table,
+    is_inside,
+    is_whole,
+    opened,
+)
 from vid2ev.stream.ahead import ahead
 from vid2ev.stream.events import Events
 from vid2ev.untrusted import check_bytes
@@ -185,6 +194,7 @@ def _index(index: h5py.Dataset, first: int, last: int, t: np.ndarray, start: int
 def _check(file: h5py.File, path: Path) -> None:
     import h5py
 
+    check_links(file, path, [*(f"events/{name}" for name in "txyp"), *BESIDE])
     columns = [file.get(f"events/{name}") for name in "txyp"]
     if not all(isinstance(column, h5py.Dataset) and column.ndim == 1 for column in columns):
         raise DataError(f"{path} has no events/t, x, y, p; expected an event file in the layout of DSEC")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MAGIC = b"\x89HDF\r\n\x1a\n"
 # gzip, shuffle, Fletcher-32, bzip2, LZF, Blosc, LZ4, bitshuffle, Zstandard: others may trust what they unpack
 FILTERS = {1: 0, 2: 0, 3: 0, 307: 0, 32000: 0, 32001: 4, 32004: 0, 32008: 3, 32015: 0}  # -> numbers that each reads
+
+
+MOST_LINKS = 16  # from one to the next, as HDF5 itself follows them
 
 
 @contextmanager
@@ -38,9 +41,38 @@ def holds_table(path: Path) -> bool:
 
     try:
         with h5py.File(path, "r") as file:
-            return isinstance(file.get("events"), h5py.Dataset)
+            return not _leads_out(file, "events") and isinstance(file.get("events"), h5py.Dataset)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError):
         return False
+
+
+def check_links(file: h5py.File, path: Path, names: Iterable[str]) -> None:
+    """Raise DataError where one of these names leads into another file: that may be one of which an opening waits for
+    ever, such as a pipe, so it is not opened."""
+    if outside := [name for name in names if _leads_out(file, name)]:
+        raise DataError(f"{path}: {outside[0]} is in another file; expected one file, so copy it into this (h5repack)")
+
+
+def _leads_out(file: h5py.File, name: str, links: int = MOST_LINKS) -> bool:
+    """Whether a name leads into another file, also by links within the file, of which there may be so many."""
+    import h5py
+
+    group = file["/"]
+    parts = [part for part in name.split("/") if part not in ("", ".")]
+    for number, part in enumerate(parts, 1):
+        there = group.id.links
+        if not there.exists(part.encode()):
+            return False
+        kind = there.get_info(part.encode()).type
+        if kind == h5py.h5l.TYPE_SOFT:
+            target = there.get_val(part.encode()).decode()
+            begin = "" if target.startswith("/") else f"{group.name}/"
+            return links == 0 or _leads_out(file, "/".join([f"{begin}{target}", *parts[number:]]), links - 1)
+        if kind != h5py.h5l.TYPE_HARD:
+            return True
+        if not isinstance(group := group[part], h5py.Group):
+            return False
+    return False
 
 
 def is_inside(dataset: h5py.Dataset, path: Path) -> bool:

@@ -22,7 +22,16 @@ import numpy as np
 from vid2ev.errors import DataError
 from vid2ev.formats.columns import pixels, whole_us
 from vid2ev.formats.event_file import Format, Recording, promised
-from vid2ev.formats.hdf5_file import MAGIC, WholeFile, check_chunks, holds_table, is_inside, is_whole, opened
+from vid2ev.formats.hdf5_file import (
+    MAGIC,
+    WholeFile,
+    check_chunks,
+    check_links,
+    holds_table,
+    is_inside,
+    is_whole,
+    opened,
+)
 from vid2ev.formats.sequential import Sequential
 from vid2ev.stream.events import Events
 
@@ -85,6 +94,7 @@ def write_events(path: Path, recording: Recording) -> None:
 def _check(file: h5py.File, path: Path) -> None:
     import h5py
 
+    check_links(file, path, ["events"])
     table = file.get("events")
     if not isinstance(table, h5py.Dataset) or table.ndim != 2 or not COLUMNS <= table.shape[1] <= COLUMNS + 1:
         raise DataError(f"{path} has no table of events with 4 columns; expected the HDF5 of v2e")
